@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from verify.stepnc.attribute_checks import Attributes
-from verify.stepnc.part21 import DERIVED, Part21, Ref, Typed, Word
+from verify.stepnc.part21 import DERIVED, EnumItem, Part21File, Ref, Typed
 
 NOWHERE, WORD = "#999999", ".NO_SUCH_WORD."
 
@@ -31,7 +31,7 @@ def written(value: object) -> str:
         return "*"
     if isinstance(value, Ref):
         return f"#{int(value)}"
-    if isinstance(value, Word):
+    if isinstance(value, EnumItem):
         return f".{value!s}."
     if isinstance(value, Typed):
         return f"{value.name}({written(value.value)})"
@@ -60,12 +60,12 @@ def ways(value: object, names: bool) -> Iterator[tuple[str, str]]:
         for how, text in ways(value.value, names):
             yield f"inside it {how}", f"{value.name}({text})"
         return
-    yield "of another type", "7" if isinstance(value, str) and not isinstance(value, Word) else "'text'"
+    yield "of another type", "7" if isinstance(value, str) and not isinstance(value, EnumItem) else "'text'"
     if isinstance(value, Ref):
         yield "leading nowhere", NOWHERE
-    if isinstance(value, Word):
+    if isinstance(value, EnumItem):
         yield "another word", WORD
-    if names and isinstance(value, str) and not isinstance(value, Word):
+    if names and isinstance(value, str) and not isinstance(value, EnumItem):
         yield "another word", "'no such word'"
 
 
@@ -77,7 +77,7 @@ def broken(text: str, tables: dict[str, Attributes], *, names: bool, most: int |
     names  : strings stand for enumerations too; most : so many instances of an entity, None all
     without : entities, with blanks between the records of complex ones, that are left alone
     """
-    file = Part21(text, "job")
+    file = Part21File(text, "job")
     lines = text.split("\n")
     seen: dict[str, int] = {}
     numbers = sorted({n for of in file.entities().values() for n in of} | set(file._point_ids.tolist()))

@@ -18,7 +18,7 @@ from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from tests.hand_parts import box_mesh
 from verify.material.material import machined
-from verify.material.stock_field import Field
+from verify.material.stock_field import DistanceField
 from verify.model import ProofSetup
 from verify.moves import BOW, Moves
 from verify.tool_axes import ToolAxes
@@ -69,7 +69,7 @@ class Machined:
         turning = self.moves.axes is not None and bool((self.moves.axes.angle > 0).any())
         return (BOW if turning else 1e-6) + self.strays
 
-    def field(self, step: float, shift: F64 | float = 0.0, threads: int = 2) -> Field:
+    def field(self, step: float, shift: F64 | float = 0.0, threads: int = 2) -> DistanceField:
         """The field of this case, its lattice moved by ``shift`` (3,) steps."""
         room = np.array([BOX[0] - 2.0, BOX[1] + 2.0]) + step * np.asarray(shift)
         return machined(box_mesh(*BOX), self.moves, (self.tool,), self.setup, step, box=room, threads=threads)

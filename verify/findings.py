@@ -1,4 +1,7 @@
-"""From single contacts to findings a person can act on."""
+"""Turns single contacts into findings that a person can act on.
+
+Arrays are float64, lengths are mm, and points are in the setup frame unless a docstring says otherwise.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +16,8 @@ from verify.kernels.stock import CUTTER, FIXTURE, HOLDER, NECK, PLUNGE, SHANK
 from verify.model import Finding, FindingKind
 from verify.moves import Moves
 
-MOST = 200
-OF_A_KIND = MOST // len(FindingKind)
+MAX_FINDINGS = 200
+KEPT_OF_A_KIND = MAX_FINDINGS // len(FindingKind)
 NEAR = 5.0
 LINES_APART = 5
 BODY_NAMES = {CUTTER: "cutting part", NECK: "neck", SHANK: "shank", HOLDER: "holder"}
@@ -22,7 +25,13 @@ BODY_NAMES = {CUTTER: "cutting part", NECK: "neck", SHANK: "shank", HOLDER: "hol
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """Where each move comes from: program names, (m,) program number, (m,) 1-based line, (m,) T number."""
+    """Origin of each of m moves.
+
+    names   : names of the programs
+    program : (m,) int32, index, place of the program in ``names``
+    line    : (m,) int32, index, 1-based line
+    tool    : (m,) int32, index, T number
+    """
 
     names: tuple[str, ...]
     program: I32
@@ -31,7 +40,13 @@ class Source:
 
 
 def chains(program: I32, line: I32, points: F64, key: I32) -> NDArray[np.int64]:
-    """(n,) int64 group of each row: one key, one program, lines at most 5 and places at most 5 mm apart."""
+    """Group neighbouring contacts: one key, one program, lines at most 5 and places at most 5 mm apart.
+
+    program, line, key : (n,) int32, index
+    points             : (n, 3) float64, mm, setup frame
+
+    Returns (n,) int64, index: the group of each row.
+    """
     if len(line) == 0:
         return np.zeros(0, np.int64)
     order = np.lexsort((points[:, 1], points[:, 0], line, program, key))
@@ -44,7 +59,13 @@ def chains(program: I32, line: I32, points: F64, key: I32) -> NDArray[np.int64]:
 
 
 def worst_of(groups: NDArray[np.int64], depth: F64) -> list[NDArray[np.int64]]:
-    """Row indices of each group, deepest first (first row first among equals); groups (n,) int64, depth (n,) mm."""
+    """Rows of each group, the deepest first; of equal depths the first row first.
+
+    groups : (n,) int64, index
+    depth  : (n,) float64, mm
+
+    Returns one (k,) int64 array of rows, index, for each group.
+    """
     order = np.lexsort((np.arange(len(groups)), -depth, groups))
     cuts = np.flatnonzero(np.diff(groups[order])) + 1
     return [rows for rows in np.split(order, cuts) if len(rows)]
@@ -52,7 +73,11 @@ def worst_of(groups: NDArray[np.int64], depth: F64) -> list[NDArray[np.int64]]:
 
 def contact_findings(events: F64, moves: Moves, source: Source, rapid_clearance: float,
                      skins: F64) -> list[Finding]:
-    """Findings of the events of ``verify.material.stock_lines``; skins (m,) float64 is the plunge limit of each move, mm."""
+    """Findings of the events that a pass over the stock collected.
+
+    events : (e, 7) float64, rows of ``verify.material.stock_pass.StockPass``, mm, setup frame
+    skins  : (m,) float64, mm, depth that each move may plunge
+    """
     if len(events) == 0:
         return []
     move, code, feed = events[:, 0].astype(np.int64), events[:, 1].astype(np.int32), moves.feed
@@ -75,7 +100,7 @@ def contact_findings(events: F64, moves: Moves, source: Source, rapid_clearance:
 
 
 def _nearest(start: F64, end: F64, place: F64) -> F64:
-    """The place (3,) of a straight move that is nearest to another."""
+    """(3,) float64, mm: the point of a straight move that is nearest to ``place``."""
     way = end - start
     size = float(way @ way)
     return np.asarray(start + (min(max(float((place - start) @ way) / size, 0.0), 1.0) if size > 0.0 else 1.0) * way)
@@ -85,22 +110,29 @@ def _contact(code: int, feed: bool, depth: float, clearance: float, rapid_cleara
              skin: float) -> tuple[FindingKind, str, float]:
     if code == PLUNGE:
         return (FindingKind.PLUNGE, f"a descent steeper than the ramp angle takes {depth:.3f} mm of stock with the "
-                f"end of the tool (skin allowed {skin:.3f} mm)", skin)
-    body, what = BODY_NAMES[code % FIXTURE], "a fixture" if code >= FIXTURE else "stock or part"
+                f"end of the tool ({skin:.3f} mm allowed)", skin)
+    body, obstacle = BODY_NAMES[code % FIXTURE], "a fixture" if code >= FIXTURE else "stock or part"
     gap = clearance - depth
     if not feed:
-        text = f"a rapid takes the {body} into {what}" if gap < 0 else \
-            f"a rapid brings the {body} to {gap:.3f} mm of {what} (clearance {rapid_clearance:g} mm)"
+        text = f"a rapid takes the {body} into {obstacle}" if gap < 0 else \
+            f"a rapid brings the {body} to {gap:.3f} mm of {obstacle} (clearance {rapid_clearance:g} mm)"
         return FindingKind.RAPID, text, rapid_clearance
     if gap < 0:
-        return FindingKind.COLLISION, f"the {body} enters {what} by {-gap:.3f} mm", 0.0
-    text = f"the {body} comes to {gap:.3f} mm of {what} (clearance {clearance:.3f} mm)"
+        return FindingKind.COLLISION, f"the {body} enters {obstacle} by {-gap:.3f} mm", 0.0
+    text = f"the {body} comes to {gap:.3f} mm of {obstacle} (clearance {clearance:.3f} mm)"
     return FindingKind.RUBBING, text, clearance
 
 
 def gouge_findings(points: F64, face: I32, depth: F64, area: F64, mover: I32, source: Source,
                    tolerance: float) -> list[Finding]:
-    """Findings of gouges deeper than the tolerance: (n, 3) places, faces, depths in mm, areas and moves."""
+    """Findings of gouges deeper than the tolerance, by face and neighbouring lines.
+
+    points : (n, 3) float64, mm, setup frame
+    face   : (n,) int32, index, face number
+    depth  : (n,) float64, mm, how deep the cut goes under the surface
+    area   : (n,) float64, mm²
+    mover  : (n,) int32, index, the move that cut deepest
+    """
     out = []
     groups = chains(source.program[mover], source.line[mover], points, face)
     for rows in worst_of(groups, depth):
@@ -115,9 +147,9 @@ def gouge_findings(points: F64, face: I32, depth: F64, area: F64, mover: I32, so
 
 def residual_findings(points: F64, zone: I32, face: I32, excess: F64, area: F64, zone_ids: Sequence[str],
                       scallop: float) -> list[Finding]:
-    """Findings of claimed samples outside the budget, by zone, face and 5 mm cell.
+    """Findings of samples outside the budget of their zone, by zone, face and 5 mm cell.
 
-    points     : (n, 3) float64, mm
+    points     : (n, 3) float64, mm, setup frame
     zone, face : (n,) int32, row of ``zone_ids`` from 1, and face number
     excess     : (n,) float64, mm left over the allowance, negative where the part is cut too deep
     area       : (n,) float64, mm²
@@ -132,17 +164,17 @@ def residual_findings(points: F64, zone: I32, face: I32, excess: F64, area: F64,
         name = zone_ids[zone[r] - 1]
         total = float(area[rows].sum())
         text = f"{excess[r]:.4f} mm stays where {scallop:g} mm is allowed" if excess[r] > 0 else \
-            f"{-excess[r]:.4f} mm too deep"
+            f"the cut is {-excess[r]:.4f} mm too deep"
         out.append(Finding(FindingKind.RESIDUAL, "", 0, name, f"F{face[r]}", _point(points[r]), float(excess[r]),
-                           scallop, f"{name}: {text} ({total:.3g} mm² round here)", len(rows), total))
+                           scallop, f"{name}: {text} ({total:.3g} mm² in this place)", len(rows), total))
     return out
 
 
 def ordered(findings: Sequence[Finding]) -> tuple[tuple[Finding, ...], dict[str, int]]:
-    """200 findings, the gravest first, and how many there are of each kind.
+    """200 findings, the gravest first, and the number of each kind.
 
-    The gravest ``OF_A_KIND`` of each kind are always among them: a program in the wrong unit collides a thousand times,
-    and what says why is a single line.
+    The gravest ``KEPT_OF_A_KIND`` of each kind are always among them. A program in the wrong unit collides a thousand
+    times, and a single finding of another kind names the cause.
     """
     rank = {kind: i for i, kind in enumerate(FindingKind)}
     counts: dict[str, int] = {}
@@ -155,8 +187,8 @@ def ordered(findings: Sequence[Finding]) -> tuple[tuple[Finding, ...], dict[str,
     more: list[int] = []
     for k, f in enumerate(by_grade):
         seen[str(f.kind)] = seen.get(str(f.kind), 0) + 1
-        (sure if seen[str(f.kind)] <= OF_A_KIND else more).append(k)
-    kept = sorted(sure + more[:MOST - len(sure)])
+        (sure if seen[str(f.kind)] <= KEPT_OF_A_KIND else more).append(k)
+    kept = sorted(sure + more[:MAX_FINDINGS - len(sure)])
     return tuple(by_grade[k] for k in kept), dict(sorted(counts.items()))
 
 

@@ -1,18 +1,18 @@
-"""Forward kinematics of five-axis machines, the witness's own: where the tip is and how the tool stands on the part.
+"""Forward kinematics of five-axis machines, the verifier's own: where the tip is and how the tool stands on the part.
 
 Three frames. The setup frame is fixed to the part; the machine frame does not move and falls on the setup frame while
 both rotary axes stand at zero; the joints are the linear axes, zeroed so that there they are the tip in the setup
 frame with the length offset on. With Rx, Ry, Rz the right-handed turns about the axes, A, B, C the angles as
 programmed, T the tilt (Rx(A) or Ry(B)):
 
-- a table carries the part: a point p of it stands at q1 + T (q2 + Rz(C) (p - q2) - q1) in the machine, where q1 lies
-  on the tilting axis and q2 on the turning one (table-table), or at q2 + Rz(C) (p - q2) (head-table);
-- a head carries the tool: its axis is h = T e_z (head-table) or h = Rz(C) T e_z (head-head), and its tip swings round
-  the swivel, a distance L = swivel to spindle face + gauge length up the tool: it is at j + L (e_z - h).
+- A table carries the part. A point p of the part is at q1 + T (q2 + Rz(C) (p - q2) - q1) in the machine
+  (table-table), or at q2 + Rz(C) (p - q2) (head-table). q1 lies on the tilting axis, q2 on the turning axis.
+- A head carries the tool. Its axis is h = T e_z (head-table) or h = Rz(C) T e_z (head-head). Its tip swings round the
+  swivel at the distance L = swivel to spindle face + gauge length: it is at j + L (e_z - h).
 
-``tip`` and ``axis`` come from putting the tip of the tool where the part is; ``joints`` is the same read backwards.
+``tip`` and ``axis`` follow from the tip of the tool at the point of the part; ``joints`` is the inverse.
 The sense of the angles is that of LinuxCNC's xyzac-trt and xyzbc-trt: with A30 C90 the point (10, 0, 5) of the part
-stands at (0, 6.160, 9.330).
+stands at (0, 6.160, 9.330). Names and positive directions of the axes are those of [ISO841].
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ class Kinematics:
     """One five-axis machine.
 
     kind   : one of KINDS, the rotary axes by where they sit, tilting one first
-    pivots : mm, setup frame with both rotary axes at zero, or None where nobody said; table-table: a point on the
-             tilting and one on the turning axis; head-table: (0, 0, spindle face up to the swivel) and a point on the
-             turning axis; head-head: (0, 0, spindle face up to the swivel)
-    sense  : of the words of the two axes, 1 as above, -1 for a table axis whose positive angle turns the tool
-             right-handed as seen from the table (ISO 841), so the table the other way
+    pivots : mm, setup frame with both rotary axes at zero, or None where the setup gives none. Table-table: a point on
+             the tilting and one on the turning axis. Head-table: (0, 0, spindle face up to the swivel) and a point on
+             the turning axis. Head-head: (0, 0, spindle face up to the swivel).
+    sense  : of the words of the two axes. 1: as above. -1: a positive angle of a table axis turns the tool right-handed
+             as seen from the table [ISO841], so the table turns the other way.
 
     Raises
     ------
@@ -93,7 +93,11 @@ class Kinematics:
 
         turn : (n, 2) float64, rad, angles in the order of ``letters``
 
-        Returns (n, 3) float64 unit vectors, tip to spindle, setup frame.
+        Returns (n, 3) float64 unit vectors, dimensionless, tip to spindle, setup frame.
+
+        Notes
+        -----
+        Head-head: Rz(C) T e_z. Head-table: Rz(-C) T e_z. Table-table: Rz(-C) T^-1 e_z. Names of the turns: [ISO841].
         """
         tilt, spin = self._right_handed(turn).T
         up = np.zeros((len(turn), 3))
@@ -105,8 +109,8 @@ class Kinematics:
     def tip(self, joints: F64, turn: F64, gauge: F64 | float) -> F64:
         """Tip from the linear joints.
 
-        joints : (n, 3) float64, mm, zeroed as the module says
-        turn   : (n, 2) float64, rad
+        joints : (n, 3) float64, mm, machine frame, zeroed as the module says
+        turn   : (n, 2) float64, rad, angles of the rotary words, signs as in [ISO841]
         gauge  : (n,) float64 or one number, mm, spindle face to tip; counts where a head swings the tool
 
         Returns (n, 3) float64, mm, setup frame. Raises VerificationError (no_pivots) where no pivots are given.
@@ -117,11 +121,11 @@ class Kinematics:
     def joints(self, tip: F64, turn: F64, gauge: F64 | float) -> F64:
         """Linear joints from the tip; the inverse of ``tip``.
 
-        tip  : (n, 3) float64, mm, setup frame
-        turn : (n, 2) float64, rad
-        gauge : (n,) float64 or one number, mm
+        tip   : (n, 3) float64, mm, setup frame
+        turn  : (n, 2) float64, rad, angles of the rotary words, signs as in [ISO841]
+        gauge : (n,) float64 or one number, mm, spindle face to tip
 
-        Returns (n, 3) float64, mm. Raises VerificationError (no_pivots) where no pivots are given.
+        Returns (n, 3) float64, mm, machine frame. Raises VerificationError (no_pivots) where no pivots are given.
         """
         turn = self._right_handed(turn)
         return self._in_machine(tip, turn) - self._swing(turn, gauge)
@@ -131,7 +135,7 @@ class Kinematics:
 
         turn : (n, 2) float64, rad
 
-        Returns (n, 3, 3) float64: rows are the directions of X, Y and Z.
+        Returns (n, 3, 3) float64, dimensionless, setup frame: rows are the directions of X, Y and Z.
         """
         out = np.tile(np.eye(3), (len(turn), 1, 1))
         if self.turns_head:
@@ -158,11 +162,11 @@ class Kinematics:
         return self.pivots
 
     def _right_handed(self, turn: F64) -> F64:
-        """(n, 2) rad: how far heads and tables are turned, right-handed, for the angles of the words."""
+        """(n, 2) rad: right-handed turns of heads and tables for the angles of the words."""
         return turn if self.sense == (1, 1) else turn * np.array(self.sense, dtype=np.float64)
 
     def _swing(self, turn: F64, gauge: F64 | float) -> Any:
-        """(n, 3) mm, how far the head carries the tip off the joints: L (e_z - h)."""
+        """(n, 3) mm, offset by which the head carries the tip off the joints: L (e_z - h)."""
         pivots = self.points()
         if not self.tilts_head:
             return 0.0

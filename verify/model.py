@@ -1,4 +1,4 @@
-"""What a proof is asked and what it answers: plain values, mm, rad, s, setup frame."""
+"""Inputs and results of a proof as plain values, in mm, rad and s, in the setup frame."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class StockKind(StrEnum):
 
 
 class FindingKind(StrEnum):
-    """What a proof can find, gravest first."""
+    """Kinds of finding, the gravest first."""
 
     COLLISION = "collision"
     GOUGE = "gouge"
@@ -40,34 +40,34 @@ class FindingKind(StrEnum):
 class ProofSetup:
     """Stock, surroundings and tolerances of a proof.
 
-    stock_kind, margin, uncertainty : the part grown by margin + uncertainty, or a box or cylinder (axis Z)
-                    round it by as much (not below the part), or a mesh grown by the uncertainty alone
-    stock_box     : (2, 3) float64 corners of a box blank, or None
-    stock_cylinder, stock_axis : (x, y, z, radius, height) of a cylinder blank, or None, (x, y, z) the middle of its
-                    lower end; unit vector from there to the other end, not downwards
+    stock_kind, margin, uncertainty : shape of the blank. part_offset: the part grown by margin + uncertainty. box,
+                    cylinder (axis Z): round the part by as much, not below it. step: a mesh grown by the uncertainty.
+    stock_box     : (2, 3) float64, mm, corners of a box blank, or None
+    stock_cylinder, stock_axis : (x, y, z, radius, height) of a cylinder blank in mm, or None, (x, y, z) the middle of
+                    its lower end; unit vector from there to the other end, not downwards
     stock_mesh    : TriangleMesh, closed, normals outwards, mm, of a blank of kind step, or None
-    fixtures      : boxes as (2, 3) float64 corners; each stands down to the table
-    clearance_*   : radial; the part, its stock and fixtures nearer than this are rubbing, in a rapid a finding
-    scallop_height, gouge_tolerance, stock_allowance : the budget -gouge <= residual - allowance <= scallop
+    fixtures      : boxes as (2, 3) float64 corners, mm; each stands down to the table
+    clearance_*   : mm, radial. A body nearer than this to part, stock or fixture rubs; in a rapid it is a finding.
+    scallop_height, gouge_tolerance, stock_allowance : mm, the budget -gouge <= residual - allowance <= scallop
     ramp_angle    : rad, steepest descent into stock
-    plunge_skin   : share of the tool diameter that a steeper descent may take off (see ``verify.material.stock_lines``)
+    plunge_skin   : share of the tool diameter that a steeper descent may take off (``verify.material.stock_lines``)
     rapid_feed    : mm/min
     acceleration  : mm/s², for times
-    travel        : (3,) float64 mm, what the moves of a program may span in X, Y and Z, or None
+    travel        : (3,) float64, mm, span of the moves of a program that the machine allows in X, Y and Z, or None
     gauge_length  : mm by T number, from the spindle face to the tip; counted in Z against the travel
-    dogleg        : whether a rapid moves each axis at its own speed, so that its way is not a straight line
+    dogleg        : whether a rapid moves each axis at its own speed, so that its path is not a straight line
     max_feed      : mm/min of any feed move, or None
-    max_rpm       : 1/min by T number; a tool left out is not limited
-    max_engaged   : rad by T number, most of the front half of a cutter that may be in stock; left out: not limited
+    max_rpm       : 1/min by T number; a tool that is absent has no limit
+    max_engaged   : rad by T number, largest engaged angle of the front half of a cutter; absent: no limit
     work_offset   : the only one whose coordinates are those of the setup frame
     line_spacing  : mm between the vertical lines of the stock model
-    kinematics    : rotary axes of the machine, or None on one of three axes
-    rotary_limits : (2, 2) float64, rad, least and greatest angle of the tilting and the turning axis, or None
-    rotary_rate   : rad/min, the fastest either turns in a feed move, or None
-    table         : mm, Z of what the part stands on, or None; table_known : somebody said so, else it is held against
-                    tools that lean only
-    free_ratio    : how many times as high as thick a wall may be free where it is finished (``verify.surface.wall_support``)
-    walls_in_turn : whether more than that is a finding; else it is a figure alone
+    kinematics    : rotary axes of the machine, or None for a machine of three axes
+    rotary_limits : (2, 2) float64, rad, smallest and largest angle of the tilting and the turning axis, or None
+    rotary_rate   : rad/min, the fastest that either axis turns in a feed move, or None
+    table         : mm, Z of the machine table, or None
+    table_known   : False: the table height is assumed and checked for tilted tools only
+    free_ratio    : largest ratio of free height to thickness where a wall is finished (``verify.surface.wall_support``)
+    walls_in_turn : whether a larger ratio is a finding; otherwise the proof reports the figure only
     """
 
     stock_kind: StockKind | str = StockKind.PART_OFFSET
@@ -110,10 +110,10 @@ class ProofSetup:
 class NcProgram:
     """One program of a proof.
 
-    name, text  : of the program
-    turn        : (3, 3) float64, from the frame of the proof to that of the program (another side up); None: the same
-    work_offset : the one that is the zero of its frame; None: that of the setup
-    dialect     : whose words its text has (``verify.gcode.dialects``)
+    name, text  : name and text of the program
+    turn        : (3, 3) float64, rotation from the frame of the proof to that of the program; None: the same frame
+    work_offset : work offset that is the zero of its frame; None: that of the setup
+    dialect     : dialect of its text, one of ``verify.gcode.dialects.DIALECTS``
     """
 
     name: str
@@ -128,7 +128,7 @@ class ScoredSamples:
     """The samples that coverage is counted on.
 
     samples : SurfaceSamples
-    zone    : (n,) int32, 0 where no zone claims the sample, else k for the k-th entry (1-based) of the zone ids
+    zone    : (n,) int32, index, 0 where no zone claims the sample, else k for the k-th entry (1-based) of the zone ids
     """
 
     samples: SurfaceSamples
@@ -137,15 +137,15 @@ class ScoredSamples:
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing found, with everything near it of the same kind folded in.
+    """One finding; neighbours of the same kind are merged into it.
 
-    line  : 1-based line of the program, 0 where no line is to blame (material that stayed)
+    line  : 1-based line of the program, 0 where no line causes it (material that stayed)
     zone, face : ids, or None
-    point : mm, where it is worst
-    depth : mm, how bad; limit : what would have been allowed
-    near  : nothing touches, and the depth is how near it comes
-    count : places folded in; area : mm² of samples folded in, 0 where none
-    tip   : mm, where the tip of the tool was, or None where no move is to blame or it is at the point itself
+    point : mm, the worst place
+    depth : mm, measured value; limit : allowed value
+    near  : True where nothing touches; the depth is then the distance
+    count : number of places merged; area : mm² of the samples merged, 0 where there are none
+    tip   : mm, tip of the tool at that place, or None where no move causes it or the tip is the point itself
     """
 
     kind: FindingKind
@@ -169,7 +169,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Engagement:
-    """How much of the front half of a cutter is in stock, rad: at most, and on 99 % of its way in stock at most."""
+    """Engaged angle of the front half of a cutter, rad: the largest, and the 99th percentile over its path in stock."""
 
     most: float
     p99: float
@@ -177,9 +177,9 @@ class Engagement:
 
 @dataclass(frozen=True)
 class Spent:
-    """Where the time of programs goes: s in all, s of moves that take stock, s of rapids.
+    """Time of the programs: s in all, s of moves that remove stock, s of rapids.
 
-    retracts : times a rapid follows on a feed move; tool_changes : within programs
+    retracts : number of rapids that follow a feed move; tool_changes : number within programs
     """
 
     seconds: float
@@ -191,13 +191,13 @@ class Spent:
 
 @dataclass(frozen=True)
 class Support:
-    """How far thin walls were free where they were finished.
+    """Free height of thin walls where they were finished.
 
-    walls  : sheets of the part that are somewhere more than ``limit`` times as high as thick
-    places : pairs of opposite places of them that were judged
-    most   : the most a wall was free for at one, in times its thickness; limit : what is allowed
-    over   : places at which it was more; found : and that is a finding
-    at     : mm, the place where it was most; None where there is none
+    walls  : number of walls whose height is somewhere more than ``limit`` times their thickness
+    places : number of pairs of opposite places that were judged
+    most   : largest free height at one of them, as a multiple of the thickness; limit : allowed multiple
+    over   : number of places above the limit; found : whether they are a finding
+    at     : mm, the place of ``most``; None where there is none
     """
 
     walls: int
@@ -211,7 +211,7 @@ class Support:
 
 @dataclass(frozen=True)
 class ZoneProof:
-    """The proof of one zone: scallops of its claimed samples in mm, areas in mm², coverage 0..1."""
+    """The proof of one zone: scallops of the samples it claims in mm, areas in mm², coverage 0..1."""
 
     scallop_p50: float
     scallop_p99: float
@@ -226,10 +226,10 @@ class ZoneProof:
 class FaceProof:
     """The proof of the scored samples of one face.
 
-    number : of the face (``F12`` is 12); area : mm² of its samples
-    left_p50, left_p99, left_max : mm of stock over the allowance, cut deeper counts 0; not above ``Proof.reach``
+    number : face number (``F12`` is 12); area : mm² of its samples
+    left_p50, left_p99, left_max : mm of rest material over the allowance, 0 where cut deeper; not above ``Proof.reach``
     gouge  : mm, deepest cut into the part at a sample
-    uncut  : mm² that no feed move ever reached and that stand higher than the budget allows
+    uncut  : mm² that no feed move reaches and where more stands than the budget allows
     proved_area : mm² within the budget; coverage : its share, 0..1
     """
 
@@ -246,17 +246,18 @@ class FaceProof:
 
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """The answer.
+    """The result of a proof.
 
-    findings : gravest first, at most 200, the 20 gravest of each kind among them; counts : all there are of each kind
+    findings : the gravest first, at most 200, the 20 gravest of each kind among them; counts : all of each kind
     residual : (n,) float64, mm left on the normal of each scored sample, negative = gouged; not above ``reach``
-    line     : (n,) int32 of the move that left it, 0 where none; program : (n,) int32 its program, -1 where none
+    line     : (n,) int32, index, line of the move that left it, 0 where none
+    program  : (n,) int32, index, its program, -1 where none
     proved   : (n,) bool, inside the budget
     zones    : by zone id; faces : by face number, of every face with scored samples
-    spent    : where the time goes, feeds, rapids and dwells; cutting_length : mm of feed moves that took stock
-    minutes  : minutes in cut by tool number; engaged : how much of each cutter was in stock, by tool number
+    spent    : time of feeds, rapids and dwells; cutting_length : mm of feed moves that removed stock
+    minutes  : minutes in cut by T number; engaged : engaged angles by T number
     error_bound : mm, largest error of a residual against the mesh the samples lie on
-    support  : how far thin walls were free where they were cut
+    support  : free height of thin walls where they were cut
     """
 
     findings: tuple[Finding, ...]
@@ -280,7 +281,7 @@ class Proof:
 
     @property
     def clean(self) -> bool:
-        """Whether nothing was found."""
+        """Whether the proof has no finding."""
         return not self.counts
 
     def as_dict(self) -> dict[str, Any]:

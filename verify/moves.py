@@ -1,4 +1,4 @@
-"""Moves: the straight steps of a program as arrays, as every check of the proof takes them."""
+"""Moves: the straight steps of a program as arrays. Every check of the proof takes them."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Moves:
 
     start, end : (m, 3) float64, mm
     feed       : (m,) bool, False for a rapid
-    tool       : (m,) int32, row in the sequence of tools the moves belong to
-    axes       : of the tool, None where all are +Z
+    tool       : (m,) int32, index, place in the sequence of tools
+    axes       : tool axes, None where all are +Z
     """
 
     start: F64
@@ -43,15 +43,20 @@ class Moves:
 
 
 def cutter_table(tools: Sequence[ToolBody]) -> F64:
-    """(k, 3) float64, mm: radius, corner radius and flute length of each tool.
+    """Sizes of the cutting parts: radius, corner radius and flute length of each of k tools.
 
-    Raises VerificationError where the flutes end below the corner of the cutting part.
+    Returns (k, 3) float64, mm, in the tool frame.
+
+    Raises
+    ------
+    VerificationError
+        Code flute_too_short: the flutes end inside the corner of the cutting part.
     """
     for tool in tools:
-        least = 2.0 * tool.corner_radius if tool.kind == "bull" else tool.corner_radius
-        if tool.flute_length < least:
+        corner_height = 2.0 * tool.corner_radius if tool.kind == "bull" else tool.corner_radius
+        if tool.flute_length < corner_height:
             raise VerificationError(
-                f"{tool.id}: flute length {tool.flute_length} mm ends inside the corner of the cutting part",
-                code="flute_too_short", subjects=(tool.id,), measured=tool.flute_length, limit=least,
-                remedy="give the flute length from the tip")
+                f"{tool.id}: the flute length {tool.flute_length} mm ends inside the corner of the cutting part",
+                code="flute_too_short", subjects=(tool.id,), measured=tool.flute_length, limit=corner_height,
+                remedy="give the flute length measured from the tip")
     return np.array([[t.radius, min(t.corner_radius, t.radius), t.flute_length] for t in tools]).reshape(-1, 3)

@@ -1,4 +1,7 @@
-"""The door of the witness: programs, part, tools and setup in, a proof out."""
+"""The entry to the verifier: it takes programs, part, tools and setup and returns a proof.
+
+Coordinates are in the setup frame, lengths in mm.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.tool_body import ToolBody
 from verify.blank.blank import stock_on_normals
-from verify.checks.program_sequence import Given, Reading, check_numbers, moves_of, read_all, slides_of
+from verify.checks.program_sequence import FramedProgram, Given, check_numbers, moves_of, read_all, slides_of
 from verify.checks.repeated_passes import repeat_findings
 from verify.checks.table_clearance import table_findings
 from verify.findings import (
@@ -43,7 +46,7 @@ from verify.model import (
 from verify.moves import BOW, Moves
 from verify.program.arc_chords import CHORD
 from verify.program.move_times import minutes_of, spent
-from verify.progress import Report, Stages
+from verify.progress import Report, StageProgress
 from verify.surface.guard_points import (
     CLOSER_SHARE,
     SURE,
@@ -58,7 +61,7 @@ from verify.surface.removal import residual_on_normals
 from verify.surface.sample_scores import RAY_ERROR, face_proofs, proved_samples, zone_proofs
 from verify.surface.wall_support import supported
 
-LEAST_REACH = 1.0
+MIN_REACH = 1.0
 READ, CUT, HELD, MET = 0.12, 0.48, 0.52, 0.97  # shares of the work done: read, residuals, support, contacts known
 
 
@@ -67,14 +70,14 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
           threads: int | None = None, spindle_tool: int = 0) -> Proof:
     """Prove finished NC programs against the part.
 
-    programs : NcProgram, or (name, text), in the order they run, stock carried over
+    programs : NcProgram, or (name, text), in the order they run; each starts on the stock the one before leaves
     part     : Part in the setup frame, mm; tools : by T number
     setup    : ProofSetup
-    scored   : ScoredSamples; zones may all be 0, then only gouges, contacts and limits are looked for
+    scored   : ScoredSamples; zones may all be 0, then only gouges, contacts and limits are checked
     zone_ids : names of the zones 1, 2, ... of ``scored.zone``
     progress : called with 0..1, never less than before, ten times a second or more often; an exception from it ends
                the proof at once
-    threads  : 2 where None, at most the cores; the answer has the same bytes for any number
+    threads  : 2 where None, at most the cores; the result has the same bytes for any number
     spindle_tool : T number in the spindle, its length offset on, before the first line of each program; 0 for none
 
     Returns
@@ -86,18 +89,18 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     ProgramError
         A program cannot be read; the subjects name the lines.
     VerificationError
-        Two tools share a number, a cutting part is impossible, samples and zones do not fit each other, a fixture is no
-        box, or the budget no number.
+        Two tools share a number, a cutting part is impossible, the counts of samples and zones differ, a fixture is not
+        a box, or the budget is not a number.
 
     Notes
     -----
     A sample is proved where -gouge_tolerance <= residual - stock_allowance <= scallop_height. Residuals are
-    exact on the normal of each sample (error_bound); stock that is not part is seen on vertical lines, or on a grid
-    where tools lean or programs run with another side up.
+    exact on the normal of each sample (error_bound), as in [Chappel1983]. Stock beyond the part is checked on vertical
+    lines [VanHook1986], or on a grid where tools tilt or programs run with another side up.
     """
     _check(tools, setup, scored, zone_ids)
     threads = threads or min(2, os.cpu_count() or 1)
-    stages = Stages(progress)
+    stages = StageProgress(progress)
     read = read_all(programs, part, tools, setup, spindle_tool, stages.span(0.0, READ))
     moves, source = moves_of(read, tools)
     cuts = _cuts(part, tools, setup, scored, moves, source, threads, stages.span(READ, CUT))
@@ -119,13 +122,13 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                   if setup.dogleg else ()),
                 *engagement_findings(angle, stretches, of, source, setup.max_engaged), *unheld,
                 *_residuals(scored, cuts.residual, setup, zone_ids)]
-    notes = [f"{run.lost} contacts more than the tables hold"] if run.lost else []
+    notes = [f"{run.lost} contacts are not listed: the tables are full"] if run.lost else []
     notes.extend(cuts.notes)
-    notes.extend(f"T{t.number} is so fine that it may plunge unseen: the stock is looked at {met.spacing:.3f} mm apart"
-                 for t in fine)
+    notes.extend(f"T{t.number} is so thin that a plunge may stay unseen: the stock is sampled every "
+                 f"{met.spacing:.3f} mm" for t in fine)
     if met.dip > DIP + 1e-9:
-        notes.append(f"a ball may be {met.dip:.3f} mm in a fixture before it is seen: so much of it is not looked "
-                     "at closer; give them as smaller boxes where tools go")
+        notes.append(f"a ball may enter a fixture by {met.dip:.3f} mm unseen: the fixtures are too large to be sampled "
+                     "more closely; give smaller boxes where tools go")
     notes.extend(note for p in read for note in p.notes())
     stages.tell(1.0)
     return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids,
@@ -136,15 +139,15 @@ def _check(tools: Sequence[ToolBody], setup: ProofSetup, scored: ScoredSamples, 
     check_numbers(tools)
     for k, box in enumerate(setup.fixtures):
         if not (np.isfinite(box).all() and (np.asarray(box)[0] < np.asarray(box)[1]).all()):
-            raise VerificationError(f"fixture {k + 1} is no box: {np.asarray(box).tolist()}", code="bad_fixture",
+            raise VerificationError(f"fixture {k + 1} is not a box: {np.asarray(box).tolist()}", code="bad_fixture",
                                     subjects=(f"fixture {k + 1}",), measured=np.asarray(box).tolist(),
                                     remedy="give its lower corner first and its upper corner second, in mm")
     budget = [setup.gouge_tolerance, setup.scallop_height, setup.stock_allowance]
     if not np.isfinite(budget).all():
-        raise VerificationError("the budget of the proof is no number", code="bad_budget", measured=budget,
+        raise VerificationError("the budget of the proof is not a number", code="bad_budget", measured=budget,
                                 remedy="give gouge tolerance, scallop height and stock allowance in mm")
     if len(scored.zone) != len(scored.samples) or scored.zone.max(initial=0) > len(zone_ids):
-        raise VerificationError("samples and zones do not fit each other", code="bad_samples",
+        raise VerificationError("the counts of samples and zones differ", code="bad_samples",
                                 measured=len(scored.zone), limit=len(scored.samples))
 
 
@@ -171,7 +174,7 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
     normals = np.concatenate([s.normals, guard.normals, bisector])
     face = np.concatenate([s.face, guard.face, edge_face])
     area = np.concatenate([s.area, guard.area, np.zeros(len(edge))])
-    reach = max(LEAST_REACH, setup.stock_allowance + 4 * setup.scallop_height)
+    reach = max(MIN_REACH, setup.stock_allowance + 4 * setup.scallop_height)
     initial = stock_on_normals(points, normals, part.mesh.bounds, setup, reach)
     residual, mover = residual_on_normals(points, normals, initial, moves, tools, threads=threads,
                                           progress=lambda f: tell(0.1 + 0.7 * f))
@@ -201,16 +204,16 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
     return out
 
 
-def _program_findings(read: Sequence[Reading]) -> list[Finding]:
+def _program_findings(read: Sequence[FramedProgram]) -> list[Finding]:
     return [Finding(FindingKind.PROGRAM, p.program.name, r.line, None, None, None, 0.0, 0.0, r.message)
             for p in read for r in p.program.remarks]
 
 
-def _idle_findings(read: Sequence[Reading], run: StockPass, moves: Moves, source: Source,
+def _idle_findings(read: Sequence[FramedProgram], run: StockPass, moves: Moves, source: Source,
                    fine: Sequence[ToolBody]) -> list[Finding]:
-    """A program whose feed moves never meet the stock: another zero, or inch for mm.
+    """Programs whose feed moves never meet the stock: wrong zero, or inch for mm.
 
-    fine : tools of which the stock need not show a trace
+    fine : tools so thin that the stock model may not show their cuts
     """
     out, traceless = [], np.isin(source.tool, [t.number for t in fine])
     for number, p in enumerate(read):
@@ -218,7 +221,7 @@ def _idle_findings(read: Sequence[Reading], run: StockPass, moves: Moves, source
         if own.any() and not run.cut[own].any() and not traceless[own].all():
             m = int(np.flatnonzero(own)[0])
             out.append(Finding(FindingKind.PROGRAM, p.program.name, int(source.line[m]), None, None, None, 0.0, 0.0,
-                               "no feed move meets the stock: is the unit, the zero or the tool another one?"))
+                               "no feed move meets the stock: check the unit, the program zero and the tool"))
     return out
 
 
@@ -229,7 +232,7 @@ def _residuals(scored: ScoredSamples, residual: F64, setup: ProofSetup, zone_ids
                              s.area[bad], zone_ids, setup.scallop_height)
 
 
-def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, readings: Sequence[Reading], moves: Moves,
+def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, readings: Sequence[FramedProgram], moves: Moves,
            source: Source, setup: ProofSetup, scored: ScoredSamples, zone_ids: Sequence[str],
            engaged: dict[int, Engagement], spacing: float, notes: tuple[str, ...], support: Support) -> Proof:
     read = [r.program for r in readings]
@@ -253,7 +256,7 @@ def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, readings: Seque
 
 
 def error_bound(read: Sequence[Program]) -> float:
-    """Largest error of a residual, mm: of the rays, of chords, of blending the programs allow, of turning tools."""
+    """Largest error of a residual, mm: rays, chords of arcs, blending the programs allow, and turning tools."""
     turning = BOW if any(p.poses is not None for p in read) else 0.0
     return RAY_ERROR + CHORD + max((p.leaves for p in read), default=0.0) + turning
 

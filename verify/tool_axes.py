@@ -1,4 +1,4 @@
-"""How moves hold the tool: standing along Z, tilted, or turning."""
+"""Tool axes of moves: along Z, tilted, or turning. Axes are float64 unit vectors, dimensionless, in the setup frame."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from verify.kernels.engaged import carried_frames
 
-STILL = 1e-9  # rad, below which an axis does not turn: 1e-7 mm at 100 mm
+STILL = 1e-9  # rad: an axis that turns by less stands still; that is 1e-7 mm at 100 mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,8 +18,8 @@ class ToolAxes:
     """Tool axes of moves, as the kernels take them (see ``verify.kernels.pose``).
 
     axis  : (m, 3) float64, unit, tip to spindle, at the start of each move
-    about : (m, 3) float64, unit, square to it: what the axis turns about
-    angle : (m,) float64, rad, by which it turns over the move; 0 where it stands
+    about : (m, 3) float64, unit, perpendicular to ``axis``: the axis turns about it
+    angle : (m,) float64, rad, turn over the move; 0 where the axis stands still
     """
 
     axis: F64
@@ -28,9 +28,11 @@ class ToolAxes:
 
     @classmethod
     def between(cls, start: F64, end: F64) -> ToolAxes:
-        """Axes that run along great circles from ``start`` to ``end``, both (m, 3) float64 unit vectors.
+        """Axes that turn evenly along great circles [Shoemake1985].
 
-        Of two opposite axes the way between is not determined: any is taken.
+        start, end : (m, 3) float64, unit, setup frame
+
+        Two opposite axes do not determine a circle: any is taken.
         """
         cross = np.cross(start, end)
         sine = np.linalg.norm(cross, axis=1)
@@ -39,19 +41,19 @@ class ToolAxes:
         about = np.divide(cross, sine[:, None], out=np.zeros_like(cross), where=(sine > 1e-300)[:, None])
         loose = still | (sine < 1e-12)
         about[loose] = square_to(start[loose])
-        # the frame needs a right angle to the last digit
+        # the kernels need a right angle to the last digit
         about -= np.einsum("ij,ij->i", about, start)[:, None] * start
         about /= np.linalg.norm(about, axis=1)[:, None]
         return cls(np.ascontiguousarray(start), about, np.where(still, 0.0, angle))
 
     @property
     def middle(self) -> F64:
-        """(m, 3) float64 unit axes half way."""
+        """(m, 3) float64, unit, setup frame: axes half way along the great circle [Shoemake1985]."""
         half = 0.5 * self.angle[:, None]
         return np.asarray(np.cos(half) * self.axis + np.sin(half) * np.cross(self.about, self.axis))
 
     def only(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> ToolAxes:
-        """The axes where ``chosen`` (m,) bool is true, or those of its rows."""
+        """The axes where ``chosen``, (m,) bool, is true, or those of its rows, (k,) int64, index."""
         return ToolAxes(self.axis[chosen], self.about[chosen], self.angle[chosen])
 
     @classmethod
@@ -61,16 +63,22 @@ class ToolAxes:
 
 
 def square_to(axis: F64) -> F64:
-    """(m, 3) float64 unit vectors square to (m, 3) unit vectors; X for +Z."""
-    least = np.where(np.abs(axis[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    out = least - np.einsum("ij,ij->i", least, axis)[:, None] * axis
+    """Unit vectors perpendicular to axes; X for +Z.
+
+    axis : (m, 3) float64, unit, any frame
+
+    Returns (m, 3) float64, unit, in the same frame.
+    """
+    seed = np.where(np.abs(axis[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    out = seed - np.einsum("ij,ij->i", seed, axis)[:, None] * axis
     return np.asarray(out / np.linalg.norm(out, axis=1)[:, None])
 
 
 def sector_frames(axes: ToolAxes | None, count: int) -> tuple[F64, F64]:
-    """X and Y, (m, 3) float64 unit vectors square to the tool axis half way along each of ``count`` moves.
+    """X and Y perpendicular to the tool axis half way along each of ``count`` moves.
 
-    Setup X and Y for a tool along +Z; from there on as little turned about the axis as may be.
+    Returns two (m, 3) float64 arrays, unit, setup frame: setup X and Y for a tool along +Z, and turned about the axis
+    as little as possible from move to move.
     """
     axis = np.tile([0.0, 0.0, 1.0], (count, 1)) if axes is None else np.ascontiguousarray(axes.middle)
     x = square_to(axis)

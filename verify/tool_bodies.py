@@ -1,4 +1,4 @@
-"""Necks, shanks and holders as rows for the kernels."""
+"""Necks, shanks and holders as rows for the kernels: float64, mm, in the tool frame (tip at the origin, axis Z)."""
 
 from __future__ import annotations
 
@@ -13,19 +13,23 @@ from geometry.tool_body import ToolBody
 from verify.kernels.stock import HOLDER, NECK, SHANK
 from verify.model import ProofSetup
 
-NO_HOLDER = 200.0  # mm by which a shank goes on over its stickout where the setup names no holder
+NO_HOLDER = 200.0  # mm, length of shank above the stickout where the setup names no holder
 
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """Neck, shank and holder rows of all tools; rows first[k]:first[k+1] belong to tool k (see kernels.stock)."""
+    """Neck, shank and holder rows of all tools (see ``verify.kernels.stock``).
+
+    rows  : (r, 6) float64, mm: z0, z1, r0, r1, clearance, and the part code
+    first : (k + 1,) int64, index: rows first[k]:first[k + 1] belong to tool k
+    """
 
     rows: F64
     first: NDArray[np.int64]
 
     @classmethod
     def of(cls, tools: Sequence[ToolBody], setup: ProofSetup) -> Bodies:
-        """Rows (z0, z1, r0, r1, clearance, part) with the clearance in the radii."""
+        """Rows (z0, z1, r0, r1, clearance, part) of tools; the radii include the clearance."""
         rows: list[tuple[float, ...]] = []
         first = [0]
         for tool in tools:
@@ -39,7 +43,12 @@ class Bodies:
         return cls(np.array(rows, dtype=np.float64).reshape(-1, 6), np.array(first, dtype=np.int64))
 
     def reach(self, cutters: F64) -> F64:
-        """(k,) float64, mm: how far each assembly reaches from its tip; cutters (k, 3) as ``cutter_table``."""
+        """Largest distance of each assembly from its tip.
+
+        cutters : (k, 3) float64, mm, as ``cutter_table``
+
+        Returns (k,) float64, mm.
+        """
         out = np.hypot(cutters[:, 0], cutters[:, 2])
         for k in range(len(out)):
             own = self.rows[self.first[k]:self.first[k + 1]]
@@ -47,7 +56,10 @@ class Bodies:
         return np.asarray(out)
 
     def width(self, cutters: F64) -> float:
-        """mm: how far the widest of the assemblies reaches from its axis; cutters (k, 3) as ``cutter_table``."""
+        """Largest radius of all assemblies, mm.
+
+        cutters : (k, 3) float64, mm, as ``cutter_table``
+        """
         return float(max(cutters[:, 0].max(initial=0.0), self.rows[:, 2:4].max(initial=0.0)))
 
 
@@ -61,6 +73,6 @@ def _frusta(tool: ToolBody, setup: ProofSetup) -> list[tuple[float, float, float
         out.append((z, z + part.length, 0.5 * part.diameter, 0.5 * part.diameter_top, setup.clearance_holder, HOLDER))
         z += part.length
     if not tool.holder:
-        # nobody said what holds it: at least the tool itself goes on
+        # the holder is unknown: at least the shank goes on
         out.append((max(z, top), max(z, top) + NO_HOLDER, shank, shank, setup.clearance_shank, SHANK))
     return out

@@ -39,7 +39,7 @@ from tests import pocket_case  # noqa: E402
 from verify.blank.blank import stock_bounds  # noqa: E402
 from verify.gcode.reader import FEED, read_program  # noqa: E402
 from verify.material.material import machined  # noqa: E402
-from verify.material.stock_field import Field  # noqa: E402
+from verify.material.stock_field import DistanceField  # noqa: E402
 from verify.model import ProofSetup, StockKind  # noqa: E402
 from verify.moves import Moves
 
@@ -95,7 +95,7 @@ def peer(job: Job, moves: Moves, steps: list[float]) -> tuple[F64, F64, str]:
             return told["volume"][:, 0] - told["volume"][:, 1], told["seconds"], ".".join(told["version"])
 
 
-def peer_bound(field: Field, step: float) -> float:
+def peer_bound(field: DistanceField, step: float) -> float:
     """mm³ for every mm of resolution, by how far down each column was cut; over the middle of the grid."""
     share = np.clip(0.5 + field.values / field.step, 0.0, 1.0)
     standing = share.sum(axis=2) * field.step

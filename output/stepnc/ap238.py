@@ -76,10 +76,10 @@ def stream_stepnc_aim(plan: Workplan, write: Write) -> None:
     written until then is no file.
     """
     check_plan(plan)
-    _Aim(plan, write).run()
+    _Ap238Writer(plan, write).run()
 
 
-class _Aim:
+class _Ap238Writer:
     """One file being written; the small dictionaries keep equal instances single."""
 
     def __init__(self, plan: Workplan, write: Write) -> None:

@@ -71,10 +71,10 @@ def stream_stepnc_arm(plan: Workplan, write: Write) -> None:
     written until then is no file.
     """
     check_plan(plan)
-    _Arm(plan, write).run()
+    _Iso14649Writer(plan, write).run()
 
 
-class _Arm:
+class _Iso14649Writer:
     """One file being written; the small dictionaries keep equal instances single."""
 
     def __init__(self, plan: Workplan, write: Write) -> None:

@@ -25,7 +25,7 @@ from service.viewer.view_mesh import LEFT_UNIT, Judged, edge_chunk, facets_of, m
 from service.viewer.view_paths import AXIS_UNIT, COARSE, Way, path_chunks, way_of
 from service.viewer.view_paths import GRID as PATH_GRID
 from service.viewer.view_stock import stock_chunk
-from verify.checks.program_sequence import Reading, read_all
+from verify.checks.program_sequence import FramedProgram, read_all
 from verify.model import NcProgram, Proof, ProofSetup
 from zones.reach.access_view import turned_samples
 from zones.remainder.remainder import RemainderEntry
@@ -105,7 +105,7 @@ def _entries(s: SurfaceSamples, stays: Sequence[RemainderEntry], count: int) -> 
 
 
 def _file(ready: Prepared, samples: SurfaceSamples, look: Look, label: I64, names: Sequence[Mapping[str, Any]],
-          proof: Proof, setup: ProofSetup, way: Way, read: Sequence[Reading], report: Mapping[str, Any], *,
+          proof: Proof, setup: ProofSetup, way: Way, read: Sequence[FramedProgram], report: Mapping[str, Any], *,
           open_: bool) -> Files:
     part, d = ready.part, ready.decomposition
     here = turned_samples(samples, look.rotation.T)

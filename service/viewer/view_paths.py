@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from service.viewer.view_file import Chunk, Column
-from verify.checks.program_sequence import Reading
+from verify.checks.program_sequence import FramedProgram
 from verify.gcode.reader import FEED
 from verify.model import NcProgram
 from verify.program.move_times import minutes_of
@@ -90,7 +90,7 @@ class Way:
                      self.axis[row])
 
 
-def way_of(readings: Sequence[Reading], programs: Sequence[NcProgram], rotation: F64,
+def way_of(readings: Sequence[FramedProgram], programs: Sequence[NcProgram], rotation: F64,
            planned: Sequence[dict[str, Any]] = ()) -> Way:
     """The way of the tool through programs.
 
@@ -119,7 +119,7 @@ def way_of(readings: Sequence[Reading], programs: Sequence[NcProgram], rotation:
                program[there], step[there], tuple(steps), tuple(p.name for p in programs))
 
 
-def _axes(r: Reading) -> F64:
+def _axes(r: FramedProgram) -> F64:
     p = r.program
     return r.here(np.tile([0.0, 0.0, 1.0], (len(p), 1)) if p.poses is None else p.poses.end_axis)
 

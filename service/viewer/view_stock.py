@@ -14,14 +14,14 @@ from geometry.part import Part
 from geometry.tool_body import ToolBody
 from service.stages.access_plan import Look
 from service.viewer.view_file import Chunk, Column
-from verify.checks.program_sequence import Reading
+from verify.checks.program_sequence import FramedProgram
 from verify.material.machined_part import LEVELS, stock_in_time
 from verify.model import ProofSetup
 
 NODES, STRETCHES = 200_000, 32
 
 
-def stock_chunk(read: Sequence[Reading], part: Part, tools: Sequence[ToolBody], setup: ProofSetup, look: Look, *,
+def stock_chunk(read: Sequence[FramedProgram], part: Part, tools: Sequence[ToolBody], setup: ProofSetup, look: Look, *,
                 open_: bool) -> Chunk:
     """Blank, part and the changes as a chunk of kind 'field'.
 

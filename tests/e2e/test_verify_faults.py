@@ -264,7 +264,7 @@ def test_a_pass_pasted_twice_is_named():
     proof = run(twice)
     found = first(proof, FindingKind.PROGRAM)
     assert proof.counts == {"program": 1} and b < found.line <= b + 3
-    assert f"run again what lines {a + found.line - b}" in found.message
+    assert f"repeat lines {a + found.line - b}" in found.message
 
 
 def test_a_stop_in_the_stock_is_named():
@@ -293,8 +293,8 @@ def test_what_is_taken_for_granted_is_told():
     lines = program()
     lines[1] = "G90"
     proof = run(lines)
-    assert proof.clean and proof.notes == ("pocket.ngc does not state G21, G17, G94, G54 before its first move; it was "
-                                           "read as if it did",)
+    assert proof.clean and proof.notes == ("pocket.ngc does not state G21, G17, G94, G54 before its first move; the "
+                                           "proof assumes it",)
 
 
 def test_blending_is_in_the_error_bound():

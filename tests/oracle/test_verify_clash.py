@@ -10,7 +10,7 @@ from tests.oracle.turning_twin import random_moves, seen, signed
 from verify.kernels.clash import TOUCHING, is_lift
 from verify.kernels.frustum import contact
 from verify.kernels.stock import CUTTER, FIXTURE, HOLDER, NECK, SHANK
-from verify.material.collision import FIXTURE_SPACING, MOST_FIXTURE_POINTS, fixture_points, run_clashes
+from verify.material.collision import FIXTURE_SPACING, MAX_FIXTURE_POINTS, fixture_points, run_clashes
 from verify.model import ProofSetup
 from verify.moves import BOW, Moves
 from verify.tool_axes import ToolAxes
@@ -224,7 +224,7 @@ def test_no_ball_dips_farther_into_a_fixture_than_is_said(size, radius):
     moves = Moves(np.zeros((1, 3)), np.full((1, 3), size), np.array([True]), np.zeros(1, np.int32))
     tool = replace(TOOL, diameter=2.0 * radius, corner_radius=radius)
     points, told = fixture_points(replace(SETUP, fixtures=(box,)), np.array([[0.0, 0, 0], [9, 9, 9]]), moves, [tool])
-    assert told <= 0.005 + 1e-12 or len(points) > 0.5 * MOST_FIXTURE_POINTS
+    assert told <= 0.005 + 1e-12 or len(points) > 0.5 * MAX_FIXTURE_POINTS
     middle = np.append(np.random.default_rng(4).uniform(0.3 * size, 0.7 * size, 2), 5.0)
     near = points[(np.abs(points - middle) < 3.0).all(axis=1) & (points[:, 2] > 5.0 - 1e-9)]
     dip = []
@@ -236,8 +236,8 @@ def test_no_ball_dips_farther_into_a_fixture_than_is_said(size, radius):
 
 def test_many_fixture_points_are_thinned_and_what_no_tool_comes_near_is_left_out():
     big = [np.array([[0.0, 0, 0], [400, 300, 100]])]
-    assert 0.5 * MOST_FIXTURE_POINTS < len(near_all(big)) < 1.1 * MOST_FIXTURE_POINTS
+    assert 0.5 * MAX_FIXTURE_POINTS < len(near_all(big)) < 1.1 * MAX_FIXTURE_POINTS
     here = near_all(big, (10.0, 10, 95), (20.0, 20, 110))
-    assert len(here) < 0.2 * MOST_FIXTURE_POINTS and here[:, 0].max() < 60 and here[:, 2].max() == 100
+    assert len(here) < 0.2 * MAX_FIXTURE_POINTS and here[:, 0].max() < 60 and here[:, 2].max() == 100
     assert near_all(big, (10.0, 10, 105), (20.0, 20, 110)).shape == (0, 3)
 

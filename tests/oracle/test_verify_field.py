@@ -16,7 +16,7 @@ from tests.pocket_case import block as pocket_block
 from verify.kernels.field import brick_tops
 from verify.kernels.grid import cross_columns
 from verify.kernels.stock import CUTTER, HOLDER, NECK, PLUNGE, SHANK
-from verify.material.stock_field import Field, run_field, stock_field
+from verify.material.stock_field import DistanceField, run_field, stock_field
 from verify.model import ProofSetup
 from verify.moves import BOW, Moves
 
@@ -24,7 +24,7 @@ MESH = box_mesh(*BOX)
 TOOLS = {"ball": mill(4.0, 2.0, 7.0), "flat": mill(5.0, 0.0, 8.0), "bull": mill(6.0, 1.0, 8.0)}
 
 
-def nodes(field: Field):
+def nodes(field: DistanceField):
     """(n, 3) places of all nodes, mm."""
     at = np.stack(np.meshgrid(*(np.arange(n) for n in field.values.shape), indexing="ij"), -1).reshape(-1, 3)
     return field.origin + field.step * at
@@ -200,7 +200,7 @@ def test_a_cylinder_blank_is_as_wide_as_asked():
 
 
 def test_steps_are_widened_where_nodes_would_be_too_many(monkeypatch):
-    monkeypatch.setattr(verify.material.stock_field, "MOST_NODES", 20_000)
+    monkeypatch.setattr(verify.material.stock_field, "MAX_NODES", 20_000)
     field = stock_field(MESH, block(), 0.05)
     assert field.values.size < 30_000 and field.step > 0.3
     assert field.volume == pytest.approx(LEFT, rel=0.01)
@@ -218,7 +218,7 @@ def test_nodes_inside_a_hull_are_those_behind_all_its_planes(seed):
     origin, h = np.array([-2.5, -2.4, -2.6]), 0.125
     for a, b in ((0, 17), (17, 40)):
         cross_columns(inside, a, b, origin, h, hull.points, faces.astype(np.int32))
-    p = nodes(Field(origin, h, inside)).reshape(*inside.shape, 3)
+    p = nodes(DistanceField(origin, h, inside)).reshape(*inside.shape, 3)
     off = (p @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=-1)
     clear = np.abs(off) > 1e-5
     assert (inside == (off < 0))[clear].all() and 0.03 < inside.mean() < 0.5
@@ -229,7 +229,7 @@ def test_nodes_on_round_numbers_of_a_pocket():
     mesh = pocket_block().mesh
     inside = np.zeros((43, 33, 24), bool)
     cross_columns(inside, 0, 43, np.array([-21.0, -16.0, -10.75]), 1.0, mesh.vertices, mesh.faces)
-    p = nodes(Field(np.array([-21.0, -16.0, -10.75]), 1.0, inside)).reshape(*inside.shape, 3)
+    p = nodes(DistanceField(np.array([-21.0, -16.0, -10.75]), 1.0, inside)).reshape(*inside.shape, 3)
 
     def held(room):
         block_ = (np.abs(p) < [20 + room, 15 + room, 99]).all(-1) & (p[..., 2] > -10) & (p[..., 2] < 0)
@@ -250,7 +250,7 @@ def test_the_surface_is_closed_seen_from_outside_and_as_large_as_the_stock():
     run_field(field, random_moves(np.random.default_rng(4), 12, length=5.0), [TOOLS["bull"]], block(), bare=True)
     mesh = field.surface()
     assert closed(mesh) and mesh.volume == pytest.approx(field.volume, rel=0.01)
-    empty = Field(field.origin, field.step, np.full_like(field.values, -0.3))
+    empty = DistanceField(field.origin, field.step, np.full_like(field.values, -0.3))
     assert empty.volume == 0.0 and len(empty.surface().faces) == 0
 
 
@@ -260,7 +260,7 @@ def test_the_surface_of_a_ball_is_within_its_bound(shift):
     h, radius = 0.25, 3.0
     at = np.stack(np.meshgrid(*(np.arange(-16, 17) * h + shift,) * 3, indexing="ij"), -1)
     values = np.clip(radius - np.linalg.norm(at, axis=-1), -h, h).astype(np.float32)
-    field = Field(np.full(3, -16 * h + shift), h, values)
+    field = DistanceField(np.full(3, -16 * h + shift), h, values)
     mesh = field.surface()
     off = radius - np.linalg.norm(mesh.vertices, axis=1)
     assert off.min() > -1e-5 and off.max() < 2.0 * h * h / radius

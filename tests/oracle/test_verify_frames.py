@@ -59,7 +59,7 @@ def test_limits_and_ways_are_told_in_the_frame_of_the_proof():
     proof = prove([NcProgram("low", text(lines), FLIP)], PART, [TOOL], replace(SETUP, max_feed=5000.0), NOBODY, [])
     limit = next(f for f in proof.findings if f.kind == FindingKind.LIMIT)
     assert limit.line == 7 and limit.point == (0.0, 0.0, -38.0)
-    low = [f for f in proof.findings if "lift the tool" in f.message]
+    low = [f for f in proof.findings if "retract the tool" in f.message]
     assert [f.line for f in low] == [9] and low[0].depth == pytest.approx(10 - 5)  # the underside is its top
 
 

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from geometry.errors import ProgramError
-from verify.stepnc.part21 import Part21, decoded, is_exchange_file
+from verify.stepnc.part21 import Part21File, decoded, is_exchange_file
 
 RUN, SOON = 200_000, 2.0  # letters, s
 BEGIN = "ISO-10303-21;\nHEADER;FILE_SCHEMA(('X'));ENDSEC;\nDATA;\n"
@@ -34,7 +34,7 @@ PLACES = {
 def read_all(text):
     """Everything of a text, as a form of which all instances are looked at would have it."""
     is_exchange_file(text)
-    file = Part21(text, "job")
+    file = Part21File(text, "job")
     for number in sorted({n for of in file.entities().values() for n in of}):
         file.plain_polyline(number)
         file.records(number)
@@ -68,7 +68,7 @@ def test_a_name_has_a_longest(form):
 
 
 def test_a_comment_between_name_and_bracket_hides_no_record():
-    file = Part21(BEGIN + "#1=(A /* x */ (1.) B/**/());\n" + END, "job")
+    file = Part21File(BEGIN + "#1=(A /* x */ (1.) B/**/());\n" + END, "job")
     assert file.of("A") == [1] and file.of("B") == [1]
 
 
@@ -84,4 +84,4 @@ def test_a_blank_that_is_not_ascii_is_none():
 
 
 def test_two_records_in_the_header_are_refused_or_read():
-    Part21(BEGIN.replace("FILE_SCHEMA(('X'))", "(A('') FILE_SCHEMA(('X')))") + END, "job")
+    Part21File(BEGIN.replace("FILE_SCHEMA(('X'))", "(A('') FILE_SCHEMA(('X')))") + END, "job")

@@ -19,7 +19,7 @@ from tests.synthetic_plan import clamped, shaped, tiny
 from verify.comparison.stepnc_agreement import check_agreement
 from verify.kinematics import Kinematics
 from verify.program.program import Program
-from verify.stepnc.part21 import Part21
+from verify.stepnc.part21 import Part21File
 from verify.stepnc.reader import ap238, iso14649, read_stepnc
 
 MACHINE = Kinematics("table-table-AC", None)
@@ -167,7 +167,7 @@ def same(a: Program, b: Program) -> bool:
 
 
 def entities(text):
-    file = Part21(text, "job")
+    file = Part21File(text, "job")
     return frozenset(" ".join(n for n, _ in file.records(k)) for of in file.entities().values() for k in of)
 
 
@@ -218,7 +218,7 @@ def test_a_step_file_that_is_no_step_nc_is_refused_by_its_schema(schema):
     ("ENDSEC;\nEND-ISO-10303-21;\n", "", "an instance"),
     ("END-ISO-10303-21;\n", "", "END-ISO-10303-21"),
     ("DATA;", "", "line [0-9]+: "),
-    ("#9=PLANE(", "#10=PLANE(", "stands twice"),
+    ("#9=PLANE(", "#10=PLANE(", "appears twice"),
     ("#9=PLANE('security plane',#8);", "#9=PLANE('security plane',#8;", "#9 PLANE"),
     ("#9=PLANE('security plane',#8);", "#9=PLANE('security plane',#8));", "#9 PLANE"),
     ("#9=PLANE('security plane',#8);", "#9=PLANE('security plane' #8);", "#9 PLANE"),
@@ -263,5 +263,5 @@ def test_what_has_no_end_or_no_size_is_refused(what, instead):
 
 def test_a_unit_that_is_made_of_itself_is_refused():
     text = write_stepnc_aim(tiny())
-    with pytest.raises(ProgramError, match="hold themselves"):
+    with pytest.raises(ProgramError, match="contain themselves"):
         read_stepnc(text.replace("#21=DERIVED_UNIT_ELEMENT(#18,-1.)", "#21=DERIVED_UNIT_ELEMENT(#23,-1.)"))

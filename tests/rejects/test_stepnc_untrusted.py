@@ -16,7 +16,7 @@ from output.stepnc.iso14649 import write_stepnc_arm
 from tests.synthetic_plan import clamped, tiny
 from verify.kinematics import Kinematics
 from verify.stepnc.reader import read_stepnc
-from verify.stepnc.tool_motion import Course
+from verify.stepnc.tool_motion import MotionRecorder
 
 WRITERS = {"arm": write_stepnc_arm, "aim": write_stepnc_aim}
 NUMBERS = ("0", "-1", "1", "0.", "-1.", "1.E308", "-1.E308", "1.E-308", "1.E999", "1.E-999", "NAN", ".NAN.", "INF",
@@ -87,7 +87,7 @@ def test_a_direction_of_no_size_and_a_dwell_before_now_are_refused():
 
 
 def test_an_axis_that_turns_over_in_one_move_is_refused():
-    course = Course("job", 9)
+    course = MotionRecorder("job", 9)
     with pytest.raises(ProgramError, match="line 8: .*half a turn"):
         course.follow(np.zeros((2, 3)), np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]), rapid=False, feed=1.0, speed=1.0,
                       lines=np.array([7.0, 8.0]))

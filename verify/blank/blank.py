@@ -1,4 +1,7 @@
-"""The blank before the first cut: its box, its cylinder, its mesh, and what of it stands on normals of the part."""
+"""The blank before the first cut: its box, cylinder or mesh, and the stock on normals of the part.
+
+Coordinates are float64, mm, in the setup frame.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +15,16 @@ from geometry.mesh_queries.bvh import TriangleTree
 from verify.blank.mesh_blank_exit import way_out_of_mesh
 from verify.model import ProofSetup, StockKind
 
-UPRIGHT = 1e-9  # of a unit axis: aside, or up, by so little does not count
+UPRIGHT = 1e-9  # of a unit axis: smaller components count as 0
 
 
 def stock_bounds(bounds: F64, setup: ProofSetup) -> F64:
-    """(2, 3) float64, mm: bounding box of the blank round a part with these bounds."""
+    """Bounding box of the blank round a part.
+
+    bounds : (2, 3) float64, mm, setup frame, of the part
+
+    Returns (2, 3) float64, mm, setup frame.
+    """
     grow = setup.margin + setup.uncertainty
     if setup.stock_kind == StockKind.BOX and setup.stock_box is not None:
         return np.asarray(setup.stock_box, dtype=np.float64)
@@ -31,7 +39,7 @@ def stock_bounds(bounds: F64, setup: ProofSetup) -> F64:
 
 
 def stands_over_air(setup: ProofSetup) -> bool:
-    """Whether a tool may go in under what stands of the blank before anything is cut."""
+    """Whether the uncut blank has overhangs that a tool may go under."""
     if setup.stock_kind == StockKind.CYLINDER:
         return bool(np.hypot(*setup.stock_axis[:2]) > UPRIGHT)
     return setup.stock_kind in (StockKind.PART_OFFSET, StockKind.STEP)
@@ -39,7 +47,7 @@ def stands_over_air(setup: ProofSetup) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class BlankCylinder:
-    """A cylinder blank, however it stands.
+    """A cylinder blank in any orientation.
 
     foot : (3,) float64, mm, middle of its lower end; axis : (3,) float64, unit, from there, Z not below 0
     radius, height : mm
@@ -61,13 +69,18 @@ class BlankCylinder:
 
     @property
     def bounds(self) -> F64:
-        """(2, 3) float64, mm: the smallest box along the axes that holds it."""
+        """(2, 3) float64, mm, setup frame: the smallest box along the axes that holds the cylinder."""
         ends = np.array([self.foot, self.foot + self.height * self.axis])
         aside = self.radius * np.sqrt(np.maximum(1.0 - self.axis**2, 0.0))
         return np.array([ends.min(axis=0) - aside, ends.max(axis=0) + aside])
 
     def tops(self, x: F64, y: F64) -> F64:
-        """Where vertical lines at x, y, two arrays of one shape, mm, leave it upwards: mm, -inf where they pass by."""
+        """Heights at which vertical lines leave the cylinder upwards.
+
+        x, y : (i, j) float64, mm, or any one shape
+
+        Returns (i, j) float64, mm, -inf where a line misses the cylinder.
+        """
         wx, wy = x - self.foot[0], y - self.foot[1]
         if self.upright:
             return np.where(np.hypot(wx, wy) <= self.radius, self.foot[2] + self.height, -np.inf)
@@ -86,7 +99,12 @@ class BlankCylinder:
         return np.where(inside & (low <= high), self.foot[2] + high, -np.inf)
 
     def depth(self, x: F64, y: F64, z: F64) -> F64:
-        """How far inside places lie, mm, arrays of one shape together; below 0 outside, no nearer than they are."""
+        """Depth of places below the surface of the cylinder.
+
+        x, y, z : (i, j, k) float64, mm, or any shapes that broadcast together
+
+        Returns (i, j, k) float64, mm, negative outside; its size is never more than the distance to the surface.
+        """
         wx, wy, wz = x - self.foot[0], y - self.foot[1], z - self.foot[2]
         if self.upright:
             return np.asarray(np.minimum(self.radius - np.hypot(wx, wy), np.minimum(wz, self.height - wz)))
@@ -96,7 +114,13 @@ class BlankCylinder:
         return np.asarray(np.minimum(self.radius - off, np.minimum(along, self.height - along)))
 
     def way_out(self, points: F64, directions: F64) -> F64:
-        """(n,) float64, mm: how far it is from points (n, 3) inside, mm, out along unit directions (n, 3)."""
+        """Distance from points inside to the surface along directions.
+
+        points     : (n, 3) float64, mm, setup frame
+        directions : (n, 3) float64, unit
+
+        Returns (n,) float64, mm.
+        """
         w = points - self.foot
         along, slope = w @ self.axis, directions @ self.axis
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -108,7 +132,10 @@ class BlankCylinder:
 
 
 def blank_cylinder(bounds: F64, setup: ProofSetup) -> BlankCylinder:
-    """The cylinder blank of a setup; upright round a part with these bounds (2, 3), mm, where it names none."""
+    """The cylinder blank of a setup; an upright one round the part where the setup gives none.
+
+    bounds : (2, 3) float64, mm, setup frame, of the part
+    """
     if setup.stock_cylinder is not None:
         x, y, z, radius, height = setup.stock_cylinder
         return BlankCylinder(np.array([x, y, z]), np.array(setup.stock_axis), radius, height)
@@ -120,7 +147,13 @@ def blank_cylinder(bounds: F64, setup: ProofSetup) -> BlankCylinder:
 
 
 def blank_mesh(setup: ProofSetup) -> TriangleMesh:
-    """The mesh of a blank of kind step, mm (VerificationError, ``no_stock_mesh``, where the setup has none)."""
+    """The mesh of a blank of kind step, mm.
+
+    Raises
+    ------
+    VerificationError
+        Code no_stock_mesh: the setup has none.
+    """
     if setup.stock_mesh is None:
         raise VerificationError("a blank of kind step has no mesh", code="no_stock_mesh", subjects=("stock_mesh",),
                                 remedy="give the surface of the blank as a closed mesh")
@@ -130,9 +163,11 @@ def blank_mesh(setup: ProofSetup) -> TriangleMesh:
 def stock_on_normals(points: F64, normals: F64, bounds: F64, setup: ProofSetup, reach: float) -> F64:
     """Stock on each outward normal before the first cut, not above ``reach``.
 
-    points, normals : (n, 3) float64, mm and unit; bounds : (2, 3) of the part
+    points, normals : (n, 3) float64, mm and unit, setup frame
+    bounds          : (2, 3) float64, mm, of the part
 
-    Returns (n,) float64, mm: margin + uncertainty for an offset blank, else the way out of the box, cylinder or mesh.
+    Returns (n,) float64, mm: margin + uncertainty for an offset blank, else the distance out of the box, cylinder or
+    mesh.
     """
     if setup.stock_kind == StockKind.PART_OFFSET:
         return np.full(len(points), min(setup.margin + setup.uncertainty, reach))

@@ -1,4 +1,4 @@
-"""Ways out of a blank that is a mesh, grown all round, along straight lines."""
+"""Distances along straight lines out of a blank that is a grown mesh."""
 
 from __future__ import annotations
 
@@ -9,30 +9,30 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.nearest import nearest
 from geometry.mesh_queries.rays import first_hits
 
-CLOSE = 1e-6  # mm: as near as this to the surface is on it
-MOST_STEPS = 200
+CLOSE = 1e-6  # mm: a place this near to the surface counts as on it
+MAX_STEPS = 200
 
 
 def way_out_of_mesh(tree: TriangleTree, points: F64, directions: F64, beyond: float, reach: float) -> F64:
-    """How far it is out of a closed mesh grown by ``beyond`` mm, the first time, along directions; not over ``reach``.
+    """Distance along directions to the first exit from a closed mesh grown by ``beyond``, at most ``reach``.
 
     tree       : TriangleTree, of a closed mesh with its normals outwards, mm
-    points     : (n, 3) float64, mm; directions : (n, 3) float64, unit
+    points     : (n, 3) float64, mm, setup frame
+    directions : (n, 3) float64, unit
     beyond, reach : float, mm, 0 or more
 
-    Returns (n,) float64, mm: 0 where a point is out from the beginning.
+    Returns (n,) float64, mm: 0 where a point is outside from the start.
 
     Notes
     -----
-    A place is inside the mesh where the first facet ahead is seen from behind. Inside, the way goes on to that facet
-    and as far as ``beyond`` it, for a ball round the place where it is met is part of what is grown; outside, by as
-    much as the nearest place of the mesh is nearer than ``beyond``, which never passes the surface looked for (sphere
-    tracing). Within 1e-6 mm it is taken for reached. A line that grazes it for 200 steps gets ``reach``: too much and
-    never too little.
+    A place is inside the mesh where its ray meets the first facet from behind. Inside, a step goes to that facet and
+    ``beyond`` further: a ball of that radius round the hit belongs to the grown mesh. Outside, a step is ``beyond``
+    less the distance to the mesh, so it never passes the surface (sphere tracing [Hart1996]). The search stops within
+    1e-6 mm. A line that grazes the surface for 200 steps gets ``reach``: the result is never too small.
     """
     out, normals = np.zeros(len(points)), tree.mesh.normals
     active = np.arange(len(points))
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         if not len(active):
             break
         at, way = points[active] + out[active, None] * directions[active], directions[active]

@@ -1,4 +1,7 @@
-"""What a program asks of the machine, and ways nobody wrote down: doglegs, unstated starts, stops in the stock."""
+"""Limits of the machine, and unprogrammed moves: doglegs, unstated starts, stops in the stock.
+
+Arrays are float64, lengths mm, points in the setup frame.
+"""
 
 from __future__ import annotations
 
@@ -17,29 +20,29 @@ from verify.model import Finding, FindingKind, ProofSetup
 from verify.program.move_kinds import FEED
 from verify.program.program import Program
 
-LEAST_BELOW = 0.01  # mm under the part that nobody need be told of
-HALF_A_TURN = 180.0 + 1e-6  # deg, and rounding
-LEAST_ANGLE = 1e-6  # deg beyond a limit that are rounding
-RATE_ROUNDING = 1e-6  # share of a rate that is; angles and minutes come from decimals
+MIN_BELOW = 0.01  # mm: tips less far below the part are not noted
+HALF_A_TURN = 180.0 + 1e-6  # deg, rounding included
+MIN_ANGLE = 1e-6  # deg: less beyond a limit is rounding
+RATE_ROUNDING = 1e-6  # share of a rate that is rounding: angles and minutes come from decimals
 
 
 def way_findings(p: Program, bounds: F64, tools: Sequence[ToolBody], setup: ProofSetup) -> list[Finding]:
-    """Ways that cannot be simulated and are not clear above everything, and stops below it.
+    """Findings of moves whose path is unknown and not above everything, and of stops below it.
 
-    bounds : (2, 3) mm, of the part
+    bounds : (2, 3) float64, mm, setup frame, of the part
     """
     top = top_of_all(bounds, setup)
     low = np.minimum(p.start[:, 2], p.end[:, 2])
-    if p.poses is not None:  # where a tool leans its holder may hang lower than its tip
+    if p.poses is not None:  # the holder of a tilted tool may be lower than its tip
         low = np.minimum(low, lowest_places(p, tools, setup, leaning=True))
     return [*_blind(p, bounds, top, low, setup), *_doglegs(p, top, low, setup), *_low_stops(p, bounds, setup)]
 
 
 def _blind(p: Program, bounds: F64, top: float, low: F64, setup: ProofSetup) -> Iterator[Finding]:
-    """Ways that start at a place nobody stated and do not end above everything, where all of these places are.
+    """Moves from a place the program has not stated that do not end above everything.
 
-    Above is along Z of the machine. On a machine whose table tilts that is the tool axis, else Z of the setup frame,
-    above which all of the tool has to be; low (m,) float64, mm, its lowest places.
+    Above is along Z of the machine. That is the tool axis on a machine whose table tilts, else Z of the setup frame.
+    The whole tool must be above; low : (m,) float64, mm, lowest place of the tool on each move.
     """
     clear = top + setup.clearance_rapid - 1e-6
     tables = setup.kinematics is not None and not setup.kinematics.tilts_head
@@ -48,25 +51,27 @@ def _blind(p: Program, bounds: F64, top: float, low: F64, setup: ProofSetup) -> 
         if axes == Z_AXIS and (a[:2] == b[:2]).all():
             continue
         names = "".join(name for k, name in enumerate("XYZ") if axes & (1 << k))
-        way = f"the way to {_place(b)} starts at a place the program has not stated ({names})"
+        way = f"the move to {_place(b)} starts at a place that the program has not stated ({names})"
         axis = UP if p.poses is None else p.poses.end_axis[move]
         if tables and axis[2] < 1.0 - UPRIGHT:
             limit = _top_along(axis, bounds, setup) + setup.clearance_rapid
             lowest = min(float(a @ axis), float(b @ axis))
             if lowest < limit - 1e-6:
                 yield _finding(FindingKind.PROGRAM, p, move, limit - lowest, limit,
-                               f"{way} and ends {limit - lowest:.3f} mm along the tool lower than above everything, so "
-                               "it cannot be simulated: go to a place farther out first, then along the tool")
+                               f"{way}. It ends {limit - lowest:.3f} mm too low along the tool axis and cannot be "
+                               "simulated: move farther out first, then along the tool axis")
         elif low[move] < clear:
             yield _finding(FindingKind.PROGRAM, p, move, float(clear - low[move]), float(clear),
-                           f"{way} and goes below Z{clear:.3f}, so it cannot be simulated: state X and Y first, then "
-                           "come down")
+                           f"{way}. It goes below Z{clear:.3f} and cannot be simulated: program X and Y first, then "
+                           "Z")
 
 
 def _doglegs(p: Program, top: float, low: F64, setup: ProofSetup) -> Iterator[Finding]:
-    """Rapids that turn an axis while another moves; those of linear axes alone are simulated (``verify.material.dogleg_rapids``).
+    """Rapids that turn an axis while another moves.
 
-    low : (m,) float64, mm, the lowest places of tools
+    Rapids of linear axes alone are simulated (``verify.material.dogleg_rapids``).
+
+    low : (m,) float64, mm, lowest place of the tool on each move
     """
     if not setup.dogleg or p.poses is None:
         return
@@ -78,34 +83,34 @@ def _doglegs(p: Program, top: float, low: F64, setup: ProofSetup) -> Iterator[Fi
     if len(bad):
         m = int(bad[0])
         yield _finding(FindingKind.RAPID, p, m, float(clear - low[bad].min()), float(clear),
-                       f"a rapid below Z{clear:.3f} turns a rotary axis while another axis moves; on this machine "
-                       "(rapid_motion dogleg) its way cannot be known: turn above that, or one axis at a time",
+                       f"a rapid below Z{clear:.3f} turns a rotary axis while another axis moves. Its path is unknown "
+                       "on this machine (rapid_motion dogleg): turn above that height, or move one axis at a time",
                        len(bad))
 
 
 def _low_stops(p: Program, bounds: F64, setup: ProofSetup) -> Iterator[Finding]:
-    """Stops at which part, blank or fixtures reach higher along the tool than its tip."""
+    """Stops at which part, blank or fixtures reach higher along the tool axis than the tip."""
     for stop in p.stops:
         axis = np.array(stop.axis)
         top = _top_along(axis, bounds, setup)
         at = float(np.where(axis != 0.0, np.array(stop.tip) * axis, 0.0).sum())
         if at < top - 1e-6:
             along = f"Z{at:.3f}, below the top of stock and fixtures (Z{top:.3f})" if stop.axis[2] == 1.0 else \
-                f"{at:.3f} mm along its axis, to which stock and fixtures reach {top:.3f} mm"
+                f"{at:.3f} mm along its axis, where stock and fixtures reach {top:.3f} mm"
             yield Finding(FindingKind.PROGRAM, p.name, stop.line, None, None, None, top - at, top,
-                          f"{stop.what} with T{stop.tool} at {along}: lift the tool first")
+                          f"{stop.event} with T{stop.tool} at {along}: retract the tool first")
 
 
 def limit_findings(read: Sequence[Program], setup: ProofSetup) -> list[Finding]:
-    """What the machine or a tool cannot do: travel, angles, rates, feed, spindle speed; one per program and limit."""
+    """Findings of exceeded limits: travel, angles, rates, feed, spindle speed; one per program and limit."""
     return [found for p in read for found in (*_travel(p, setup), *_angles(p, setup), *_rates(p, setup),
                                               *_feeds(p, setup), *_speeds(p, setup))]
 
 
 def joints_of(p: Program, setup: ProofSetup) -> tuple[F64, F64] | None:
-    """Linear joints, (m, 3) float64, mm, where every move starts and ends; None where poses need pivots nobody gave.
+    """Linear joints where every move starts and ends; None where the pivots they need are not given.
 
-    While the rotary axes stand at 0 the joints are the tip.
+    Returns two (m, 3) float64 arrays, mm, machine frame. While the rotary axes stand at 0 the joints are the tip.
     """
     if p.poses is None or setup.kinematics is None:
         return p.start, p.end
@@ -124,10 +129,10 @@ def _gauges(p: Program, setup: ProofSetup) -> F64:
 
 
 def _travel(p: Program, setup: ProofSetup) -> Iterator[Finding]:
-    """Where the travel lies is for the operator to set, so what the spindle's moves span is held against it.
+    """Compare the span of the spindle's moves with the travel; the operator sets where the travel lies.
 
-    To blame is the end that lies further from most of the program: one word without its point is the line named. Of
-    two as far it is the later, where the travel runs out.
+    The finding names the end that is farther from the median of the program, so a word that lacks its decimal point
+    is the line named. Of two equally far ends it names the later one, where the travel runs out.
     """
     if setup.travel is None or len(p) == 0:
         return
@@ -136,7 +141,7 @@ def _travel(p: Program, setup: ProofSetup) -> Iterator[Finding]:
         return
     end, lengths = joints[1], _gauges(p, setup)
     spindle = end + np.column_stack([np.zeros((len(p), 2)), lengths])
-    lines = spindle[np.r_[p.line[1:] != p.line[:-1], True]]  # one vote each, in however many pieces it was read
+    lines = spindle[np.r_[p.line[1:] != p.line[:-1], True]]  # one place a line, however many pieces it has
     for axis, limit in enumerate(np.asarray(setup.travel, dtype=np.float64).tolist()):
         low, high = int(np.argmin(spindle[:, axis])), int(np.argmax(spindle[:, axis]))
         span = float(spindle[high, axis] - spindle[low, axis])
@@ -144,12 +149,12 @@ def _travel(p: Program, setup: ProofSetup) -> Iterator[Finding]:
             ends = " to ".join(f"{end[m, axis]:.3f} (line {p.line[m]})" for m in (low, high))
             more = f" and tool lengths from {lengths[low]:g} to {lengths[high]:g} mm" \
                 if axis == 2 and lengths.any() else ""
-            what = "the program moves" if p.poses is None else "the program moves the linear axes"
+            subject = "the program moves" if p.poses is None else "the program moves the linear axes"
             below, above = np.abs(spindle[[low, high], axis] - np.median(lines[:, axis])).tolist()
             far = max(low, high) if abs(below - above) < 1e-9 else low if below > above else high
             yield _finding(FindingKind.LIMIT, p, far, span - limit, limit,
-                           f"{what} over {span:.3f} mm in {'XYZ'[axis]}, from {ends}{more}; the machine "
-                           f"travels {limit:g} mm")
+                           f"{subject} over {span:.3f} mm in {'XYZ'[axis]}, from {ends}{more}; the travel of the "
+                           f"machine is {limit:g} mm")
 
 
 def _angles(p: Program, setup: ProofSetup) -> Iterator[Finding]:
@@ -159,17 +164,17 @@ def _angles(p: Program, setup: ProofSetup) -> Iterator[Finding]:
     beyond = np.maximum(low - turn, turn - high)
     for k, letter in enumerate(setup.kinematics.letters):
         m = int(np.argmax(beyond[:, k]))
-        if beyond[m, k] > LEAST_ANGLE:
+        if beyond[m, k] > MIN_ANGLE:
             limit = float(high[k] if turn[m, k] > high[k] else low[k])
             yield _finding(FindingKind.LIMIT, p, m, float(beyond[m, k]), limit,
-                           f"{letter}{turn[m, k]:g} is beyond the {low[k]:g} to {high[k]:g} deg the machine turns "
-                           f"{letter} to", int((beyond[:, k] > LEAST_ANGLE).sum()))
+                           f"{letter}{turn[m, k]:g} is outside the range of {letter}, {low[k]:g} to {high[k]:g} deg",
+                           int((beyond[:, k] > MIN_ANGLE).sum()))
 
 
 def _rates(p: Program, setup: ProofSetup) -> Iterator[Finding]:
-    """Feed moves that ask a linear axis for more than its rapid, or a rotary one for more than its rate.
+    """Feed moves that need a linear axis faster than its rapid, or a rotary axis faster than its rate.
 
-    Near the pole a slow tip makes them race.
+    Near the pole a slow tip makes the rotary axes fast.
     """
     if p.poses is None or setup.kinematics is None:
         return
@@ -182,14 +187,14 @@ def _rates(p: Program, setup: ProofSetup) -> Iterator[Finding]:
 
 
 def _racing(p: Program, way: F64, fed: NDArray[np.bool_], letters: str, limit: float, unit: str) -> Iterator[Finding]:
-    """One finding per axis whose way (m, n) over the minutes of its move is faster than a limit."""
+    """One finding per axis whose travel, (m, n), over the minutes of its move is faster than a limit."""
     rate = np.divide(way, p.minutes[:, None], out=np.zeros(way.shape), where=fed[:, None])
     over = rate > limit * (1.0 + RATE_ROUNDING)
     for k in np.flatnonzero(over.any(axis=0)).tolist():
         m = int(np.argmax(rate[:, k]))
         yield _finding(FindingKind.LIMIT, p, m, float(rate[m, k]) - limit, limit,
-                       f"the feed asks {rate[m, k]:.6g} {unit} of {letters[k]}, which the machine moves at {limit:g} "
-                       f"{unit} at most: feed slower, or tilt the tool away from the pole", int(over[:, k].sum()))
+                       f"the feed needs {rate[m, k]:.6g} {unit} of {letters[k]}; the limit of the machine is {limit:g} "
+                       f"{unit}: feed slower, or tilt the tool away from the pole", int(over[:, k].sum()))
 
 
 def _feeds(p: Program, setup: ProofSetup) -> Iterator[Finding]:
@@ -199,7 +204,7 @@ def _feeds(p: Program, setup: ProofSetup) -> Iterator[Finding]:
     if len(over):
         m = int(over[np.argmax(p.feed[over])])
         yield _finding(FindingKind.LIMIT, p, m, float(p.feed[m]) - setup.max_feed, setup.max_feed,
-                       f"F{p.feed[m]:g} is over the {setup.max_feed:g} mm/min the machine feeds at", len(over))
+                       f"F{p.feed[m]:g} is above the largest feed of the machine, {setup.max_feed:g} mm/min", len(over))
 
 
 def _speeds(p: Program, setup: ProofSetup) -> Iterator[Finding]:
@@ -207,30 +212,31 @@ def _speeds(p: Program, setup: ProofSetup) -> Iterator[Finding]:
         limit = setup.max_rpm.get(tool)
         if limit is not None and speed > limit * (1.0 + 1e-9):
             yield Finding(FindingKind.LIMIT, p.name, line, None, None, None, speed - limit, limit,
-                          f"S{speed:g} with T{tool} is over the {limit:g} 1/min it may turn at")
+                          f"S{speed:g} with T{tool} is above its largest speed, {limit:g} 1/min")
 
 
 def notes_on(p: Program, bottom: float, setup: ProofSetup) -> Iterator[str]:
-    """What is no finding and should be known: words taken for granted; tips below ``bottom`` mm, the part's underside;
-    axes nobody could hold against their limits.
+    """Notes that are not findings: assumed words, tips below the part, and axes that could not be checked.
 
-    The proof knows of no table that is not a fixture of the setup.
+    bottom : mm, underside of the part
+
+    The proof knows a table only where it is a fixture of the setup.
     """
     yield from (f"{p.name}, {note}" for note in p.notes)
     if p.assumed:
-        yield f"{p.name} does not state {', '.join(p.assumed)} before its first move; it was read as if it did"
-    if len(p) and float(p.end[:, 2].min()) < bottom - LEAST_BELOW:
+        yield f"{p.name} does not state {', '.join(p.assumed)} before its first move; the proof assumes it"
+    if len(p) and float(p.end[:, 2].min()) < bottom - MIN_BELOW:
         m = int(np.argmin(p.end[:, 2]))
         yield (f"{p.name}, line {p.line[m]} goes to Z{p.end[m, 2]:.3f}, {bottom - p.end[m, 2]:.3f} mm below the "
-               "part; what stands there is not known unless it is a fixture of the setup")
+               "part; the proof knows only fixtures of the setup there")
     yield from _long_turns(p, setup)
     if joints_of(p, setup) is None:
         yield (f"{p.name} turns rotary axes and machine.pivots_mm is not given: travel and rates of the linear axes "
-               "were not held against the machine's")
+               "were not checked")
 
 
 def _long_turns(p: Program, setup: ProofSetup) -> Iterator[str]:
-    """Blocks of other controls than LinuxCNC's, whose rotary axes may count from 0 to 360 deg, of over half a turn."""
+    """Blocks that turn an axis by over half a turn, on controls that may count rotary axes from 0 to 360 deg."""
     if p.poses is None or setup.kinematics is None or p.dialect == LINUXCNC or not len(p):
         return
     first = np.flatnonzero(np.r_[True, p.line[1:] != p.line[:-1]])
@@ -240,8 +246,8 @@ def _long_turns(p: Program, setup: ProofSetup) -> Iterator[str]:
     if len(rows):
         way = float(turned[rows[0], axes[0]])
         more = f" (and {len(rows) - 1} more such blocks)" if len(rows) > 1 else ""
-        yield (f"{p.name}, line {p.line[first[rows[0]]]} turns {setup.kinematics.letters[axes[0]]} by {way:g} deg, and "
-               f"was read so; on a machine that counts it from 0 to 360 deg the block may turn it by "
+        yield (f"{p.name}, line {p.line[first[rows[0]]]} turns {setup.kinematics.letters[axes[0]]} by {way:g} deg in "
+               f"this proof. A machine that counts the axis from 0 to 360 deg may turn it by "
                f"{math.remainder(way, 360.0):g}, or by the sign of its word{more}")
 
 

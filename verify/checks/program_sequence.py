@@ -1,4 +1,7 @@
-"""Programs one after the other, each in its own frame: read, started from above, and as one list of moves."""
+"""Programs one after the other, each in its own frame: read, started from above, and joined to one list of moves.
+
+Arrays are float64, mm or dimensionless for directions.
+"""
 
 from __future__ import annotations
 
@@ -19,21 +22,22 @@ from verify.findings import Source
 from verify.gcode.reader import FEED, Program, read_program
 from verify.model import Finding, NcProgram, ProofSetup, StockKind
 from verify.moves import Moves
-from verify.progress import Report, Stages
+from verify.progress import Report, StageProgress
 from verify.stepnc.reader import is_stepnc, read_stepnc
 from verify.tool_axes import ToolAxes
 
-BLEND = 0.001  # mm, what G64 may leave the path by, or this share of the gouge tolerance; it is in the error bound
-BLEND_SHARE = 0.1
+BLEND = 0.001  # mm, deviation that G64 may allow; the error bound includes it
+BLEND_SHARE = 0.1  # of the gouge tolerance: allowed instead where that is more
 Given = NcProgram | tuple[str, str]
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
-    """One program and what it is held against, all in its own frame.
+class FramedProgram:
+    """One program with setup and bounds of the part, all in the frame of the program.
 
-    program : as read; turn : (3, 3) float64 from the frame of the proof to that of the program, None: the same
-    setup   : of the proof, blank and fixtures as boxes round them where the frame is turned
+    program : as read
+    turn    : (3, 3) float64, rotation from the frame of the proof to that of the program; None: the same frame
+    setup   : of the proof; where the frame is turned, boxes round blank and fixtures stand in for them
     bounds  : (2, 3) float64, mm, of the part
     """
 
@@ -43,7 +47,7 @@ class Reading:
     bounds: F64
 
     def findings(self, tools: Sequence[ToolBody]) -> list[Finding]:
-        """Limits of the machine and ways that cannot be simulated, places in the frame of the proof."""
+        """Findings of machine limits and of moves that cannot be simulated; points are in the frame of the proof."""
         found = [*limit_findings([self.program], self.setup),
                  *way_findings(self.program, self.bounds, tools, self.setup)]
         if self.turn is None:
@@ -52,16 +56,27 @@ class Reading:
                 for f in found]
 
     def notes(self) -> list[str]:
-        """What is no finding and should be known."""
+        """Notes that are not findings."""
         return list(notes_on(self.program, float(self.bounds[0, 2]), self.setup))
 
     def here(self, vectors: F64) -> F64:
-        """Places or directions (..., 3) of the program in the frame of the proof."""
+        """Turn places or directions of the program into the frame of the proof.
+
+        vectors : (n, 3) or (n, 3, 3) float64, mm or dimensionless, frame of the program
+
+        Returns the same shape, frame of the proof.
+        """
         return vectors if self.turn is None else np.asarray(vectors @ self.turn)
 
 
 def check_numbers(tools: Sequence[ToolBody]) -> None:
-    """Refuse two tools of one T number (VerificationError, code tool_number_twice)."""
+    """Refuse two tools of one T number.
+
+    Raises
+    ------
+    VerificationError
+        Code tool_number_twice.
+    """
     numbers = [t.number for t in tools]
     if len(set(numbers)) != len(numbers):
         raise VerificationError("two tools share a T number", code="tool_number_twice",
@@ -70,33 +85,33 @@ def check_numbers(tools: Sequence[ToolBody]) -> None:
 
 
 def read_all(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
-             spindle_tool: int, report: Report) -> list[Reading]:
-    """Read programs in the order they run; a first descent that lacks only its height comes from above everything.
+             spindle_tool: int, report: Report) -> list[FramedProgram]:
+    """Read programs in the order they run; a descent of unknown start height comes from above everything.
 
-    programs, spindle_tool : as ``verify.prove.prove`` takes them, and errors as it raises them
+    programs, spindle_tool : as ``verify.prove.prove`` takes them; it also names the errors
     report   : called with the share read, 0 to 1
     """
     given = [p if isinstance(p, NcProgram) else NcProgram(*p) for p in programs]
-    stages, total, done = Stages(report), max(sum(len(p.text) for p in given), 1), 0
+    stages, total, done = StageProgress(report), max(sum(len(p.text) for p in given), 1), 0
     read = []
     for nc in given:
         own, bounds = _own(nc, part, setup)
         top = top_of_all(bounds, own)
-        told = stages.span(done / total, (done + len(nc.text)) / total)
+        share = stages.span(done / total, (done + len(nc.text)) / total)
         if is_stepnc(nc.text):
-            program = read_stepnc(nc.text, name=nc.name, tools=tools, kinematics=setup.kinematics, report=told)
+            program = read_stepnc(nc.text, name=nc.name, tools=tools, kinematics=setup.kinematics, report=share)
         else:
             program = read_program(
                 nc.text, name=nc.name, tools=frozenset(t.number for t in tools), work_offset=own.work_offset,
                 blend_limit=max(BLEND, BLEND_SHARE * setup.gouge_tolerance), kinematics=setup.kinematics,
-                gauge_length=setup.gauge_length, spindle_tool=spindle_tool, report=told, dialect=nc.dialect)
-        read.append(Reading(from_above(program, top + setup.clearance_rapid), nc.turn, own, bounds))
+                gauge_length=setup.gauge_length, spindle_tool=spindle_tool, report=share, dialect=nc.dialect)
+        read.append(FramedProgram(from_above(program, top + setup.clearance_rapid), nc.turn, own, bounds))
         done += len(nc.text)
     return read
 
 
 def _own(nc: NcProgram, part: Part, setup: ProofSetup) -> tuple[ProofSetup, F64]:
-    """Setup and bounds of the part, (2, 3) mm, as one program sees them."""
+    """Setup and bounds of the part, (2, 3) mm, in the frame of one program."""
     offset = nc.work_offset or setup.work_offset
     if nc.turn is None:
         return replace(setup, work_offset=offset), part.mesh.bounds
@@ -113,10 +128,10 @@ def _box_round(box: F64, turn: F64) -> F64:
     return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
 
-def moves_of(read: Sequence[Reading], tools: Sequence[ToolBody]) -> tuple[Moves, Source]:
-    """All programs one after the other. Moves without a tool have nothing to simulate; the reader named them.
+def moves_of(read: Sequence[FramedProgram], tools: Sequence[ToolBody]) -> tuple[Moves, Source]:
+    """Moves of all programs, one after the other. Moves without a tool are left out; the reader remarks them.
 
-    tools : of the moves; ``Moves.tool`` is the place in it
+    tools : of the moves; ``Moves.tool`` is the place in this sequence
     """
     programs = [r.program for r in read]
     row = {t.number: i for i, t in enumerate(tools)}
@@ -137,10 +152,11 @@ def moves_of(read: Sequence[Reading], tools: Sequence[ToolBody]) -> tuple[Moves,
             Source(tuple(p.name for p in programs), which, line, number))
 
 
-def slides_of(read: Sequence[Reading], tools: Sequence[ToolBody], setup: ProofSetup) -> F64 | None:
-    """(m, 3, 3) directions of the linear axes, move by move, as ``moves_of`` takes them.
+def slides_of(read: Sequence[FramedProgram], tools: Sequence[ToolBody], setup: ProofSetup) -> F64 | None:
+    """Directions of the linear axes for each move of ``moves_of``.
 
-    None where they lie along the frame throughout, or no rapid asks for them.
+    Returns (m, 3, 3) float64, dimensionless, rows in the frame of the proof. None where the axes lie along the frame
+    throughout, or rapids are straight.
     """
     if not setup.dogleg or all(r.turn is None and r.program.poses is None for r in read):
         return None
@@ -153,13 +169,13 @@ def slides_of(read: Sequence[Reading], tools: Sequence[ToolBody], setup: ProofSe
     return np.concatenate(out)[_known(read, tools)]
 
 
-def _known(read: Sequence[Reading], tools: Sequence[ToolBody]) -> NDArray[np.bool_]:
-    """(m,) bool: moves with a tool of the table in the spindle."""
+def _known(read: Sequence[FramedProgram], tools: Sequence[ToolBody]) -> NDArray[np.bool_]:
+    """(m,) bool: moves with one of the tools in the spindle."""
     number = np.concatenate([np.zeros(0, np.int32), *(r.program.tool for r in read)])
     return np.isin(number, [t.number for t in tools])
 
 
-def _axes(r: Reading, at_start: bool) -> F64:
+def _axes(r: FramedProgram, at_start: bool) -> F64:
     """(m, 3) tool axes of a program at the start or the end of its moves, in the frame of the proof."""
     p = r.program
     if p.poses is None:

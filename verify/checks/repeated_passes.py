@@ -1,4 +1,4 @@
-"""Stretches of a program that run a second time and find nothing to cut: a zone pasted twice, a pass not deleted."""
+"""Parts of a program that run a second time and remove nothing: a zone pasted twice, a pass not deleted."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from verify.findings import Source
 from verify.model import Finding, FindingKind
 from verify.moves import Moves
 
-LEAST_LINES = 4
+MIN_LINES = 4
 WINDOW = 8
-ROUND = 1e-6  # mm, rad: moves nearer than that are the same
+ROUND = 1e-6  # mm, rad: closer moves are the same
 
 
 def repeat_findings(moves: Moves, cut: NDArray[np.bool_], source: Source) -> list[Finding]:
-    """One finding for each run of feed moves over at least 4 lines that repeats an earlier one and takes no stock.
+    """One finding for each run of feed moves over at least 4 lines that repeats an earlier one and removes no stock.
 
-    cut : (m,) bool, moves that took stock
+    cut : (m,) bool, moves that removed stock
 
-    A level round walked once more at once, a spring pass, is none.
+    A closed level path that is repeated at once, a spring pass, is not a finding.
     """
     return [Finding(FindingKind.PROGRAM, source.names[source.program[a]], int(source.line[a]), None, None,
                     tuple(round(float(v), 6) for v in moves.end[a]), 0.0, 0.0,  # type: ignore[arg-type]
-                    f"T{source.tool[a]}: lines {source.line[a]} to {source.line[b]} run again what lines "
-                    f"{source.line[a - shift]} to {source.line[b - shift]} ran, and take nothing off", b - a + 1)
+                    f"T{source.tool[a]}: lines {source.line[a]} to {source.line[b]} repeat lines "
+                    f"{source.line[a - shift]} to {source.line[b - shift]} and remove no stock", b - a + 1)
             for a, b, shift in _runs(moves, cut)
-            if source.line[b] - source.line[a] + 1 >= LEAST_LINES and not _spring(moves, a, b, shift)]
+            if source.line[b] - source.line[a] + 1 >= MIN_LINES and not _spring(moves, a, b, shift)]
 
 
 def _spring(moves: Moves, a: int, b: int, shift: int) -> bool:
-    """Whether moves a..b are a level round again, right after the first time."""
+    """Whether moves a..b repeat a closed level path at once."""
     way = moves.end[a:b + 1] - moves.start[a:b + 1]
     up = np.array([0.0, 0.0, 1.0]) if moves.axes is None else moves.axes.axis[a]
     closed = np.linalg.norm(moves.end[b] - moves.start[a]) < 1e-3
@@ -41,7 +41,7 @@ def _spring(moves: Moves, a: int, b: int, shift: int) -> bool:
 
 
 def _runs(moves: Moves, cut: NDArray[np.bool_]) -> Iterator[tuple[int, int, int]]:
-    """First and last move of each run, and how many moves before it the same ones stand."""
+    """First and last move of each run, and how many moves earlier the same moves are."""
     if len(moves) < 2 * WINDOW:
         return
     idle = moves.feed & ~cut

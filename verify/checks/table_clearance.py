@@ -1,11 +1,11 @@
-"""Does a tool reach down to the table: lowest places of whole assemblies along the moves of a program.
+"""Clearance to the table: lowest places of whole assemblies along the moves of a program.
 
 The lowest place of a disc of radius r at the height h of a tool with tip p and axis a is p_z + h a_z - r s, with
 s = sqrt(1 - a_z²). Cutting parts are rounded: a corner of radius c has its centres on the circle of radius R - c at
 the height c, so it reaches to p_z + c a_z - (R - c) s - c. All else is made of frusta, whose lowest place is on one of
 their two rims. Along a move the tip goes straight and the axis swings by a tenth of a radian at most
-(``dividing.MOST_TURN``), so what a rim at the distance q from the tip does between the ends of a move is within
-q / 800 of the way between them; that is added where an axis swings.
+(``turn_subdivision.MAX_TURN``). Between the ends of a move, a rim at the distance q from the tip therefore stays within
+q / 800 of the straight line between its ends. That is added where an axis swings.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from verify.program.program import Program
 from verify.tool_bodies import Bodies
 
 BOW = 1.0 / 800.0  # of the distance from the tip
-UPRIGHT = 1e-9  # of an axis that leans
+UPRIGHT = 1e-9  # of a unit axis: less is not a tilt
 ROUNDING = 1e-3  # mm, coordinates of a program
 
 
 def table_findings(read: Sequence[Program], tools: Sequence[ToolBody], setup: ProofSetup) -> list[Finding]:
-    """One finding for each program with tools that come nearer to the table than rapids keep to fixtures.
+    """One finding for each program whose tools come nearer to the table than the rapid clearance.
 
-    A table nobody told of (``setup.table_known`` false) is held against tools that lean, for upright ones go past the
-    part as on a machine of three axes.
+    An assumed table height (``setup.table_known`` false) is checked for tilted tools only: upright tools pass beside
+    the part as on a machine of three axes.
     """
     if setup.table is None or setup.kinematics is None:
         return []
@@ -44,33 +44,35 @@ def _of(p: Program, tools: Sequence[ToolBody], setup: ProofSetup, limit: float) 
     if not len(bad):
         return
     m = int(bad[np.argmin(low[bad])])
-    what = "the table" if setup.table_known else "the bottom of the blank, for nobody said where the table is,"
+    floor = "the table" if setup.table_known else "the bottom of the blank (the height of the table is not given)"
     at = p.end[m]
     yield Finding(FindingKind.COLLISION, p.name, int(p.line[m]), None, None, (float(at[0]), float(at[1]), float(at[2])),
                   float(limit - low[m]), float(limit),
-                  f"T{p.tool[m]} comes down to Z{low[m]:.3f}; it has to stay {setup.clearance_rapid:g} mm above {what} "
+                  f"T{p.tool[m]} comes down to Z{low[m]:.3f}; it must stay {setup.clearance_rapid:g} mm above {floor} "
                   f"at Z{setup.table:.3f}", len(bad))
 
 
 def lowest_places(p: Program, tools: Sequence[ToolBody], setup: ProofSetup, *, leaning: bool) -> F64:
-    """(m,) float64, mm: how low the assembly reaches on every move; inf without a tool of these.
+    """Lowest Z of the assembly on every move.
 
-    leaning : of upright tools too it is inf
+    leaning : whether upright tools are left out
+
+    Returns (m,) float64, mm, setup frame; inf for other tools and, with ``leaning``, for upright ones.
     """
     up = np.tile([0.0, 0.0, 1.0], (len(p), 1))
     start, end = (up, up) if p.poses is None else (p.poses.start_axis, p.poses.end_axis)
     swings = np.abs(start - end).max(axis=1) > UPRIGHT
-    asked = np.ones(len(p), np.bool_) if not leaning else np.minimum(start[:, 2], end[:, 2]) < 1.0 - UPRIGHT
+    counted = np.ones(len(p), np.bool_) if not leaning else np.minimum(start[:, 2], end[:, 2]) < 1.0 - UPRIGHT
     out = np.full(len(p), np.inf)
     for tool in tools:
-        mine = np.flatnonzero(asked & (p.tool == tool.number))
+        mine = np.flatnonzero(counted & (p.tool == tool.number))
         out[mine] = np.minimum(_lowest(tool, setup, p.start[mine], start[mine], swings[mine]),
                                _lowest(tool, setup, p.end[mine], end[mine], swings[mine]))
     return out
 
 
 def _lowest(tool: ToolBody, setup: ProofSetup, tip: F64, axis: F64, swings: F64) -> F64:
-    """(n,) float64, mm: how low the assembly reaches with tips and axes (n, 3); lower where an axis swings."""
+    """(n,) float64, mm: lowest Z of the assembly with tips and axes (n, 3); lower where an axis swings."""
     z = axis[:, 2]
     s = np.sqrt(np.maximum(1.0 - z * z, 0.0))
     c, flat = tool.corner_radius, tool.radius - tool.corner_radius

@@ -1,4 +1,4 @@
-"""Whether two programs, or a program and a STEP-NC file, describe the same motion.
+"""Compares the motion of two programs, or of a program and a STEP-NC file.
 
 Nothing is simulated here.
 """

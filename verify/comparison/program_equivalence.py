@@ -1,12 +1,12 @@
-"""Are two programs the same to the part? Move for move, so that the proof of one is the proof of the other.
+"""Compares two programs move for move: where they are equivalent, the proof of one is the proof of the other.
 
-Compared is what a reading gives: where the tip goes, how the tool stands, rapid or feed, how long a feed move takes,
-the tool, its speed, the coolant, dwells, and what is unknown of a way; how the machine is left where a tool is changed,
-where somebody is waited for, and at the end; and what is taken for granted. Moves that go nowhere are left out on both
-sides, for controls differ in how they say "home". How far a path is left is compared where both programs bound it.
+Compared are, from the readings of both: tip, tool axis, rapid or feed, time of a feed move, tool, spindle speed,
+coolant, dwells, and unknown starts of moves; the state of the machine at tool changes, stops and the end; and assumed
+words. Moves of length 0 are left out on both sides, since controls write "home" differently. The allowed deviation from
+the path is compared where both programs bound it.
 
-An arc is read as chords. Where two controls say the same arc in words that are rounded otherwise, one may have a chord
-more: such a block is compared as a whole, and its chords as lines in space.
+An arc is read as chords. Two controls may round the words of the same arc differently, so that one reading has a chord
+more. Such a block is compared as a whole, its chords as lines in space.
 """
 
 from __future__ import annotations
@@ -25,31 +25,31 @@ from verify.gcode.dialects import CONTROLS
 from verify.model import NcProgram, ProofSetup
 from verify.program.arc_chords import CHORD
 from verify.program.program import Pause, Program
-from verify.progress import Report, Stages, silent
+from verify.progress import Report, StageProgress, silent
 
 TIP = 1e-3
-"""mm between two tips that are one."""
+"""mm, largest distance of two tips that count as equal."""
 AXIS = 1e-6
-"""Between unit vectors of two tool axes that are one."""
+"""Largest difference of two unit tool axes that count as equal."""
 RATE = 1e-9
-"""Between two feeds that are one, as a share."""
+"""Largest relative difference of two feeds that count as equal."""
 
 
 def difference(proved: Program, other: Program) -> str:
-    """What the second program does otherwise than the first, in words with lines of both; '' where nothing.
+    """The first difference of two programs, in words with lines of both; '' where they are equivalent.
 
-    Neither program is simulated. Remarks of the second that the first has not are a difference too.
+    Neither program is simulated. A remark on the second program that the first does not have is a difference too.
     """
     had = {r.message for r in proved.remarks}
     for remark in other.remarks:
         if remark.message not in had:
             return f"line {remark.line} of {other.name}: {remark.message}"
     if proved.dwell != other.dwell:
-        return f"{other.name} waits {other.dwell:g} s, {proved.name} {proved.dwell:g} s"
+        return f"{other.name} dwells {other.dwell:g} s, {proved.name} {proved.dwell:g} s"
     if taken := [word for word in other.assumed if word not in proved.assumed]:
-        return f"{other.name} does not say {', '.join(taken)} before its first move"
+        return f"{other.name} does not state {', '.join(taken)} before its first move"
     if other.unbounded and other.dialect in CONTROLS and CONTROLS[other.dialect].bounds_path:
-        return f"{other.name} does not bound what the control leaves the path by"
+        return f"{other.name} does not bound the deviation from the path"
     if not (other.unbounded or proved.unbounded) and other.leaves > proved.leaves + 1e-12:
         return (f"{other.name} lets the control leave the path by {other.leaves:g} mm, {proved.name} by "
                 f"{proved.leaves:g} mm")
@@ -70,44 +70,44 @@ def difference(proved: Program, other: Program) -> str:
 
 
 def _careless(p: Program) -> str:
-    """Where a program changes a tool, or ends, as none that is written here does; '' where nowhere.
+    """First tool change, stop or end at which the spindle is not home, in words; '' where there is none.
 
-    A fresh cutter is put in by hand: on every control the spindle is away from the part then.
+    Our own programs send the spindle home there, since the operator inserts a new cutter by hand.
     """
     control, changes = CONTROLS.get(p.dialect), 0
     for pause in p.pauses:
-        least = 0 if pause.what in ("M0", "M1") else None if control is None else control.home_from
-        if least is not None and (changes >= least or pause.what != "tool change"):
+        first_home = 0 if pause.event in ("M0", "M1") else None if control is None else control.home_from
+        if first_home is not None and (changes >= first_home or pause.event != "tool change"):
             if not pause.home:
-                return f"line {pause.line} of {p.name}: {pause.what}, and the spindle was not sent home before"
+                return f"line {pause.line} of {p.name}: {pause.event} while the spindle is not home"
             if control is not None and control.gives_up_length and pause.counted:
-                return f"line {pause.line} of {p.name}: {pause.what}, and the length offset is not off"
-        changes += pause.what == "tool change"
+                return f"line {pause.line} of {p.name}: {pause.event} while the length offset is on"
+        changes += pause.event == "tool change"
     return ""
 
 
 def _paused(proved: Program, other: Program, mine: NDArray[np.int64], yours: NDArray[np.int64]) -> str:
-    """The first pause that the programs do not make alike, after the same of the moves given; '' where none."""
-    def told(pause: Pause, moving: NDArray[np.int64]) -> tuple[object, ...]:
-        tool = pause.tool if pause.what == "tool change" else 0
-        return (pause.what, tool, int(np.searchsorted(moving, pause.moves)), pause.speed, pause.coolant, pause.tcp,
+    """The first pause that differs in state or place among the given moves, in words; '' where none does."""
+    def state_at(pause: Pause, moving: NDArray[np.int64]) -> tuple[object, ...]:
+        tool = pause.tool if pause.event == "tool change" else 0
+        return (pause.event, tool, int(np.searchsorted(moving, pause.moves)), pause.speed, pause.coolant, pause.tcp,
                 pause.relative)
 
-    # LinuxCNC puts the old tool away to take a fresh one by the same number
-    first, second = ([x for x in p.pauses if x.what != "tool change" or x.tool] for p in (proved, other))
+    # LinuxCNC unloads the old tool to load a new one of the same number
+    first, second = ([x for x in p.pauses if x.event != "tool change" or x.tool] for p in (proved, other))
     for a, b in zip(first, second, strict=False):
-        if told(a, mine) != told(b, yours):
-            return (f"line {b.line} of {other.name} ({b.what}) and line {a.line} of {proved.name} ({a.what}) differ in "
-                    "what is left running, or in where they stand")
+        if state_at(a, mine) != state_at(b, yours):
+            return (f"line {b.line} of {other.name} ({b.event}) and line {a.line} of {proved.name} ({a.event}) differ "
+                    "in spindle, coolant, modes or place")
     if len(first) != len(second):
         more, rest = (proved, first) if len(first) > len(second) else (other, second)
         pause = rest[min(len(first), len(second))]
-        return f"line {pause.line} of {more.name} ({pause.what}) has no counterpart"
+        return f"line {pause.line} of {more.name} ({pause.event}) has no counterpart"
     return ""
 
 
 def _moving(p: Program) -> NDArray[np.int64]:
-    """Rows that go somewhere, or whose way there is not known."""
+    """Rows of moves that are not of length 0, or whose start is unknown."""
     moves = (p.start != p.end).any(axis=1)
     if p.poses is not None:
         moves |= (p.poses.start_turn != p.poses.end_turn).any(axis=1)
@@ -117,9 +117,9 @@ def _moving(p: Program) -> NDArray[np.int64]:
 
 def _evened(a: Program, b: Program, i: NDArray[np.int64],
             j: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """First and last row (n, 2) of each move that is compared, of both programs.
+    """First and last row, (n, 2), of each compared move in both programs.
 
-    A row each, but for blocks of several rows that have another number of them in the other program: these are one.
+    Each row is a move; a block with a different number of rows in the two programs is one move.
     """
     begins, counts = zip(*(_blocks(p, rows) for p, rows in ((a, i), (b, j))), strict=True)
     out = []
@@ -138,7 +138,7 @@ def _evened(a: Program, b: Program, i: NDArray[np.int64],
 
 
 def _blocks(p: Program, rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Where, among rows, each block of the program begins, and how many of them it has."""
+    """First row of each block of the program among ``rows``, and its number of rows."""
     line = p.line[rows]
     begin = np.flatnonzero(np.append(True, line[1:] != line[:-1])) if len(rows) else np.zeros(0, np.int64)
     return begin, np.diff(np.append(begin, len(rows)))
@@ -146,7 +146,7 @@ def _blocks(p: Program, rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDA
 
 def _compared(a: Program, b: Program, first: NDArray[np.int64],
               second: NDArray[np.int64]) -> list[tuple[str, NDArray[np.bool_]]]:
-    """What is compared, and for which pairs of moves, given by their first and last rows (n, 2), it differs."""
+    """Compared properties, and for each the pairs of moves that differ; moves by their first and last rows (n, 2)."""
     (i, il), (j, jl) = first.T, second.T
 
     def far(one: F64, other: F64, limit: float, *, at_start: bool = False) -> NDArray[np.bool_]:
@@ -159,13 +159,13 @@ def _compared(a: Program, b: Program, first: NDArray[np.int64],
 
     out = [("rapid or feed", a.kind[i] != b.kind[j]), ("the tool", a.tool[i] != b.tool[j]),
            ("where the move begins", far(a.start, b.start, TIP, at_start=True)),
-           ("where the move ends", far(a.end, b.end, TIP)), ("the way between", _wide(a, b, first, second)),
-           ("what is known of the way", _unknown(a)[i] != _unknown(b)[j])]
+           ("where the move ends", far(a.end, b.end, TIP)), ("the path between", _wide(a, b, first, second)),
+           ("which start coordinates are known", _unknown(a)[i] != _unknown(b)[j])]
     out += [("the tool axis before the move", far(_axes(a, True), _axes(b, True), AXIS, at_start=True)),
             ("the tool axis after the move", far(_axes(a, False), _axes(b, False), AXIS))]
     if a.poses is not None and b.poses is not None:
         out.append(("where the rotary axes stand", far(a.poses.end_turn, b.poses.end_turn, AXIS)))
-    # what a block takes is rounded with its places
+    # the time of a block depends on its rounded coordinates
     slack = 1e-9 + TIP / np.maximum(np.nan_to_num(a.feed[i], nan=1.0), 1.0)
     mine, yours = (_minutes(p, rows) for p, rows in ((a, first), (b, second)))
     took = ~((np.abs(mine - yours) <= slack) | (np.isnan(mine) & np.isnan(yours)))
@@ -174,7 +174,7 @@ def _compared(a: Program, b: Program, first: NDArray[np.int64],
 
 
 def _minutes(p: Program, rows: NDArray[np.int64]) -> F64:
-    """What moves take, from their first to their last row (n, 2)."""
+    """Minutes of moves from their first to their last row (n, 2)."""
     out = p.minutes[rows[:, 0]]
     for k in np.flatnonzero(rows[:, 0] != rows[:, 1]).tolist():
         out[k] = p.minutes[rows[k, 0]:rows[k, 1] + 1].sum()
@@ -182,7 +182,7 @@ def _minutes(p: Program, rows: NDArray[np.int64]) -> F64:
 
 
 def _wide(a: Program, b: Program, first: NDArray[np.int64], second: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Of moves of several rows whether their chords leave one another: by more than each may leave their arc."""
+    """Whether the chords of moves of several rows are farther apart than chords may be from their arc."""
     out = np.zeros(len(first), np.bool_)
     for k in np.flatnonzero((first[:, 0] != first[:, 1]) | (second[:, 0] != second[:, 1])).tolist():
         one, other = (np.vstack([p.start[m], p.end[m:n + 1]]) for p, (m, n) in ((a, first[k]), (b, second[k])))
@@ -191,7 +191,7 @@ def _wide(a: Program, b: Program, first: NDArray[np.int64], second: NDArray[np.i
 
 
 def _off(points: F64, way: F64) -> float:
-    """mm, the farthest of points (n, 3) from a way (m, 3), wherever along it."""
+    """mm, largest distance of points (n, 3) from a polyline (m, 3)."""
     d = np.diff(way, axis=0)
     share = ((points[:, None] - way[:-1]) * d).sum(axis=2) / np.maximum((d * d).sum(axis=1), 1e-30)
     near = way[:-1] + np.clip(share, 0.0, 1.0)[:, :, None] * d
@@ -212,33 +212,33 @@ def _axes(p: Program, at_start: bool) -> F64:
 
 def carried(proved: NcProgram, twins: Sequence[NcProgram], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
             report: Report = silent) -> list[str]:
-    """Carry the proof of a program over to others that shall be the same.
+    """Carry the proof of a program over to equivalent programs.
 
-    proved  : a program without a finding;  twins : the others, in the same frame; one may be its own text with other
-              comments
+    proved  : a program without a finding
+    twins   : the other programs, in the same frame; one may be the same text with other comments
     part, tools, setup : of the proof, as ``verify.prove.prove`` takes them
     report  : called with the share done, 0 to 1
 
-    Returns what should be known of the readings of the others and is no difference.
+    Returns the notes of the other readings.
 
     Raises
     ------
     InternalError
-        Code programs_differ: one of them does otherwise, or cannot be read; the message names both lines.
+        Code programs_differ: one of them is not equivalent, or cannot be read; the message names both lines.
     """
     if not twins:
         return []
-    stages, share, notes = Stages(report), 1.0 / (len(twins) + 1), []
+    stages, share, notes = StageProgress(report), 1.0 / (len(twins) + 1), []
     (first,) = read_all([proved], part, tools, setup, 0, stages.span(0.0, share))
     for k, twin in enumerate(twins, 1):
         try:
             (other,) = read_all([twin], part, tools, setup, 0, stages.span(k * share, (k + 1) * share))
-            told = difference(first.program, other.program)
+            problem = difference(first.program, other.program)
         except ProgramError as refusal:
-            told = refusal.message
-        if told:
-            raise InternalError(f"{twin.name} is not the program that was proved: {told}", code="programs_differ",
-                                subjects=(proved.name, twin.name), measured=told,
+            problem = refusal.message
+        if problem:
+            raise InternalError(f"{twin.name} is not the program that was proved: {problem}", code="programs_differ",
+                                subjects=(proved.name, twin.name), measured=problem,
                                 remedy="please report it with part and setup; nothing is delivered")
         if twin.dialect != proved.dialect:  # else the proof has noted them
             notes += [f"{twin.name}: {note}" for note in other.program.notes]

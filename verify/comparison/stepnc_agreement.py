@@ -1,11 +1,10 @@
-"""Two readings of one job held against each other: do they make the tool do the same.
+"""Compares two readings of one job: NC program and STEP-NC file must describe the same motion.
 
-Moves are compared one by one, after what is no move has been left out: ways that neither reading knows, blocks that
-turn the tool about itself, and pieces a reading cut a turning block into. Where one of the two leaves the way to the
-control, as STEP-NC does from a tool change to the next path, the rapids of the other up to the same place are not
-looked at. A stretch of one feed that has another number of points on both sides, as arcs for chords, is compared as a
-line in space: the chords a G2 or G3 is read as may leave their arc by ``CHORD``, so that the points of STEP-NC on that
-arc may be so much farther off.
+Moves are compared one by one. Left out are moves of unknown start in both readings and blocks that turn the tool about
+its own axis; the pieces of a turning block count as one move. STEP-NC leaves the move from a tool change to the next
+path to the control; there the rapids of the other reading up to the same place are not compared. A stretch of one feed
+with different numbers of points, such as an arc against chords, is compared as a line in space. The chords of a G2 or
+G3 may leave their arc by ``CHORD``, so points of STEP-NC on that arc may be that much farther off.
 """
 
 from __future__ import annotations
@@ -21,14 +20,14 @@ from verify.program.program import Program
 
 TIP = 1e-3  # mm
 AXIS = 1e-6  # of unit vectors, per component
-FEED = 1e-6  # share; words of feeds are decimal, so equal ones come back with rounding errors alone
-INVERSE = 1e-4  # 1/min, rounding of the words of inverse time, which turning blocks of joints are timed by
-STILL_TIP, STILL_AXIS = 5e-5, 3e-6  # mm and of unit vectors: what moves less does not move
+FEED = 1e-6  # share; feed words are decimal, so equal feeds differ by rounding only
+INVERSE = 1e-4  # 1/min, rounding of inverse time words, which time the turning blocks of joints
+STILL_TIP, STILL_AXIS = 5e-5, 3e-6  # mm and of unit vectors: smaller moves count as none
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """How far two readings are apart: moves compared, and the largest difference, mm and of unit vectors."""
+    """Result of a comparison: number of moves, and the largest differences of tip, mm, and axis, of unit vectors."""
 
     moves: int
     tip: float
@@ -36,7 +35,7 @@ class Agreement:
 
 
 class _Rows:
-    """The moves of one reading as they are compared.
+    """The moves of one reading in the form that is compared.
 
     at    : (n, 12) start and end of the tip, mm, and of the axis
     """
@@ -49,7 +48,7 @@ class _Rows:
         unknown = np.zeros(len(p), np.bool_)
         unknown[p.unknown[:, 0]] = True
         turning = np.abs(last - first).max(axis=1, initial=0.0) > 0.0
-        on = np.zeros(len(p), np.bool_)  # goes on with the turning block before it
+        on = np.zeros(len(p), np.bool_)  # continues the turning block before it
         on[1:] = (turning[1:] & turning[:-1] & (p.line[1:] == p.line[:-1]) & (rapid[1:] == rapid[:-1])
                   & (p.tool[1:] == p.tool[:-1]) & ~unknown[1:] & ~unknown[:-1])
         begins = np.flatnonzero(~on)
@@ -65,7 +64,7 @@ class _Rows:
         self.speed, self.coolant = p.speed[rows], p.coolant[rows]
         took = np.add.reduceat(p.minutes, begins)[keep.astype(np.bool_)] if len(begins) else p.minutes
         tip = np.linalg.norm(self.at[:, 3:6] - self.at[:, :3], axis=1) / np.where(took > 0.0, took, np.inf)
-        # turning joints are fed by time: what the tip does follows from that, as rounded as both are
+        # turning joints are fed by time: the speed of the tip follows from it, with the rounding of both
         other = np.abs(tip - self.feed) > FEED * np.nan_to_num(self.feed)
         self.timed = self.turning & ~self.rapid & other & (tip > 0.0)
         self.feed[self.timed] = tip[self.timed]
@@ -75,21 +74,21 @@ class _Rows:
 
 
 def check_agreement(nc: Program, stepnc: Program) -> Agreement:
-    """Hold a STEP-NC file against the NC program of the same job.
+    """Compare a STEP-NC file [ISO14649-10; ISO10303-238] with the NC program of the same job.
 
     nc, stepnc : as read, both in the frame of the program
 
     Returns
     -------
     Agreement
-        What was compared, and how near they are.
+        Number of compared moves and the largest differences.
 
     Raises
     ------
     InternalError
-        Code stepnc_differs: the tip is more than 0.001 mm apart, the axis more than 1e-6, feed, tool or kind of a move
-        is another, speed or coolant of a feed move, or one of them has moves that the other has not. The message names
-        the lines of both.
+        Code stepnc_differs. The tips are more than 0.001 mm apart, or the axes more than 1e-6. Or feed, tool or kind of
+        a move differ, or speed or coolant of a feed move. Or one reading has more moves. The message names the lines of
+        both.
     """
     a, b = _Rows(nc, arrivals=False), _Rows(stepnc, arrivals=True)
     i, moves, tip, axis = 0, 0, 0.0, 0.0
@@ -106,7 +105,7 @@ def check_agreement(nc: Program, stepnc: Program) -> Agreement:
             bad = np.flatnonzero((apart[:, :6].max(axis=1, initial=0.0) > TIP)
                                  | (apart[:, 6:].max(axis=1, initial=0.0) > AXIS))
             if len(bad) and not _chords(a, i, i + count):
-                _differ(a, i + int(bad[0]), b, begin + int(bad[0]), "go to different places, or with different axes")
+                _differ(a, i + int(bad[0]), b, begin + int(bad[0]), "go to different places or have different axes")
             if not len(bad):
                 tip = max(tip, float(apart[:, :6].max(initial=0.0)))
                 axis = max(axis, float(apart[:, 6:].max(initial=0.0)))
@@ -115,14 +114,14 @@ def check_agreement(nc: Program, stepnc: Program) -> Agreement:
         i, far = _by_stretches(a, i, b, begin, end)
         tip, moves = max(tip, far), moves + count
     while i < len(a) and a.rapid[i]:
-        i += 1  # to where nothing follows
+        i += 1  # to the end
     if i < len(a):
         _differ(a, i, b, len(b) - 1, "do not end together")
     return Agreement(moves, tip, axis)
 
 
 def _same_words(a: _Rows, i: int, b: _Rows, j: int, count: int) -> int | None:
-    """The first of ``count`` moves whose tool, kind or feed differ; None where none does."""
+    """The first of ``count`` moves whose tool, kind or feed differs; None where none does."""
     mine, theirs = slice(i, i + count), slice(j, j + count)
     rapid = a.rapid[mine]
     way = np.linalg.norm(a.at[mine, 3:6] - a.at[mine, :3], axis=1)
@@ -136,15 +135,17 @@ def _same_words(a: _Rows, i: int, b: _Rows, j: int, count: int) -> int | None:
 
 
 def _by_stretches(a: _Rows, i: int, b: _Rows, begin: int, end: int) -> tuple[int, float]:
-    """Compare stretches of one tool, kind and feed as lines in space; returns where ``a`` goes on, and the distance,
-    past what chords may leave their arcs by."""
+    """Compare stretches of one tool, kind and feed as lines in space.
+
+    Returns the next row of ``a``, and the distance, mm, less the allowed deviation of chords from their arcs.
+    """
     far = 0.0
     while begin < end:
         last_b = _stretch(b, begin, end)
         if i >= len(a):
             _differ(a, len(a) - 1, b, begin, "do not end together")
         last_a = _stretch(a, i, len(a))
-        if b.rapid[begin]:  # no arcs, and behind them ``a`` may go on to where nothing is said in ``b``
+        if b.rapid[begin]:  # rapids have no arcs, and ``a`` may continue to places that ``b`` does not have
             last_a = min(last_a, i + last_b - begin)
         if _same_words(a, i, b, begin, 1) is not None:
             _differ(a, i, b, begin, "have different feeds, speeds, coolant, tools or kinds of move")
@@ -155,10 +156,10 @@ def _by_stretches(a: _Rows, i: int, b: _Rows, begin: int, end: int) -> tuple[int
             one, other = (np.vstack([r.at[k, :3], r.at[k:m, 3:6]]) for r, k, m in ((a, i, last_a), (b, begin, last_b)))
             bow = CHORD if _chords(a, i, last_a) else 0.0
             apart = max(_along(one, other, TIP), _along(other, one, TIP + bow) - bow)
-            axis = np.tile(a.at[i, 6:9], 2)  # of stretches with other points it must not turn
+            axis = np.tile(a.at[i, 6:9], 2)  # stretches with different points must not turn
             leaning = max(float(np.abs(r.at[k:m, 6:] - axis).max()) for r, k, m in ((a, i, last_a), (b, begin, last_b)))
         if apart > TIP or leaning > AXIS:
-            _differ(a, i, b, begin, f"are {apart:.4f} mm apart behind there, or have different axes")
+            _differ(a, i, b, begin, f"are {apart:.4f} mm apart after this move, or have different axes")
         far, i, begin = max(far, apart), last_a, last_b
     return i, far
 
@@ -169,7 +170,7 @@ def _chords(r: _Rows, begin: int, end: int) -> bool:
 
 
 def _stretch(r: _Rows, begin: int, end: int) -> int:
-    """Where the moves from ``begin`` on that have its tool, kind and feed end; of feed moves its speed as well."""
+    """End of the moves from ``begin`` on with its tool, kind and feed; feed moves also need its spindle speed."""
     feed = np.nan_to_num(r.feed[begin:end])
     speed = (r.speed[begin:end] != r.speed[begin]) & ~r.rapid[begin]
     other = np.flatnonzero((r.rapid[begin:end] != r.rapid[begin]) | (r.tool[begin:end] != r.tool[begin])
@@ -178,9 +179,9 @@ def _stretch(r: _Rows, begin: int, end: int) -> int:
 
 
 def _along(points: F64, way: F64, limit: float) -> float:
-    """mm, the farthest of points (n, 3) from a way (m, 3), gone along in its order: none is behind the one before.
+    """mm, largest distance of points (n, 3) from a polyline (m, 3), matched in order along it.
 
-    Ends at the first that is farther than the limit.
+    The search ends at the first point that is farther than the limit.
     """
     if (abreast := _abreast(points, way)) <= limit:
         return abreast
@@ -202,14 +203,14 @@ def _along(points: F64, way: F64, limit: float) -> float:
 
 
 def _abreast(points: F64, way: F64) -> float:
-    """The same, where each point is looked for among the few pieces of the way that are as far along it: no less."""
+    """An upper bound of ``_along``: each point is matched with the few segments at the same share of the length."""
     gone, length = (np.append(0.0, np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))) for x in (points, way))
     if len(way) < 2 or not (gone[-1] > 0.0 and length[-1] > 0.0):
         return np.inf
     place = np.searchsorted(length, gone * (length[-1] / gone[-1])) - 1
     near = np.full(len(points), np.inf)
-    for beside in (-2, -1, 0, 1, 2):
-        k = np.clip(place + beside, 0, len(way) - 2)
+    for offset in (-2, -1, 0, 1, 2):
+        k = np.clip(place + offset, 0, len(way) - 2)
         d = way[k + 1] - way[k]
         share = np.clip(((points - way[k]) * d).sum(axis=1) / np.maximum((d * d).sum(axis=1), 1e-30), 0.0, 1.0)
         np.minimum(near, np.linalg.norm(points - way[k] - share[:, None] * d, axis=1), out=near)

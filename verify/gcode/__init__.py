@@ -1,4 +1,4 @@
-"""The reader of programs: words, modes, variables, cycles and motion of five controls.
+"""The reader of programs: words, modes, parameters, cycles and motion of five controls.
 
 Nothing here comes from the writers in ``output``.
 """

@@ -1,4 +1,4 @@
-"""What a block moves: straight lines, arcs, drilling cycles, ways to the machine's own places."""
+"""Motion of a block: straight lines, arcs, drilling cycles, moves to fixed places of the machine."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import math
 import numpy as np
 
 from verify.gcode.block_words import CYCLES, SHIFTS, Block, whole
-from verify.gcode.drilling_cycles import Hole, Out, hole_moves
+from verify.gcode.drilling_cycles import Hole, HoleExit, hole_moves
 from verify.gcode.rotary_words import between
 from verify.gcode.work_offsets import Origins
 from verify.program.arc_chords import CHORD, PLANE_AXES, ArcError, ArcTooLong, arc_points, centre_from_radius
 from verify.program.move_kinds import FEED, RAPID
-from verify.program.move_log import MOST_MOVES_A_BLOCK
+from verify.program.move_log import MAX_MOVES_A_BLOCK
 from verify.program.program import NAN
 from verify.program.turn_subdivision import TIP
 
 
-class Motion(Origins):
-    """Moves of the blocks, written to the log; ``dwell`` is what they wait, s."""
+class BlockMotion(Origins):
+    """Moves of the blocks, written to the log; ``dwell`` is the sum of their dwells, s."""
 
     dwell = 0.0
 
@@ -44,7 +44,7 @@ class Motion(Origins):
         self.incremental_moved = True
         if s.motion in CYCLES:
             if turn is not None and turn != s.turn:
-                return self.log.error("a drilling cycle whose block turns an axis: turn it in a block before")
+                return self.log.error("a drilling cycle turns a rotary axis in its block: turn it in a block before")
             return self._cycle(axes, values)
         target = self._target(axes)
         if s.motion == 0:
@@ -62,9 +62,9 @@ class Motion(Origins):
         if "P" not in values:
             return self.log.error("G4 needs P")
         if values["P"] < 0:
-            return self.log.error(f"G4 P{values['P']:g} waits a negative time")
+            return self.log.error(f"G4 P{values['P']:g} is a negative dwell")
         if coordinates:
-            return self.log.error("coordinates in a block with G4: some controls move, some wait")
+            return self.log.error("coordinates in a block with G4: some controls move, some dwell")
         self.dwell += values["P"]
         return None
 
@@ -74,7 +74,7 @@ class Motion(Origins):
             for letter, a, p in zip("XYZ", axes, s.position, strict=True):
                 if a and math.isnan(p):
                     self.log.remark("incremental_unknown", f"an incremental move ({letter}{a:g}, G91 of line "
-                                    f"{self.incremental_line}) from a place the program has not stated")
+                                    f"{self.incremental_line}) starts at a place that the program has not stated")
         target = [p if a is None else (p + a * s.scale if s.relative else a * s.scale + zero)
                   for a, p, zero in zip(axes, s.position, s.origin, strict=True)]
         if self.polar:
@@ -82,16 +82,16 @@ class Motion(Origins):
         return target
 
     def _machine_place(self, axes: list[float | None], turn: list[float] | None) -> None:
-        """G53: the linear axes named are unknown afterwards, the rotary ones stand where it says.
+        """G53: the linear axes named are unknown afterwards, the rotary axes stand at their words.
 
-        Only home is known to lie above everything: another Z is remarked.
+        Only home is known to lie above everything: another Z gets a remark.
         """
         s = self.s
         if s.motion != 0:
             return self.log.error("G53 needs G0: the proof cannot see a feed move in machine coordinates")
         if axes[2]:
-            self.log.remark("machine_height", f"G53 Z{axes[2]:g} goes to a height the proof does not know; only "
-                            "Z0, home, is taken to be above everything", self.log.line)
+            self.log.remark("machine_height", f"G53 Z{axes[2]:g} goes to a height that the proof does not know; only "
+                            "Z0 (home) counts as above everything", self.log.line)
         named = [a is not None for a in axes]
         if s.relative and (any(named) or turn is not None):
             self.log.remark("machine_relative", "G53 in incremental coordinates (G91), which controls read "
@@ -99,7 +99,7 @@ class Motion(Origins):
         return self._away(named, turn)
 
     def _home(self, axes: list[float | None], turn: list[float] | None, values: dict[str, float]) -> None:
-        """G28 and G30 pass a programmed point, then the axes named (all without any) go home; rotary home is 0."""
+        """G28 and G30: pass a programmed point, then the axes named (all if none is) go home; rotary home is 0."""
         named = [a is not None for a in axes]
         self.stated_axes.update(letter for letter in self.rotary if letter in values or not (any(named) or turn))
         if not any(named) and turn is None:
@@ -110,20 +110,21 @@ class Motion(Origins):
         return self._away(named, turn)
 
     def _away(self, named: list[bool], turn: list[float] | None) -> None:
-        """The linear axes named go to a place of the machine's own, the rotary axes to ``turn`` (2,) deg.
+        """Move the linear axes named to fixed places of the machine, the rotary axes to ``turn`` (2,) deg.
 
-        A way in X or Y there before Z is home is remarked, and so is one on which an axis turns.
+        A move in X or Y, or one that turns an axis, gets a remark unless Z is home before.
         """
         s = self.s
         if not any(named):
             return None if turn is None else self._line_to(list(s.position), RAPID, NAN, turn)
         if not math.isnan(s.position[2]):
             if named[0] or named[1]:
-                self.log.remark("machine_way", f"X or Y goes to a place of the machine's own from Z{s.position[2]:g}, "
-                                "a way the proof cannot see: send Z home first", self.log.line)
+                self.log.remark("machine_way", f"X or Y moves to a fixed place of the machine from Z{s.position[2]:g}; "
+                                "the proof does not know that path: send Z home first", self.log.line)
             if turn is not None and turn != s.turn:
-                self.log.remark("machine_turn", "a rotary axis turns on the way to a place of the machine's own from "
-                                f"Z{s.position[2]:g}, which the proof cannot see: send Z home first", self.log.line)
+                self.log.remark("machine_turn", "a rotary axis turns during a move to a fixed place of the machine "
+                                f"from Z{s.position[2]:g}; the proof does not know that path: send Z home first",
+                                self.log.line)
         self._leave(named)
         s.parked |= named[0] or named[1]
         return None if turn is None else self._stand(turn)
@@ -132,7 +133,7 @@ class Motion(Origins):
         s = self.s
         feed = values.get("F", NAN) if s.feed_mode == 93 else s.feed
         if not feed > 0:
-            self.log.error("inverse time feed (G93) needs F on every line" if s.feed_mode == 93
+            self.log.error("inverse time feed (G93) needs F in every block" if s.feed_mode == 93
                            else "a feed move without a feed (F)")
             return None
         if s.feed_mode == 95:
@@ -145,7 +146,7 @@ class Motion(Origins):
     def _check_cutting(self, target: list[float]) -> None:
         s, remark = self.s, self.log.remark
         if s.tool == 0:
-            remark("no_tool", "a feed move without a tool in the spindle (no T and M6 before)")
+            remark("no_tool", "a feed move without a tool in the spindle (no T and M6 before it)")
         if s.offset is None:
             remark("offset_off", f"a feed move with the length offset off (no G43 H{s.tool})", s.tool)
         elif s.offset != s.tool:
@@ -154,11 +155,11 @@ class Motion(Origins):
             why = "no M3" if not s.spindle else "no S given" if math.isnan(s.speed) else f"S{s.speed:g}"
             remark("spindle", f"a feed move with the spindle standing ({why})", (s.tool, why))
         if any(math.isnan(v) for v in target):
-            remark("unknown", "a feed move from a place the program has not stated")
+            remark("unknown", "a feed move starts at a place that the program has not stated")
 
     def _line_to(self, target: list[float], kind: int, feed: float, turn: list[float] | None = None,
                  minutes: float = NAN) -> None:
-        """Go straight to ``target`` (3,) mm, turning the axes to ``turn`` (2,) deg where it is given."""
+        """Move straight to ``target`` (3,) mm and turn the axes to ``turn`` (2,) deg where it is given."""
         s = self.s
         start = [t if math.isnan(p) else p for p, t in zip(s.position, target, strict=True)]
         was, s.position = s.position, target
@@ -167,8 +168,8 @@ class Motion(Origins):
             self.log.remark("rapid_offset", f"Z moves with the length offset off (no G43 H{s.tool})", s.tool)
         known = not any(math.isnan(v) for v in target)
         if s.parked and level and not known:
-            self.log.remark("parked", "Z comes down where the machine's own coordinates left X or Y: state X and Y "
-                            "first", self.log.line)
+            self.log.remark("parked", "Z comes down at an X or Y of machine coordinates: program X and Y first",
+                            self.log.line)
         s.parked &= math.isnan(target[0]) or math.isnan(target[1])
         if known:
             if not self.log.moved:
@@ -181,7 +182,7 @@ class Motion(Origins):
     def _arc(self, target: list[float], values: dict[str, float], feed: float, turn: list[float] | None) -> None:
         s, error = self.s, self.log.error
         if any(math.isnan(v) for v in s.position):
-            return error("an arc from a place the program has not stated")
+            return error("an arc starts at a place that the program has not stated")
         axes = PLANE_AXES[s.plane]
         start, end = np.array(s.position), np.array(target)
         letters = ["IJK"[axes[0]], "IJK"[axes[1]]]
@@ -199,7 +200,7 @@ class Motion(Origins):
             if values.get("IJK"[axes[2]], 0.0) != 0 and "R" not in values:
                 return error(f"the word {'IJK'[axes[2]]} has no meaning in plane G{s.plane}")
             points = arc_points(start, end, centre, s.motion == 2, axes, turns, self._arc_chord(turn),
-                                most=MOST_MOVES_A_BLOCK).tolist()
+                                max_points=MAX_MOVES_A_BLOCK).tolist()
         except ArcTooLong as problem:
             return self.log.room(problem.points)
         except ArcError as problem:
@@ -213,20 +214,20 @@ class Motion(Origins):
         return None
 
     def _arc_chord(self, turn: list[float] | None) -> float:
-        """mm its chords may leave an arc by; half where the tip of each chord is bent once more by a turning axis."""
+        """Largest distance of chords from their arc, mm; half where a turning axis bends the tip path once more."""
         bent = turn is not None and turn != self.s.turn and not self.s.tcp
         return CHORD - TIP if bent else CHORD
 
     def _cycle(self, axes: list[float | None], values: dict[str, float]) -> None:
-        """A drilling cycle along the third axis of the plane, written out as rapids and feeds.
+        """Write a drilling cycle along the third axis of the plane as rapids and feeds [Kramer2000].
 
-        In a series of them G98 goes back to, and G91 counts R from, the height where the series began, as in LinuxCNC;
-        so does its way over the next hole, which climbs while it goes where the last hole was left at R.
+        In a series, G98 returns to the height where the series began, and G91 counts R from it, as in LinuxCNC. The
+        move to the next hole climbs on its way where the last hole was left at R.
         """
         s, error = self.s, self.log.error
         k = PLANE_AXES[s.plane][2]
         if s.cycle.setdefault("plane", s.plane) != s.plane:
-            return error("a drilling cycle goes on in another plane: end it with G80 first")
+            return error("a drilling cycle continues in another plane: end it with G80 first")
         s.cycle.update({c: values[c] for c in "RQP" if c in values})
         if (depth := axes[k]) is not None:
             s.cycle["XYZ"[k]] = depth
@@ -234,9 +235,9 @@ class Motion(Origins):
         if missing:
             return error(f"a drilling cycle without {', '.join(missing)}")
         if math.isnan(s.position[k]):
-            return error("a drilling cycle from a height the program has not stated")
+            return error("a drilling cycle starts at a height that the program has not stated")
         if s.cycle.get("P", 0.0) < 0:
-            return error(f"P{s.cycle['P']:g} waits a negative time")
+            return error(f"P{s.cycle['P']:g} is a negative dwell")
         feed = self._feed(values)
         repeats = whole(values, "L" if "L" in values else "K", 1)
         hole = self._hole(k) if feed is not None else None
@@ -262,15 +263,14 @@ class Motion(Origins):
         clear = s.cycle["R"] * s.scale + (top if s.relative else s.origin[k])
         bottom = s.cycle["XYZ"[k]] * s.scale + (clear if s.relative else s.origin[k])
         if top > clear and self.stated.isdisjoint((98, 99)):
-            self.log.note("drilling cycles with neither G98 nor G99 stated were read as with G98 (back to where they "
-                          "began)")
+            self.log.note("neither G98 nor G99 is stated: drilling cycles are read with G98 (return to start height)")
         if bottom > clear:
-            self.log.error(f"the drilling depth {'XYZ'[k]} lies above R")
+            self.log.error(f"the drilling depth {'XYZ'[k]} is above R")
             return None
         pecking = s.motion in (73, 83)
         peck = abs(s.cycle["Q"]) * s.scale if pecking else max(clear - bottom, 1e-9)
         if peck <= 0 and clear > bottom:
-            self.log.error("a drilling cycle with Q0 never ends")
+            self.log.error("a drilling cycle with Q0 has no end")
             return None
-        out = {85: Out.FEED_TO_CLEAR, 89: Out.FEED}.get(int(s.motion or 0), Out.RAPID)
+        out = {85: HoleExit.FEED_TO_CLEAR, 89: HoleExit.FEED}.get(int(s.motion or 0), HoleExit.RAPID)
         return Hole(clear, bottom, clear if s.retract_to_r else max(top, clear), peck, s.motion == 83, out)

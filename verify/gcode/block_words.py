@@ -1,7 +1,7 @@
-"""Text of one block to its words, and what may stand together in it.
+"""Splits the text of one block into words and checks which may stand together.
 
-A block whose text a control could read in two ways is refused here: two words of one modal group, a number cut off by a
-whole-number address, a letter or digit that is not ASCII.
+This module refuses a block that a control could read in two ways: two words of one modal group, a fraction at an
+address of whole numbers, a character outside ASCII.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ MOTION_CODES = frozenset({0, 1, 2, 3, 80}) | CYCLES
 SHIFTS: frozenset[float] = frozenset({10, 52, 92, 92.1, 92.2, 92.3})
 """Words that move program zero."""
 SAVES = frozenset({70, 71, 72, 73})
-"""M words that keep the modes, forget and restore what was kept."""
+"""M words that save modes, discard them and restore them."""
 WORK_OFFSETS = {54: "G54", 55: "G55", 56: "G56", 57: "G57", 58: "G58", 59: "G59", 59.1: "G59.1", 59.2: "G59.2",
                 59.3: "G59.3"}
 LARGEST = 1e15
-"""The largest number a word may hold: above it whole millimetres are no longer told apart."""
+"""The largest number of a word: above it float64 no longer resolves whole millimetres."""
 
 FARTHEST = 1e8
-"""mm or deg, the largest X, Y, Z, A, B or C: no machine goes there, and a turning way is written out in pieces."""
+"""mm or deg, the largest X, Y, Z, A, B or C: no machine is larger, and turning moves are split into pieces."""
 
 NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)"
-# at most 8 digits before the point, so whatever this matches is near; longer numbers take the slow way and are named
+# at most 8 digits before the point, so a match is below FARTHEST; longer numbers go through the full block
 _SHORT = r"[+-]?(?:[0-9]{1,8}(?:\.[0-9]*)?|\.[0-9]+)"
 
 def straight(rotary: str) -> Callable[[str], re.Match[str] | None]:
-    """What matches a line of a plain straight move, words in the usual order: groups G, X, Y, Z, rotary words, F."""
+    """The matcher of a plain straight move, words in the usual order: groups G, X, Y, Z, rotary words, F."""
     words = "".join(rf"(?:{letter}({_SHORT}) ?)?" for letter in f"XYZ{rotary}F")
     return re.compile(rf"(?:N[0-9]+ ?)?(?:G0?([01]) ?)?{words}\r?").fullmatch
 
@@ -60,16 +60,16 @@ _HINTS = {
     5: "a spline", 5.1: "a spline", 5.2: "a spline", 33: "threading", 38.2: "probing", 41: "cutter radius compensation",
     42: "cutter radius compensation", 43.4: "tool centre point control", 43.5: "tool centre point control by vectors",
     65: "a macro call", 66: "a macro call", 68: "a rotated frame", 68.2: "a tilted plane", 74: "tapping",
-    76: "threading", 84: "tapping", 87: "boring from below", 88: "boring with a stop for the hand",
+    76: "threading", 84: "tapping", 87: "back boring", 88: "boring with a manual retract",
 }
-_M_HINTS = {428: "tool centre point control", 429: "tool centre point control", 430: "kinematics of the shop's own"}
-NO_MACHINE = "give the machine of the setup its rotary axes: kind 5-axis and machine.kinematics"
+_M_HINTS = {428: "tool centre point control", 429: "tool centre point control", 430: "user-defined kinematics"}
+NO_MACHINE = "give the machine of the setup its rotary axes: machine.kind 5-axis and machine.kinematics"
 
 
 class BlockError(ValueError):
     """A block that cannot be read, or could be read in two ways; the reader adds the line.
 
-    remedy : what to do about it, or None where the message says it all
+    remedy : remedy of the error, or None where the message suffices
     """
 
     def __init__(self, message: str, remedy: str | None = None) -> None:
@@ -97,13 +97,17 @@ def parse_block(text: str, rotary: str = "") -> Block:
     """Words of one line of a program; comments, blank lines and Fanuc O numbers give an empty block.
 
     text   : the line
-    rotary : letters of the machine's rotary axes, such as 'AC'; none without
+    rotary : letters of the machine's rotary axes, such as 'AC'; '' where it has none
 
     Raises
     ------
     BlockError
-        Text that is no word, an open comment, a character outside ASCII, an unknown word, a letter that stands twice,
-        two words of one modal group, a fraction where the address takes whole numbers, a number above 1e15.
+        Text that is not a word, an unknown word, an open comment, or a character outside ASCII. A repeated letter, or
+        two words of one modal group. A fraction at an address of whole numbers, or a number above 1e15.
+
+    Notes
+    -----
+    The modal groups and the order of words are those of RS274/NGC [Kramer2000].
     """
     text = "".join(bare(text).upper().split())
     block = Block(deleted=text.startswith("/"))
@@ -131,22 +135,22 @@ def bare(text: str) -> str:
         An open comment, a comment that LinuxCNC runs as Python, a character outside ASCII.
     """
     if _SCRIPT.search(text):
-        raise BlockError("a comment that LinuxCNC runs as Python ('py,')")
+        raise BlockError("LinuxCNC runs this comment as Python ('py,')")
     text = _COMMENT.sub(" ", text).split(";", 1)[0]
     if "(" in text or ")" in text:
         raise BlockError("a comment is not closed")
     if strange := _FOREIGN.search(text.strip()):
-        raise BlockError(f"a character that is no part of a word: {ascii(strange.group())}")
+        raise BlockError(f"a character that is not part of a word: {ascii(strange.group())}")
     return text
 
 
 def _add(block: Block, letter: str, digits: str, rotary: str) -> None:
     number = float(digits)
     if not abs(number) <= LARGEST:
-        raise BlockError(f"{letter}{digits[:12]}... is a number of {len(digits)} characters, beyond {LARGEST:g}")
+        raise BlockError(f"{letter}{digits[:12]}... is a number of {len(digits)} characters, above {LARGEST:g}")
     if letter in _PLACES and abs(number) > FARTHEST:
-        raise BlockError(f"{letter}{digits} is farther than any machine goes ({FARTHEST:g})",
-                         "look for a lost decimal point")
+        raise BlockError(f"{letter}{digits} is farther than any machine moves ({FARTHEST:g})",
+                         "look for a missing decimal point")
     if letter == "G":
         if number not in _G_CODES and not (rotary and number == _TCP_G):
             hint = _HINTS.get(number)
@@ -158,8 +162,8 @@ def _add(block: Block, letter: str, digits: str, rotary: str) -> None:
     if letter == "N":
         return
     if letter in _ROTARY and letter not in rotary:
-        raise BlockError(f"unknown word {letter}{digits} (a rotary axis; the machine turns {' and '.join(rotary)})"
-                         if rotary else f"unknown word {letter}{digits} (a rotary axis; the machine has none)",
+        raise BlockError(f"unknown word {letter}{digits} (the rotary axes of the machine are {' and '.join(rotary)})"
+                         if rotary else f"unknown word {letter}{digits} (the machine has no rotary axis)",
                          None if rotary else NO_MACHINE)
     if letter not in "XYZABCIJKRPQLFSTHDM@^":
         raise BlockError(f"unknown word {letter}{digits}")
@@ -172,7 +176,7 @@ def _add(block: Block, letter: str, digits: str, rotary: str) -> None:
                              NO_MACHINE if number in _TCP_M else None)
         block.ms.append(int(number))
     elif letter in block.values:
-        raise BlockError(f"the word {letter} stands twice")
+        raise BlockError(f"the word {letter} appears twice")
     else:
         block.values[letter] = number
 
@@ -184,11 +188,11 @@ def _check_groups(letter: str, codes: list[float] | list[int], groups: tuple[fro
         found = [c for c in codes if c in group]
         if len(found) > 1:
             names = " and ".join(f"{letter}{c:g}" for c in found)
-            raise BlockError(f"{names} in one block: words of one modal group, and controls differ in which one counts")
+            raise BlockError(f"{names} in one block are of one modal group, and controls differ in which one counts")
 
 
 def used_letters(block: Block, motion: float | None, moves: bool) -> str:
-    """Letters that some code of the block takes a number for.
+    """Letters whose number some code of the block uses.
 
     motion : G number in force
     moves  : whether the block makes a move of that motion
@@ -214,7 +218,7 @@ def used_letters(block: Block, motion: float | None, moves: bool) -> str:
 
 
 def whole(values: dict[str, float], letter: str, otherwise: int) -> int:
-    """The whole number from 1 of a count such as turns or repeats; ``otherwise`` where the letter is absent.
+    """The count of a word such as turns or repeats, from 1; ``otherwise`` where the letter is absent.
 
     Raises
     ------
@@ -223,5 +227,5 @@ def whole(values: dict[str, float], letter: str, otherwise: int) -> int:
     """
     number = values.get(letter, float(otherwise))
     if number < 1 or math.modf(number)[0] != 0:
-        raise BlockError(f"{letter}{number:g} is no count: {letter} takes a whole number from 1")
+        raise BlockError(f"{letter}{number:g} is not a count: {letter} takes a whole number from 1")
     return int(number)

@@ -1,7 +1,7 @@
-"""The stage before the blocks: parameters worked out, subroutines, conditions and loops run, plain blocks handed on.
+"""The stage before the blocks: evaluates parameters, runs subroutines, conditions and loops, and yields plain blocks.
 
-A program without any of these never comes here. Every block keeps the line number of its text. An error in a parameter
-or an O-word ends the reading: where the program would go from there is not known.
+A program without any of these skips this stage. Every block keeps the line number of its text. An error in a parameter
+or an O-word ends the reading, since the next line of the program is then unknown.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ from typing import Protocol
 from geometry.errors import VerificationError
 from verify.gcode.block_words import BlockError
 from verify.gcode.expressions import Value
-from verify.gcode.o_words import Step, Structure, StructureError, find_structure
-from verify.gcode.parameters import LOCAL, Frame, Parameters
-from verify.gcode.parametric_lines import Line, read_line
+from verify.gcode.o_words import OWordStep, Structure, StructureError, find_structure
+from verify.gcode.parameters import LOCAL, CallFrame, Parameters
+from verify.gcode.parametric_lines import ParametricLine, read_line
 from verify.program.move_log import Log
 
-MOST_BLOCKS = 5_000_000
-MOST_CALLS = 9
-"""Calls within one another that LinuxCNC runs."""
-MOST_KEPT = 20_000
+MAX_BLOCKS = 5_000_000
+MAX_CALLS = 9
+"""Nested calls that LinuxCNC runs."""
+MAX_KEPT = 20_000
 _O_WORD = re.compile(r"[oO][ \t]*(?:[<\[#]|[0-9]+[ \t]*[a-zA-Z])")
 
 
 def has_flow(text: str) -> bool:
-    """Whether a program has parameters, expressions or O-words; True also where only a comment looks so."""
+    """Whether a program has parameters, expressions or O-words; also True where only a comment seems to have them."""
     if "#" in text or "[" in text:
         return True
     for letter in "oO":
@@ -38,8 +38,8 @@ def has_flow(text: str) -> bool:
     return False
 
 
-class Machine(Protocol):
-    """What the flow needs of the reader."""
+class FlowReader(Protocol):
+    """The part of the reader that the flow needs."""
 
     log: Log
 
@@ -54,19 +54,19 @@ class Machine(Protocol):
 
 
 class Flow:
-    """One run of a program.
+    """One run of a program: parameters, O-words and calls as in LinuxCNC, whose language extends [Kramer2000].
 
     lines   : its text
-    machine : the reader, asked for its state and told of calls
+    machine : the reader; it gives its state and hears of calls
     """
 
-    def __init__(self, lines: Sequence[str], machine: Machine) -> None:
+    def __init__(self, lines: Sequence[str], machine: FlowReader) -> None:
         self.lines, self.machine = lines, machine
         self.scope = Parameters(machine.served)
         self.structure = Structure()
         self._back: list[int] = []
-        self._kept: dict[int, Line] = {}
-        self._runs: dict[str, Callable[[Step], int]] = {
+        self._kept: dict[int, ParametricLine] = {}
+        self._runs: dict[str, Callable[[OWordStep], int]] = {
             "sub": lambda step: step.end + 1, "endsub": self._return, "return": self._return, "call": self._call,
             "if": self._if, "else": lambda step: step.end + 1, "elseif": lambda step: step.end + 1,
             "endif": lambda step: step.at + 1, "while": self._while, "endwhile": lambda step: step.start,
@@ -89,11 +89,10 @@ class Flow:
         at, runs = 0, 0
         plain, steps = self.structure.plain, self.structure.steps
         if not all(plain):
-            self.machine.log.note("parameters, expressions and O-words were read as LinuxCNC reads them; other "
-                                  "controls differ")
+            self.machine.log.note("parameters, expressions and O-words are read as in LinuxCNC; other controls differ")
         while at < len(plain):
             runs += 1
-            if runs > MOST_BLOCKS:
+            if runs > MAX_BLOCKS:
                 self._endless(at + 1)
             if plain[at]:
                 at += 1
@@ -114,63 +113,63 @@ class Flow:
             yield len(plain) + 1, "%"
         return None
 
-    def _line(self, at: int) -> Line:
-        """The line as read; kept only where it comes again, as keeping them all slows the collector of garbage."""
+    def _line(self, at: int) -> ParametricLine:
+        """The parsed line; it is cached only where it can run again, as caching all lines slows garbage collection."""
         line = self._kept.get(at)
         if line is None:
             line = read_line(self.lines[at])
-            if self.structure.again[at] and len(self._kept) < MOST_KEPT:
+            if self.structure.again[at] and len(self._kept) < MAX_KEPT:
                 self._kept[at] = line
         return line
 
     def _endless(self, line: int) -> None:
         log = self.machine.log
-        raise VerificationError(f"{log.name}, line {line}: the program runs more than {MOST_BLOCKS} lines, so a loop "
+        raise VerificationError(f"{log.name}, line {line}: the program runs more than {MAX_BLOCKS} lines; a loop "
                                 "may have no end", code="program_too_long", subjects=(f"line {line}",),
-                                measured=MOST_BLOCKS + 1, limit=MOST_BLOCKS,
+                                measured=MAX_BLOCKS + 1, limit=MAX_BLOCKS,
                                 remedy="correct the condition of the loop, or split the program")
 
-    def _holds(self, step: Step) -> bool:
+    def _holds(self, step: OWordStep) -> bool:
         return step.word.values[0](self.scope) != 0
 
-    def _if(self, step: Step) -> int:
-        """Go from branch to branch until one holds."""
+    def _if(self, step: OWordStep) -> int:
+        """Line of the first branch whose condition holds."""
         while step.word.keyword in ("if", "elseif") and not self._holds(step):
             step = self.structure.steps[step.other]
             self.machine.log.line = step.at + 1
         return step.at + 1
 
-    def _while(self, step: Step) -> int:
+    def _while(self, step: OWordStep) -> int:
         if step.kind == "do":
             return step.start + 1 if self._holds(step) else step.at + 1
         return step.at + 1 if self._holds(step) else step.end + 1
 
-    def _repeat(self, step: Step) -> int:
+    def _repeat(self, step: OWordStep) -> int:
         times = step.word.values[0](self.scope)
-        self.scope.frame.repeats[step.start] = round(times) if times < MOST_BLOCKS else MOST_BLOCKS
+        self.scope.frame.repeats[step.start] = round(times) if times < MAX_BLOCKS else MAX_BLOCKS
         return step.at + 1 if self.scope.frame.repeats[step.start] > 0 else step.end + 1
 
-    def _again(self, step: Step) -> int:
+    def _again(self, step: OWordStep) -> int:
         self.scope.frame.repeats[step.start] -= 1
         return step.start + 1 if self.scope.frame.repeats[step.start] > 0 else step.at + 1
 
-    def _call(self, step: Step) -> int:
+    def _call(self, step: OWordStep) -> int:
         word = step.word
         label = word.label if word.computed is None else _label(word.computed, self.scope)
         sub = self.structure.subs.get(label)
         if sub is None:
-            raise BlockError(f"the subroutine '{label}' is not in the program: it would be in the file {label}.ngc; "
-                             "put it into the program")
-        if len(self._back) >= MOST_CALLS:
-            raise BlockError(f"more than {MOST_CALLS} calls in one another, which is all LinuxCNC runs")
+            raise BlockError(f"the subroutine '{label}' is not in the program (LinuxCNC reads it from {label}.ngc): "
+                             "copy it into the program")
+        if len(self._back) >= MAX_CALLS:
+            raise BlockError(f"more than {MAX_CALLS} nested calls; LinuxCNC runs no more")
         numbers = dict.fromkeys(range(1, LOCAL + 1), 0.0)
         numbers.update(enumerate((value(self.scope) for value in word.values), 1))
-        self.scope.frames.append(Frame(numbers))
+        self.scope.frames.append(CallFrame(numbers))
         self._back.append(step.at + 1)
         self.machine.enter()
         return sub.at + 1
 
-    def _return(self, step: Step) -> int:
+    def _return(self, step: OWordStep) -> int:
         values = step.word.values
         self.scope.returned = (values[0](self.scope), 1.0) if values else (0.0, 0.0)
         self.scope.frames.pop()
@@ -181,5 +180,5 @@ class Flow:
 def _label(computed: Value, scope: Parameters) -> str:
     number = computed(scope)
     if number < 0 or number != round(number):
-        raise BlockError(f"O{number:g} is no label")
+        raise BlockError(f"O{number:g} is not a label")
     return str(int(number))

@@ -1,4 +1,4 @@
-"""Drilling cycles written out as rapids and feeds."""
+"""Drilling cycles as rapids and feeds."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MOVES_A_PECK = 3
 MOVES_A_HOLE = 5
 
 
-class Out(Enum):
+class HoleExit(Enum):
     """How a cycle leaves the bottom: at once, feeding to the R plane (G85), or feeding all the way (G89)."""
 
     RAPID = 0
@@ -24,14 +24,14 @@ class Out(Enum):
 
 @dataclass(frozen=True)
 class Hole:
-    """One hole along the axis across the plane.
+    """One hole along the axis perpendicular to the plane.
 
     clear  : mm, the R plane
-    bottom : mm, depth of the tip
-    back   : mm, height left to afterwards
-    peck   : mm a peck takes, > 0; the whole depth for G81 and G82
-    lift   : whether each peck goes back to ``clear`` (G83) or lifts 0.254 mm to break the chip
-    out    : how it leaves the bottom
+    bottom : mm, height of the tip at the bottom
+    back   : mm, height after the retract
+    peck   : mm, depth of a peck, > 0; the whole depth for G81 and G82
+    lift   : True: each peck retracts to ``clear`` (G83); False: it lifts 0.254 mm to break the chip
+    out    : how the tool leaves the bottom
     """
 
     clear: float
@@ -39,7 +39,7 @@ class Hole:
     back: float
     peck: float
     lift: bool
-    out: Out = Out.RAPID
+    out: HoleExit = HoleExit.RAPID
 
     @property
     def pecks(self) -> float:
@@ -57,7 +57,13 @@ class Hole:
 def hole_moves(hole: Hole, over: list[float], axis: int) -> Iterator[tuple[list[float], int]]:
     """Targets (x, y, z) in mm and kinds of the moves over the hole, down, and back.
 
-    over : (3,) mm, above the hole at the height the tip goes across, not below ``hole.clear`` along ``axis``
+    over : (3,) mm, place above the hole where the tip arrives, not below ``hole.clear`` along ``axis``
+    axis : 0, 1 or 2, the drilling axis
+
+    Notes
+    -----
+    The order of moves is that of the canned cycles G81, G82, G83, G85, G86 and G89 of RS274/NGC [Kramer2000]; G73 is as
+    in LinuxCNC.
     """
     def at(height: float) -> list[float]:
         return [height if k == axis else p for k, p in enumerate(over)]
@@ -72,6 +78,6 @@ def hole_moves(hole: Hole, over: list[float], axis: int) -> Iterator[tuple[list[
         yield at(hole.clear if hole.lift else depth + PECK_LIFT), RAPID
         if hole.lift:
             yield at(min(depth + PECK_LIFT, hole.clear)), RAPID
-    if hole.out is Out.FEED_TO_CLEAR:
+    if hole.out is HoleExit.FEED_TO_CLEAR:
         yield at(hole.clear), FEED
-    yield at(hole.back), FEED if hole.out is Out.FEED else RAPID
+    yield at(hole.back), FEED if hole.out is HoleExit.FEED else RAPID

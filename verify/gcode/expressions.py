@@ -1,7 +1,7 @@
-"""Numbers, parameters and expressions of LinuxCNC: read once, worked out whenever their line is run.
+"""Numbers, parameters and expressions of LinuxCNC: parsed once, evaluated whenever their line runs.
 
-Precedence, from the closest: ** ; * / MOD ; + - ; EQ NE GT GE LT LE ; AND OR XOR. All of them run from left to right,
-and a sign belongs to the value behind it. Angles are degrees. Numbers nearer than 1e-5 are equal for EQ and NE.
+Precedence, from the highest: ** ; * / MOD ; + - ; EQ NE GT GE LT LE ; AND OR XOR. Operators of one level run from left
+to right, and a sign belongs to the value after it. Angles are degrees. EQ and NE treat numbers within 1e-5 as equal.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from verify.gcode.parameters import Parameters
 
 Value = Callable[[Parameters], float]
 
-MOST_BRACKETS = 40
+MAX_BRACKETS = 40
 EQUAL = 1e-5
 
 _NUMBER = re.compile(NUMBER)
@@ -29,39 +29,51 @@ _PRECEDENCE = {"**": 5, "*": 4, "/": 4, "mod": 4, "+": 3, "-": 3, "eq": 2, "ne":
 
 
 @dataclass(frozen=True)
-class Target:
-    """A parameter as it is written: its name, or what its number comes from."""
+class ParameterReference:
+    """A parameter as it is written: its name, or the expression of its number."""
 
     name: str
     number: Value | None
 
     def read(self, scope: Parameters) -> float:
-        """Its value now."""
+        """Its present value."""
         return scope.named(self.name) if self.number is None else scope.numbered(self.number(scope))
 
 
-class Reading:
-    """One left-to-right reading of the text of a line, which has no blanks and is in lower case."""
+class ExpressionReader:
+    """Parser of one line from left to right; the text is without blanks and in lower case."""
 
     def __init__(self, text: str) -> None:
         self.text, self.at, self._depth = text, 0, 0
 
     @property
     def rest(self) -> str:
-        """What is still to read, for messages."""
+        """The text still to read, for messages."""
         return self.text[self.at:self.at + 40]
 
     def take(self, sign: str) -> None:
-        """Pass over ``sign``; BlockError where it is not there."""
+        """Skip ``sign``.
+
+        Raises
+        ------
+        BlockError
+            The text does not continue with it.
+        """
         if not self.text.startswith(sign, self.at):
             raise BlockError(f"'{sign}' is missing before '{self.rest}'")
         self.at += len(sign)
 
     def value(self) -> Value:
-        """A number, a parameter, a function, an expression in brackets, or one of these with a sign."""
+        """A number, a parameter, a function, an expression in brackets, or one of these with a sign [Kramer2000].
+
+        Raises
+        ------
+        BlockError
+            More than 40 nested brackets, signs or #.
+        """
         self._depth += 1
-        if self._depth > MOST_BRACKETS:
-            raise BlockError(f"more than {MOST_BRACKETS} brackets, signs or # in one another")
+        if self._depth > MAX_BRACKETS:
+            raise BlockError(f"more than {MAX_BRACKETS} nested brackets, signs or #")
         found = self._value()
         self._depth -= 1
         return found
@@ -94,22 +106,22 @@ class Reading:
         def checked(scope: Parameters) -> float:
             result = inside(scope)
             if not math.isfinite(result):
-                raise BlockError("an expression whose value is no finite number")
+                raise BlockError("the value of an expression is not a finite number")
             return result
         return checked
 
-    def target(self) -> Target:
+    def target(self) -> ParameterReference:
         """The parameter behind a # sign."""
         self.take("#")
         if name := _NAME.match(self.text, self.at):
             self.at = name.end()
-            return Target(name.group(1), None)
-        return Target("", self.value())
+            return ParameterReference(name.group(1), None)
+        return ParameterReference("", self.value())
 
-    def _joined(self, least: int) -> Value:
+    def _joined(self, min_precedence: int) -> Value:
         """Values joined by operators of at least this precedence."""
         left = self.value()
-        while (sign := _OPERATOR.match(self.text, self.at)) and _PRECEDENCE[sign.group()] >= least:
+        while (sign := _OPERATOR.match(self.text, self.at)) and _PRECEDENCE[sign.group()] >= min_precedence:
             self.at = sign.end()
             left = _join(_OPERATIONS[sign.group()], left, self._joined(_PRECEDENCE[sign.group()] + 1))
         return left
@@ -120,7 +132,7 @@ class Reading:
             target = self.target()
             self.take("]")
             if target.number is not None:
-                raise BlockError("EXISTS of a numbered parameter: it takes a name, such as EXISTS[#<depth>]")
+                raise BlockError("EXISTS takes a named parameter, such as EXISTS[#<depth>], not a numbered one")
             return lambda scope: float(scope.exists(target.name))
         first = self.bracket()
         if name == "atan":
@@ -149,7 +161,7 @@ def _modulo(left: float, right: float) -> float:
 
 def _power(left: float, right: float) -> float:
     if left < 0 and right != math.floor(right):
-        raise BlockError(f"{left:g} ** {right:g}: a negative number has whole powers only")
+        raise BlockError(f"{left:g} ** {right:g} has no value: a negative number has whole powers only")
     if left == 0 and right < 0:
         raise BlockError(f"0 ** {right:g} has no value")
     return _small_enough(f"{left:g} ** {right:g}", lambda: math.pow(left, right))
@@ -159,14 +171,14 @@ def _small_enough(name: str, compute: Callable[[], float]) -> float:
     try:
         return compute()
     except OverflowError:
-        raise BlockError(f"{name} is no finite number") from None
+        raise BlockError(f"{name} is not a finite number") from None
 
 
-def _within(name: str, function: Callable[[float], float], least: float, most: float) -> Callable[[float], float]:
-    """``function`` of a number from ``least`` to ``most``; any other is refused with the name."""
+def _within(name: str, function: Callable[[float], float], low: float, high: float) -> Callable[[float], float]:
+    """``function`` of a number from ``low`` to ``high``; any other number is refused."""
     def applied(number: float) -> float:
-        if not least <= number <= most:
-            raise BlockError(f"{name}[{number:g}] has no value: it takes numbers from {least:g} to {most:g}")
+        if not low <= number <= high:
+            raise BlockError(f"{name}[{number:g}] has no value: it takes numbers from {low:g} to {high:g}")
         return function(number)
     return applied
 

@@ -12,21 +12,21 @@ from verify.gcode.rotary_words import Rotary
 from verify.gcode.saved_modes import SavedModes
 from verify.kinematics import Kinematics
 from verify.program.move_log import Log
-from verify.program.program import NAN, Pause, Stop
+from verify.program.program import NAN, Pause, StopPoint
 
 INCH = 25.4
 
 
 class Modes(Rotary):
-    """State, log, and everything a block sets before it moves.
+    """State, log, and all modes that a block sets before it moves.
 
     tools       : T numbers of the tool table; any number where None
     work_offset : the one of the setup
-    blend_limit : mm, what path blending may leave the path by without a remark
-    machine     : its rotary axes, or None without any
+    blend_limit : mm, deviation that path blending may have without a remark
+    machine     : rotary axes of the machine, or None
     gauge       : mm by T number, spindle face to tip
     spindle_tool : T number in the spindle, its length offset on, before the first line; 0 for none
-    fits        : whether the control leaves points out by the P of a G64 without Q
+    fits        : whether the control drops points by the P of a G64 without Q
     """
 
     fits = True
@@ -49,12 +49,12 @@ class Modes(Rotary):
         s, values, scale = self.s, block.values, self.s.scale
         if not SAVES.isdisjoint(block.ms):
             if values or block.codes or len(block.ms) > 1:
-                raise BlockError(f"M{block.ms[0]} beside other words: give it a block of its own")
+                raise BlockError(f"M{block.ms[0]} with other words in one block: give it its own block")
             self.saved.run(block.ms[0], s)
         if "S" in values:
             s.speed = values["S"]
             if s.speed < 0:
-                self.log.remark("speed", f"S{s.speed:g} is no spindle speed", self.log.line)
+                self.log.remark("speed", f"S{s.speed:g} is not a spindle speed", self.log.line)
         if "T" in values:
             self._select(int(values["T"]))
         self._spindle(block.ms)
@@ -65,13 +65,13 @@ class Modes(Rotary):
         self.log.runs(s.speed if s.turning else 0.0, s.coolant)
         if not {428, 429}.isdisjoint(block.ms):
             self._control(s.tcp_word, 428 in block.ms)
-        for g in sorted(block.codes, key=lambda g: g != 80):  # beside a motion word G80 only ends the cycle before it
+        for g in sorted(block.codes, key=lambda g: g != 80):  # with a motion word G80 only ends the cycle before it
             self._mode(g, values)
         if 64 in block.codes:
             self._blending(values)
         if "F" in values and s.scale != scale:
-            self.log.remark("unit_feed", f"F{values['F']:g} beside the word that changes the unit: LinuxCNC reads it "
-                            "in the old unit, other controls in the new one; give F a line of its own", self.log.line)
+            self.log.remark("unit_feed", f"F{values['F']:g} in the block that changes the unit: LinuxCNC reads it "
+                            "in the old unit, other controls in the new one; give F its own line", self.log.line)
         if "F" in values:
             s.feed = values["F"] * (1.0 if s.feed_mode == 93 else s.scale)
 
@@ -127,7 +127,7 @@ class Modes(Rotary):
                                 f"({self.work_offset})", s.work_offset)
 
     def _assume(self) -> None:
-        """Note what the first move takes for granted: a control keeps what the program before it left."""
+        """Record the modes that the first move assumes: a control keeps the modes of the program before."""
         groups: dict[str, Collection[float]] = {"G21": (20, 21), "G90": (90, 91), "G17": (17, 18, 19),
                                                 "G94": (93, 94, 95), self.work_offset: WORK_OFFSETS}
         words = [word for word, group in groups.items() if self.stated.isdisjoint(group)]
@@ -138,25 +138,25 @@ class Modes(Rotary):
         words.extend(f"{letter}0" for letter in self.rotary if letter not in self.stated_axes)
         self.assumed = tuple(words)
 
-    def stop(self, what: str) -> None:
-        """Note where the program stops, if its height, or off the axis Z its place, is known."""
+    def stop(self, event: str) -> None:
+        """Record where the program stops, if the height is known, or the place where the tool is tilted."""
         s = self.s
         x, y, z = self._tip()
         up = (0.0, 0.0, 1.0)
         if s.tilted and self.machine is not None:
             up = tuple(self.machine.axis(np.radians([s.turn]))[0].tolist())
         if s.tool > 0 and not math.isnan(z if up[2] == 1.0 else x + y + z):
-            self.log.stops.append(Stop(self.log.line, what, s.tool, (x, y, z), up))
+            self.log.stops.append(StopPoint(self.log.line, event, s.tool, (x, y, z), up))
 
-    def pause(self, what: str, tool: int) -> None:
-        """Note how the program leaves the machine where it waits, or ends."""
+    def pause(self, event: str, tool: int) -> None:
+        """Record the state of the machine where the program waits or ends."""
         s, log = self.s, self.log
         counted = s.offset is not None or self.stated.isdisjoint({43, 43.4, 49})
-        log.pauses.append(Pause(log.line, what, tool, log.count, s.speed if s.turning else 0.0, s.coolant, s.tcp,
+        log.pauses.append(Pause(log.line, event, tool, log.count, s.speed if s.turning else 0.0, s.coolant, s.tcp,
                                 s.relative, s.home, counted))
 
     def _motion(self, g: float) -> None:
-        """A cycle begun anew keeps nothing of the one before."""
+        """Set the motion mode; a new cycle keeps no words of the one before."""
         s = self.s
         if s.motion not in CYCLES:
             s.cycle = {}
@@ -166,16 +166,15 @@ class Modes(Rotary):
         s = self.s
         scale = INCH if g == 20 else 1.0
         if scale != s.scale and (self.log.moved or any(v == v for v in s.position)):
-            self.log.remark("unit", f"G{g} changes the unit in the middle of the program", self.log.line)
+            self.log.remark("unit", f"G{g} changes the unit within the program", self.log.line)
         s.scale = scale
 
     def _distance(self, relative: bool) -> None:
         """Enter or leave incremental coordinates.
 
-        Incremental moves are simulated exactly, and a program that states a place and then runs in G91 is right.
-        A G91 after cuts in absolute coordinates which no G90 follows is a slip far more often than meant, and what
-        it breaks may show hundreds of lines later: ``read`` puts a remark on its line. One that is turned back
-        needs none, its moves are known.
+        Incremental moves are simulated exactly, and a program that states a place and then runs in G91 is right. A G91
+        after absolute cuts that no G90 follows is usually a mistake, and its effect may show hundreds of lines later:
+        ``read`` puts a remark on its line. A G91 that a G90 ends needs none.
         """
         s = self.s
         if relative == s.relative:
@@ -200,9 +199,9 @@ class Modes(Rotary):
                             self.log.line)
 
     def _blending(self, values: dict[str, float]) -> None:
-        """G64: the control may round corners by P (0 and none: without bound), of lines it leaves points out by Q of.
+        """G64: the control may round corners by P (0 or absent: without bound) and drop points of lines within Q.
 
-        LinuxCNC takes P for Q where none is said; other controls have no such thing.
+        LinuxCNC takes P where Q is absent; other controls have no Q.
         """
         limit = self.blend_limit
         p = values.get("P", 0.0) * self.s.scale

@@ -1,4 +1,4 @@
-"""How the O-words of a program belong together, found before it is run."""
+"""Pairs the O-words of a program before it runs."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ _CLOSES = {"endsub": "sub", "endif": "if", "endwhile": "while", "endrepeat": "re
 
 
 @dataclass
-class Step:
-    """An O-word in its place; lines are numbered from 0.
+class OWordStep:
+    """An O-word and the O-words it belongs to; lines are numbered from 0.
 
     word  : the O-word
     at    : its line
-    start : line that opens what it belongs to (of break and continue: the loop)
-    end   : line that closes it
-    other : of if and elseif, the line to look at where the condition does not hold
-    kind  : what the opening line says: sub, if, while, do, repeat
+    start : line of the opening O-word (for break and continue: of the loop)
+    end   : line of the closing O-word
+    other : for if and elseif, the next line where the condition does not hold
+    kind  : keyword of the opening O-word: sub, if, while, do, repeat
     """
 
     word: OWord
@@ -36,18 +36,18 @@ class Step:
 class Structure:
     """Steps by line and subroutines by label, with lines numbered from 0.
 
-    plain : by line, whether it needs no stage before the blocks
+    plain : by line, whether it skips the stage before the blocks
     again : by line, whether a loop or call may run it more than once
     """
 
-    steps: dict[int, Step] = field(default_factory=dict)
-    subs: dict[str, Step] = field(default_factory=dict)
+    steps: dict[int, OWordStep] = field(default_factory=dict)
+    subs: dict[str, OWordStep] = field(default_factory=dict)
     plain: list[bool] = field(default_factory=list)
     again: list[bool] = field(default_factory=list)
 
 
 class StructureError(BlockError):
-    """O-words that do not belong together; ``line`` is numbered from 1."""
+    """An O-word without its counterpart; ``line`` is numbered from 1."""
 
     def __init__(self, message: str, line: int) -> None:
         super().__init__(message)
@@ -57,8 +57,8 @@ class StructureError(BlockError):
 def find_structure(lines: Sequence[str]) -> Structure:
     """Pair the O-words of a program up to its closing %.
 
-    Raises StructureError with the line: an O-word that closes or goes on with nothing, one that is never closed, a
-    label that stands twice, a subroutine within something else.
+    Raises StructureError with the line: an O-word that closes or continues nothing, one that is never closed, a label
+    that appears twice, a subroutine inside another O-word.
     """
     found, percents = Structure(), 0
     pairing = _Pairing(found)
@@ -73,7 +73,7 @@ def find_structure(lines: Sequence[str]) -> Structure:
         try:
             word = read_o_word(raw)
             if word is not None:
-                pairing.place(Step(word, at))
+                pairing.place(OWordStep(word, at))
         except BlockError as problem:
             raise StructureError(str(problem), at + 1) from None
     pairing.finish()
@@ -81,16 +81,16 @@ def find_structure(lines: Sequence[str]) -> Structure:
 
 
 class _Pairing:
-    """What is open while lines are gone through."""
+    """The open O-words while the lines are scanned."""
 
     def __init__(self, found: Structure) -> None:
         self.found = found
-        self.open: list[Step] = []
-        self.last: list[Step] = []  # the latest branch of each open step
-        self.members: list[list[Step]] = []
+        self.open: list[OWordStep] = []
+        self.last: list[OWordStep] = []  # the latest branch of each open step
+        self.members: list[list[OWordStep]] = []
         self.labels: set[tuple[str, str]] = set()
 
-    def place(self, step: Step) -> None:
+    def place(self, step: OWordStep) -> None:
         word = step.word
         self.found.steps[step.at] = step
         top = self.open[-1] if self.open else None
@@ -113,14 +113,14 @@ class _Pairing:
             step = self.open[-1]
             raise StructureError(f"{_name(step)} is never closed", step.at + 1)
 
-    def _open(self, step: Step) -> None:
+    def _open(self, step: OWordStep) -> None:
         word = step.word
         sub = self.open[0].word.label if self.open and self.open[0].kind == "sub" else ""
         if word.keyword == "sub" and self.open:
-            raise BlockError(f"{_name(step)} within {_name(self.open[-1])}")
+            raise BlockError(f"{_name(step)} inside {_name(self.open[-1])}")
         key = ("", word.label) if word.keyword == "sub" else (sub + "#", word.label)
         if key in self.labels:
-            raise BlockError(f"the label of {_name(step)} stands twice: each loop, condition and subroutine "
+            raise BlockError(f"the label of {_name(step)} appears twice: each loop, condition and subroutine "
                              "needs its own")
         self.labels.add(key)
         step.kind, step.start = word.keyword, step.at
@@ -130,7 +130,7 @@ class _Pairing:
         self.last.append(step)
         self.members.append([step])
 
-    def _close(self, step: Step) -> None:
+    def _close(self, step: OWordStep) -> None:
         first, members = self.open.pop(), self.members.pop()
         last = self.last.pop()
         if last.word.keyword != "else":
@@ -141,7 +141,7 @@ class _Pairing:
         for member in [*members, step]:
             member.start, member.end = first.at, step.at
 
-    def _branch(self, step: Step) -> None:
+    def _branch(self, step: OWordStep) -> None:
         first = self._needs(step, "if")
         if self.last[-1].word.keyword == "else":
             raise BlockError(f"{_name(step)} after else of {_name(first)}")
@@ -150,28 +150,28 @@ class _Pairing:
         self.last[-1] = step
         self.members[-1].append(step)
 
-    def _leave(self, step: Step) -> None:
+    def _leave(self, step: OWordStep) -> None:
         for k in range(len(self.open) - 1, -1, -1):
             loop = self.open[k]
             if loop.kind in ("while", "do", "repeat") and loop.word.label == step.word.label:
                 if loop.kind == "repeat":
-                    raise BlockError(f"{_name(step)} of a repeat, which LinuxCNC does not run: use while and endwhile")
+                    raise BlockError(f"{_name(step)} in a repeat: LinuxCNC does not run it; use while and endwhile")
                 if loop.kind == "do" and step.word.keyword == "continue":
-                    raise BlockError(f"{_name(step)} of do and while, which LinuxCNC takes for the end of the loop: "
+                    raise BlockError(f"{_name(step)} in do and while: LinuxCNC takes it for the end of the loop; "
                                      "use while and endwhile")
                 step.kind = loop.kind
                 self.members[k].append(step)
                 return
-        raise BlockError(f"{_name(step)} is in no loop of that label")
+        raise BlockError(f"{_name(step)} is not in a loop of that label")
 
-    def _needs(self, step: Step, kind: str) -> Step:
+    def _needs(self, step: OWordStep, kind: str) -> OWordStep:
         top = self.open[-1] if self.open else None
         if top is None or top.kind != kind or top.word.label != step.word.label:
-            inside = f"inside {_name(top)} of line {top.at + 1}" if top else "with nothing open"
+            inside = f"inside {_name(top)} of line {top.at + 1}" if top else "without an open O-word"
             raise BlockError(f"{_name(step)} {inside}: it belongs to {kind} of the same label")
         return top
 
 
-def _name(step: Step) -> str:
+def _name(step: OWordStep) -> str:
     label = step.word.label
     return f"O{label if label.isdigit() else f'<{label}>'} {step.word.keyword}"

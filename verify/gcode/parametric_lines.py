@@ -1,4 +1,4 @@
-"""One line of a program with parameters or O-words, read once: its words, its assignments, or its step of the flow."""
+"""One line of a program with parameters or O-words, parsed once: its words, its assignments, or its O-word."""
 
 from __future__ import annotations
 
@@ -9,33 +9,33 @@ from dataclasses import dataclass
 import numpy as np
 
 from verify.gcode.block_words import BlockError, bare
-from verify.gcode.expressions import Reading, Target, Value
+from verify.gcode.expressions import ExpressionReader, ParameterReference, Value
 from verify.gcode.parameters import Parameters
 
 _O_WORD = re.compile(r"(/?)(?:n[0-9]+\.?[0-9]*)?o(?:<([^<>]*)>|([0-9]+)(?![0-9])|(?=[\[#]))(?=.)")
 _KEYWORD = re.compile(r"endsub|endif|endwhile|endrepeat|elseif|else|sub|return|call|if|while|do|break|continue|repeat")
 _CONDITIONS = frozenset({"if", "elseif", "while", "repeat"})
-_MOST_VALUES = {"call": 30, "return": 1, "endsub": 1, "if": 1, "elseif": 1, "while": 1, "repeat": 1}
+_MAX_VALUES = {"call": 30, "return": 1, "endsub": 1, "if": 1, "elseif": 1, "while": 1, "repeat": 1}
 _WHOLE = frozenset("MTDHL")
-MOST_CHARACTERS = 255
-"""What LinuxCNC reads of a line; it also bounds how deep an expression can be."""
+MAX_CHARACTERS = 255
+"""Characters of a line that LinuxCNC reads; the limit also bounds the depth of an expression."""
 
 
 @dataclass(frozen=True)
-class Line:
+class ParametricLine:
     """Words and assignments of a line.
 
     deleted  : whether it begins with /
     words    : letters with their values, in order
-    assigned : parameters with the values they get once all values of the line are known
+    assigned : parameters with their new values; they get them after all values of the line are evaluated
     """
 
     deleted: bool
     words: tuple[tuple[str, Value], ...]
-    assigned: tuple[tuple[Target, Value], ...]
+    assigned: tuple[tuple[ParameterReference, Value], ...]
 
     def run(self, scope: Parameters) -> str:
-        """Work the line out, make its assignments, and return the plain block that is left, '' for none."""
+        """Evaluate the line, make its assignments, and return the plain block that is left, '' for none."""
         words = "".join([letter + _digits(letter, value(scope)) for letter, value in self.words])
         results = [(target, target.number and target.number(scope), value(scope)) for target, value in self.assigned]
         for target, number, result in results:
@@ -49,7 +49,7 @@ class Line:
 
 @dataclass(frozen=True)
 class OWord:
-    """An O-word: label ('' where it is computed), what it says, and the values in brackets behind it."""
+    """An O-word: label ('' where it is computed), keyword, and the values in brackets after it."""
 
     label: str
     computed: Value | None
@@ -58,24 +58,30 @@ class OWord:
 
 
 def is_plain(raw: str) -> bool:
-    """Whether a line needs no stage before the block: no parameter, expression or O-word outside its comments."""
+    """Whether a line has no parameter, expression or O-word outside its comments."""
     if "#" not in raw and "[" not in raw and "o" not in raw and "O" not in raw:
         return True
     try:
         text = _compact(raw)
     except BlockError:
-        return True  # the block names it
+        return True  # the block reports it
     return "#" not in text and "[" not in text and not _O_WORD.match(text)
 
 
-def read_line(raw: str) -> Line:
-    """Words and assignments of a line that is not plain; BlockError where it cannot be read."""
+def read_line(raw: str) -> ParametricLine:
+    """Words and assignments of a line that is not plain.
+
+    Raises
+    ------
+    BlockError
+        The line cannot be read.
+    """
     text = _compact(raw)
     reading = _reading(raw, text)
     deleted = text.startswith("/")
     reading.at = int(deleted)
     words: list[tuple[str, Value]] = []
-    assigned: list[tuple[Target, Value]] = []
+    assigned: list[tuple[ParameterReference, Value]] = []
     while reading.rest:
         letter = text[reading.at]
         if letter == "#":
@@ -84,25 +90,25 @@ def read_line(raw: str) -> Line:
             assigned.append((target, reading.value()))
         elif letter.isalpha() or letter in "@^":
             if letter == "o":
-                raise BlockError(f"the O-word '{reading.rest}' must stand first in its line")
+                raise BlockError(f"the O-word '{reading.rest}' must be first in its line")
             reading.at += 1
             words.append((letter.upper(), reading.value()))
         else:
             raise BlockError(f"cannot read '{reading.rest}'")
-    return Line(deleted, tuple(words), tuple(assigned))
+    return ParametricLine(deleted, tuple(words), tuple(assigned))
 
 
 def read_o_word(raw: str) -> OWord | None:
-    """The O-word of a line; None where it has none, as a program number O1000 standing alone.
+    """The O-word of a line; None where it has none, or only a program number such as O1000.
 
-    Raises BlockError where it is no O-word of LinuxCNC.
+    Raises BlockError where it is not an O-word of LinuxCNC.
     """
     text = _compact(raw)
     found = _O_WORD.match(text)
     if found is None:
         return None
     if found[1]:
-        raise BlockError("a / before an O-word: the way of the program would depend on a switch of the machine")
+        raise BlockError("a / before an O-word: the flow of the program would depend on a switch of the machine")
     reading = _reading(raw, text)
     reading.at = found.end()
     label, computed = found[2] or (str(int(found[3])) if found[3] else ""), None
@@ -117,17 +123,17 @@ def read_o_word(raw: str) -> OWord | None:
     values: list[Value] = []
     while reading.rest:
         values.append(reading.bracket())
-    most = _MOST_VALUES.get(keyword, 0)
-    if len(values) > most or (keyword in _CONDITIONS and not values):
-        raise BlockError(f"{keyword} takes {most or 'no'} values in brackets, and {len(values)} stand there")
+    limit = _MAX_VALUES.get(keyword, 0)
+    if len(values) > limit or (keyword in _CONDITIONS and not values):
+        raise BlockError(f"{keyword} takes {limit or 'no'} values in brackets, not {len(values)}")
     return OWord(label, computed, keyword, tuple(values))
 
 
-def _reading(raw: str, text: str) -> Reading:
-    if len(raw.rstrip()) > MOST_CHARACTERS:
-        raise BlockError(f"a line with parameters, expressions or O-words has {len(raw.rstrip())} characters, and "
-                         f"LinuxCNC reads {MOST_CHARACTERS}: split it")
-    return Reading(text)
+def _reading(raw: str, text: str) -> ExpressionReader:
+    if len(raw.rstrip()) > MAX_CHARACTERS:
+        raise BlockError(f"a line with parameters, expressions or O-words has {len(raw.rstrip())} characters; "
+                         f"LinuxCNC reads {MAX_CHARACTERS}: split it")
+    return ExpressionReader(text)
 
 
 def _compact(raw: str) -> str:
@@ -137,10 +143,10 @@ def _compact(raw: str) -> str:
 def _digits(letter: str, number: float) -> str:
     """The number as text that reads back to the same bits; whole where the letter takes whole numbers only.
 
-    A quotient such as 2.99999 counts as 3 in those, as on the control: within 1e-4, G words within 1e-4 of a tenth.
+    There a quotient such as 2.99999 counts as 3, as on the control: within 1e-4, for G words within 1e-4 of a tenth.
     """
     if not math.isfinite(number):
-        raise BlockError(f"the value of {letter} is no finite number")
+        raise BlockError(f"the value of {letter} is not a finite number")
     if letter in _WHOLE and abs(number - round(number)) < 1e-4:
         number = round(number)
     elif letter == "G" and abs(number * 10 - round(number * 10)) < 1e-3:

@@ -1,16 +1,16 @@
-"""NC text to moves of the tool tip: a LinuxCNC / Fanuc reader of its own for three to five axes.
+"""NC text to moves of the tool tip: the verifier's own reader of LinuxCNC and Fanuc words, for three to five axes.
 
-A program is read line by line by one modal machine; parameters, expressions and O-words of
-LinuxCNC are worked out in a stage before it (``flow``), words of other controls are spelt in its own
-there (``dialects``). The common line, one straight move in modal coordinates, is taken by one regular
-expression; everything else goes through the full block (``words``).
-What the reader does not know it names with its line (``ProgramError``): nothing is skipped in silence.
-What it understands but a machinist should not run (length offset off, another work offset, spindle
-standing, path blending beyond the tolerance, a word no code takes) becomes a ``Remark`` and the reading goes on.
+One modal machine reads a program line by line [Kramer2000]. A stage before it evaluates parameters, expressions and
+O-words of LinuxCNC (``control_flow``) and translates the words of other controls (``dialects``). One regular expression
+reads the common line, a straight move in modal coordinates; everything else goes through the full block
+(``block_words``).
+The reader skips nothing. A word that it does not know is a ``ProgramError`` with its line. A readable word that a
+machinist should not run is a ``Remark``, and the reading goes on: length offset off, another work offset, spindle
+stopped, path blending beyond the tolerance, a word that no code uses.
 
-Assumptions: home (G53 Z0, G28, G30), a tool change and the start of a program are above everything; the axes
-left unknown are known again once programmed. Until the program says otherwise, the unit is mm and the control keeps to
-the path; rotary axes stand at 0; what it takes for granted so is told (``Program.assumed``).
+Assumptions: home (G53 Z0, G28, G30), a tool change and the start of a program are above everything; axes of unknown
+position are known again once programmed. Before the program states them, the unit is mm, the control keeps to the path
+and rotary axes stand at 0; ``Program.assumed`` lists these assumptions.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 import numpy as np
 
 from geometry.errors import ProgramError, VerificationError
-from verify.gcode.block_motion import Motion
+from verify.gcode.block_motion import BlockMotion
 from verify.gcode.block_words import Block, BlockError, parse_block, straight, used_letters
 from verify.gcode.control_flow import Flow, has_flow
-from verify.gcode.dialects import DIALECTS, LINUXCNC, spelt
+from verify.gcode.dialects import DIALECTS, LINUXCNC, translated_blocks
 from verify.gcode.system_parameters import served
 from verify.kinematics import Kinematics
 from verify.program.move_kinds import FEED, RAPID
@@ -33,10 +33,10 @@ from verify.program.program import NAN, Program, Remark
 from verify.progress import Report, silent
 
 BLEND_LIMIT = 0.01
-TOLD = 4096  # lines between two reports of how far the reading is
+REPORT_LINES = 4096  # lines between two reports of progress
 
 
-class Reader(Motion):
+class Reader(BlockMotion):
     """One reading of one program; use ``read_program``."""
 
     def read(self, text: str, report: Report = silent, dialect: str = LINUXCNC) -> Program:
@@ -44,21 +44,21 @@ class Reader(Motion):
         log, lines, self.fits = self.log, text.split("\n"), dialect == LINUXCNC
         blocks: Iterable[tuple[int, str]] = enumerate(lines, 1)
         if dialect != LINUXCNC:
-            blocks = spelt(lines, dialect, log)
+            blocks = translated_blocks(lines, dialect, log)
         elif has_flow(text):
             blocks = Flow(lines, self).blocks()
-        percents = self._scan(_told(blocks, len(lines), report))
+        percents = self._scan(_reported(blocks, len(lines), report))
         self.stop("end of the program")
         self.pause("end of the program", self.s.tool)
         if not self.s.ended and percents < 2 and not log.errors:
-            log.error(f"{log.name} does not end with M2, M30 or a closing %: it may be cut off", len(lines))
+            log.error(f"{log.name} does not end with M2, M30 or a closing %: it may be incomplete", len(lines))
         log.raise_errors()
         if self.s.relative and self.incremental_after_cuts and self.incremental_moved:
-            log.remark("incremental", "the program turns to incremental coordinates (G91) after cuts in absolute ones "
-                       "and never turns back", line=self.incremental_line)
+            log.remark("incremental", "the program switches to incremental coordinates (G91) after absolute cuts and "
+                       "never switches back", line=self.incremental_line)
         if any(self.s.shift):
-            log.remark("shift_left", "the program ends with its zero shifted (G92, G52), and a control keeps that "
-                       "for the next run: take it back with G92.1")
+            log.remark("shift_left", "the program ends with its zero shifted (G92, G52), and a control keeps the shift "
+                       "for the next run: cancel it with G92.1")
         table = log.table()
         speed, coolant = log.states()
         start, end, feed = (np.ascontiguousarray(table[:, k]) for k in (slice(0, 3), slice(3, 6), 7))
@@ -70,19 +70,19 @@ class Reader(Motion):
                        dialect, log.unbounded, tuple(log.pauses), log.leaves)
 
     def served(self, key: int | str) -> float:
-        """A parameter that the control keeps by itself (``verify.gcode.system_parameters``)."""
+        """A parameter that the control serves (``verify.gcode.system_parameters``)."""
         return served(self.s, key)
 
     def enter(self) -> None:
-        """A subroutine begins: it has kept no modes."""
+        """A subroutine begins: it has saved no modes."""
         self.saved.enter()
 
     def leave(self) -> None:
-        """A subroutine ends: the modes its M73 kept come back."""
+        """A subroutine ends: the modes that its M73 saved come back."""
         self.saved.leave(self.s)
 
     def _scan(self, blocks: Iterable[tuple[int, str]]) -> int:
-        """Run blocks given with their lines; the fast path serves plain straight moves, and only in the plain state."""
+        """Run blocks with their lines; the fast path serves plain straight moves in the plain state only."""
         s, log, fast, rows, full = self.s, self.log, straight(self.rotary), self.log.rows, Log.full
         percents = 0
         plain = begun = False
@@ -121,7 +121,7 @@ class Reader(Motion):
             if text == "%":
                 percents += 1
                 if percents == 1 and begun:
-                    log.error("a % in the middle of the program, which does not begin with one")
+                    log.error("a % within a program that does not begin with one")
                 if percents == 2:
                     break
                 continue
@@ -134,7 +134,7 @@ class Reader(Motion):
         return percents
 
     def _is_plain(self) -> bool:
-        """Whether a straight move needs nothing but its numbers now."""
+        """Whether a straight move now needs nothing but its numbers."""
         s = self.s
         return (not s.relative and s.scale == 1.0 and s.feed_mode == 94 and s.turning and s.tool > 0
                 and s.offset == s.tool and s.work_offset == self.work_offset and (s.tcp or not s.tilted)
@@ -151,7 +151,7 @@ class Reader(Motion):
         except BlockError as problem:
             return self.log.error(str(problem), remedy=problem.remedy)
         if block.deleted:
-            self.log.remark("block_delete", "a block with / depends on a switch of the machine; it is taken as run")
+            self.log.remark("block_delete", "a block with / depends on a switch of the machine; the proof runs it")
         if len(self.log.errors) == before:
             self._name_unused(block)
         if 2 in block.ms or 30 in block.ms:
@@ -165,13 +165,13 @@ class Reader(Motion):
         used = used_letters(block, motion, moves)
         idle = [f"{letter}{number:g}" for letter, number in block.values.items() if letter not in used]
         if idle:
-            self.log.remark("unused", f"no code of this block takes {', '.join(idle)}", self.log.line)
+            self.log.remark("unused", f"no code of this block uses {', '.join(idle)}", self.log.line)
 
 
-def _told(blocks: Iterable[tuple[int, str]], lines: int, report: Report) -> Iterator[tuple[int, str]]:
-    """The blocks as they are; every so many of them the share of the lines reached is reported."""
+def _reported(blocks: Iterable[tuple[int, str]], lines: int, report: Report) -> Iterator[tuple[int, str]]:
+    """The blocks unchanged; reports the share of the lines every ``REPORT_LINES`` blocks."""
     for count, block in enumerate(blocks, 1):
-        if count % TOLD == 0:
+        if count % REPORT_LINES == 0:
             report(block[0] / lines)
         yield block
 
@@ -185,39 +185,43 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
     text        : the program
     tools       : T numbers of the tool table; any number is accepted when None
     work_offset : the one of the setup, for example 'G54'
-    blend_limit : mm, what path blending (G64 P, Q) may leave the path by without a remark
-    kinematics  : the machine's rotary axes; without them no rotary word is known
+    blend_limit : mm, deviation that path blending (G64 P, Q) may have without a remark
+    kinematics  : rotary axes of the machine; without them no rotary word is known
     gauge_length : mm by T number, spindle face to tip; a machine whose head tilts needs them in programs without
                   tool centre point control
     spindle_tool : T number in the spindle, its length offset on, before the first line; 0 for none
-    report      : called with the share read, 0 to 1, every 4096 lines; what it raises ends the reading
-    dialect     : whose words they are, one of ``verify.gcode.dialects.DIALECTS``
+    report      : called with the share read, 0 to 1, every 4096 lines; an exception from it ends the reading
+    dialect     : one of ``verify.gcode.dialects.DIALECTS``
 
     Returns
     -------
     Program
-        Tip moves in mm; arcs and turning blocks in pieces within 1e-3 mm of what the control does.
+        Tip moves in mm; arcs and turning blocks in pieces within 1e-3 mm of the path of the control.
 
     Raises
     ------
     ProgramError
-        With every line that cannot be read: unknown words, two words of one modal group, a feed move without a
-        feed, an arc without a centre or whose ends lie on two circles, a tool that is not in the table, a program
-        that breaks off, a move of the joints off rotary zero where no pivots are known. Without a line:
-        ``spindle_tool`` is not in the table.
+        Lines that cannot be read; the subjects name them. Reasons are unknown words, two words of one modal group, a
+        feed move without a feed, and an arc without a centre or with ends on two circles. Further reasons are a tool
+        that is not in the table, an incomplete program, and a move of the joints off rotary zero without known
+        pivots. Without a line: ``spindle_tool`` is not in the table.
     VerificationError
         Code program_too_long: a block of more than 200 000 moves, or a program of more than 5 000 000;
         unknown_dialect.
+
+    Notes
+    -----
+    Words, modal groups and order of execution are those of RS274/NGC [Kramer2000] as LinuxCNC runs them.
     """
     if dialect not in DIALECTS:
         raise VerificationError(f"no reader knows the dialect '{dialect}'", code="unknown_dialect", measured=dialect,
-                                limit=sorted(DIALECTS), remedy="name one of them")
+                                limit=sorted(DIALECTS), remedy=f"name one of {', '.join(sorted(DIALECTS))}")
     if "\x00" in text:
         raise ProgramError(f"{name} is not a text file", remedy="send the NC program as text")
     if spindle_tool and tools is not None and spindle_tool not in tools:
-        raise ProgramError(f"{name}: T{spindle_tool}, named as the tool in the spindle, is not in the tool table",
+        raise ProgramError(f"{name}: the tool in the spindle, T{spindle_tool}, is not in the tool table",
                            subjects=(f"T{spindle_tool}",), measured=spindle_tool, limit=sorted(tools),
-                           remedy="name a tool of the table as spindle_tool")
+                           remedy="give a tool of the table as spindle_tool")
     reader = Reader(Log(name), tools, work_offset, blend_limit, kinematics, gauge_length, spindle_tool)
     return reader.read(text, report, dialect)
 

@@ -1,9 +1,9 @@
-"""What rotary words do: where the axes stand, tool centre point control, and moves that turn the tool or the part.
+"""Rotary words: angles of the axes, tool centre point control, and moves that turn the tool or the part.
 
-With tool centre point control (G43.4, M428) X, Y, Z are the tip in the setup frame, which goes straight whatever the
-axes do; without, they are the linear joints, and the tip of a turning block goes along a curve that the pivots give.
-In both cases every word of a block goes evenly from its start to its end. Turning blocks are written out in pieces
-(``dividing``).
+With tool centre point control (G43.4, M428), X, Y, Z are the tip in the setup frame, and the tip goes straight while
+the axes turn. Without it, X, Y, Z are the linear joints, and the tip of a turning block follows a curve that depends on
+the pivots. In both cases every word of a block changes evenly from its start to its end. Turning blocks are split into
+pieces (``verify.program.turn_subdivision``).
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from verify.program.turn_subdivision import axis_pieces, tip_pieces
 
 TURNED = 8
 """Added to the unknown axes of a move whose rotary axes turn or stand off 0."""
-_LEAST = 1e-9  # mm, a block that moves X, Y, Z by less is one that only turns
+_STILL = 1e-9  # mm: a block that moves X, Y, Z by less only turns
 
 
 class Rotary:
     """State, log and rotary axes of one reading.
 
-    machine : its rotary axes, or None without any
+    machine : rotary axes of the machine, or None
     gauge   : mm by T number, spindle face to tip
     stated_axes : letters of the rotary axes whose angle the program has stated
     """
@@ -39,7 +39,7 @@ class Rotary:
         self.stated_axes: set[str] = set()
 
     def _turn(self, values: Mapping[str, float], *, absolute: bool = False) -> list[float] | None:
-        """(2,) deg, where the rotary words of a block take the axes; None where it has none."""
+        """(2,) deg, angles of the axes after the rotary words of a block; None where it has none."""
         named = [letter in values for letter in self.rotary]
         if not any(named):
             return None
@@ -50,19 +50,19 @@ class Rotary:
                 for letter, n, t in zip(self.rotary, named, self.s.turn, strict=True)]
 
     def _stand(self, turn: list[float]) -> None:
-        """The axes stand at ``turn`` now; the way there is not simulated."""
+        """Put the axes at ``turn`` without simulating the turn."""
         self.s.turn = turn
         self.log.turned.stand(self.log.count, turn)
 
     def _leave(self, named: Sequence[bool]) -> None:
-        """Linear axes went to a place of the machine's own; with the part or tool turned all of X, Y, Z follow."""
+        """Linear axes went to a fixed place of the machine; with the part or tool turned, X, Y and Z are unknown."""
         s = self.s
         s.sent |= named[2]
         every = s.tcp and s.tilted and any(named)
         s.position = [NAN if n or every else p for n, p in zip(named, s.position, strict=True)]
 
     def _control(self, word: bool, switch: bool) -> None:
-        """Set tool centre point control by G43.4 and by M428; off 0 the same place then has other numbers."""
+        """Set tool centre point control by G43.4 and by M428; with turned axes the same place gets other numbers."""
         s = self.s
         tip, was = self._tip(), s.tcp
         s.tcp_word, s.tcp_switch = word, switch
@@ -94,20 +94,20 @@ class Rotary:
         return found
 
     def _gauge(self) -> float | None:
-        """mm from the spindle face to the tip, as far as tips depend on it; None where tips cannot be had at all."""
+        """mm from the spindle face to the tip, 0 where tips do not depend on it; None where tips cannot be computed."""
         if self.machine is None or self.machine.pivots is None:
             return None
         return self.gauge.get(self.s.tool) if self.machine.tilts_head else 0.0
 
     def _timing(self, feed: float, length: float, turn: list[float] | None) -> tuple[float, float]:
-        """Rate, mm/min, and minutes of a feed block; minutes are nan where length and rate say them.
+        """Rate, mm/min, and minutes of a feed block; minutes are nan where length and rate give them.
 
         feed   : mm/min, 1/min in inverse time (G93)
         length : mm of X, Y, Z as programmed
-        turn   : (2,) deg, where the block takes the axes, None where it turns none
+        turn   : (2,) deg, angles after the block, None where it turns no axis
 
-        Inverse time says the minutes outright. Otherwise the length of X, Y, Z decides and the axes take as long;
-        where only axes turn, F is deg/min of both together, not scaled by G20. So LinuxCNC does it.
+        Inverse time gives the minutes directly. Otherwise the length of X, Y, Z decides, and the axes take as long.
+        Where only axes turn, F is deg/min of both together and G20 does not scale it. LinuxCNC does the same.
         """
         s = self.s
         rate = feed * length if s.feed_mode == 93 else feed
@@ -115,7 +115,7 @@ class Rotary:
             return rate, NAN
         if s.feed_mode == 93:
             return rate, 1.0 / feed
-        if length > _LEAST:
+        if length > _STILL:
             return rate, length / feed
         return 0.0, math.dist(turn, s.turn) * s.scale / feed
 
@@ -123,8 +123,8 @@ class Rotary:
                turn: list[float] | None, minutes: float) -> None:
         """Write one straight block.
 
-        start, target : (3,) mm, of X, Y, Z as programmed; ``unknown`` : axes whose start is not known
-        feed, minutes : as of ``_timing``; turn : (2,) deg or None, where the block takes the axes
+        start, target : (3,) mm, X, Y, Z as programmed; ``unknown`` : axes whose start is not known
+        feed, minutes : as ``_timing`` gives them; turn : (2,) deg, angles after the block, or None
         """
         s, log = self.s, self.log
         was, turning = s.turn, turn is not None and turn != s.turn
@@ -160,7 +160,7 @@ class Rotary:
 
     def _swing(self, start: list[float], target: list[float], kind: int, feed: float, was: list[float],
                minutes: float, gauge: float) -> None:
-        """Write a block that turns an axis from ``was`` to where it stands now, deg, in pieces."""
+        """Write a block that turns an axis from ``was``, deg, to its present angle, in pieces."""
         s, log = self.s, self.log
         a, b = [math.radians(t) for t in was], [math.radians(t) for t in s.turn]
         n = axis_pieces(a, b)
@@ -180,16 +180,16 @@ class Rotary:
         return None
 
     def _no_tips(self) -> None:
-        """Refuse a move of the joints whose tip cannot be told."""
+        """Refuse a move of the joints whose tip cannot be computed."""
         s = self.s
         where = " ".join(f"{letter}{t:g}" for letter, t in zip(self.rotary, s.turn, strict=True))
         if self.machine is not None and self.machine.pivots is not None:
-            return self.log.error(f"a move without tool centre point control at {where}, and the gauge length of "
-                                  f"T{s.tool} is not known", remedy="give the tool its gauge_length_mm")
-        return self.log.error(f"a move without tool centre point control at {where}, and where the rotary axes lie is "
-                              "not known", remedy="give machine.pivots_mm, or run the program with G43.4 or M428")
+            return self.log.error(f"a move without tool centre point control at {where} needs the gauge length of "
+                                  f"T{s.tool}", remedy="give the tool its gauge_length_mm")
+        return self.log.error(f"a move without tool centre point control at {where} needs the pivots of the rotary "
+                              "axes", remedy="give machine.pivots_mm, or run the program with G43.4 or M428")
 
 
 def between(start: Sequence[float], end: Sequence[float], share: float) -> list[float]:
-    """The place at a share, 0 to 1, of the way from one list of numbers (mm or deg) to another; 1 is the end itself."""
+    """Interpolate between two lists of numbers (mm or deg) at a share from 0 to 1; 1 gives the end itself."""
     return list(end) if share == 1.0 else [a + (b - a) * share for a, b in zip(start, end, strict=True)]

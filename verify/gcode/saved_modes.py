@@ -1,4 +1,4 @@
-"""Modes kept and restored by M70 to M73."""
+"""Modes that M70 to M73 save and restore."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ class _Level:
 
 
 class SavedModes:
-    """What was kept, one set of modes for the main program and one for each call."""
+    """Saved modes: one set for the main program and one for each call."""
 
     def __init__(self) -> None:
         self._levels = [_Level()]
 
     def run(self, word: int, state: State) -> None:
-        """M70 keeps the modes, M73 keeps them until the subroutine returns, M72 restores and M71 forgets them.
+        """M70 saves the modes, M73 saves them until the subroutine returns, M72 restores and M71 discards them.
 
-        Raises BlockError where nothing is kept.
+        Raises BlockError where no modes are saved.
         """
         level = self._levels[-1]
         if word in (70, 73):
@@ -35,7 +35,7 @@ class SavedModes:
             raise BlockError(f"M{word} without an M70 of the same subroutine before it")
         elif word == 72:
             if level.modes.tcp_word != state.tcp_word:
-                raise BlockError("M72 back over a G43.4 or its end: state tool centre point control itself")
+                raise BlockError("M72 would switch tool centre point control (G43.4): program that word instead")
             _restore(level.modes, state)
         else:
             level.modes, level.at_return = None, False
@@ -45,7 +45,7 @@ class SavedModes:
         self._levels.append(_Level())
 
     def leave(self, state: State) -> None:
-        """A subroutine ends: what its M73 kept is restored."""
+        """A subroutine ends: the modes that its M73 saved are restored."""
         level = self._levels.pop()
         if level.at_return and level.modes is not None:
             _restore(level.modes, state)
@@ -55,5 +55,5 @@ def _restore(kept: State, state: State) -> None:
     other_feed = kept.feed_mode != state.feed_mode
     for name in _FIELDS:
         setattr(state, name, getattr(kept, name))
-    if other_feed:  # a number of the one mode means nothing in the other: LinuxCNC wants F again
+    if other_feed:  # F of one feed mode is meaningless in another: LinuxCNC needs a new F
         state.feed = NAN

@@ -1,4 +1,4 @@
-"""Parameters a control serves by itself: those the reader knows, and those it can only name."""
+"""Parameters that a control serves: those the reader knows, and those of which it knows only the name."""
 
 from __future__ import annotations
 
@@ -32,27 +32,28 @@ def served(state: State, key: int | str) -> float:
     Raises
     ------
     BlockError
-        It is not known here: the program has not stated it, or it belongs to the machine.
+        It is unknown: the program has not stated it, or it belongs to the machine.
     """
     label = f"#{key}" if isinstance(key, int) else f"#<{key}>"
     if key in POSITION:
         k = POSITION[key]
         place = (state.position[k] - state.origin[k]) / state.scale
         if k == 2 and state.length_off:
-            raise BlockError(f"{label} with the length offset off is not the tip's; give G43 H{state.tool} first")
+            raise BlockError(f"{label} is not the place of the tip while the length offset is off; give G43 "
+                             f"H{state.tool} first")
         if math.isnan(place):
-            raise BlockError(f"{label} is read where the program has not stated {'XYZ'[k]}; state it first")
+            raise BlockError(f"{label} is unknown because the program has not stated {'XYZ'[k]}; state it first")
         return place
     found = _mode(state, {5220: "_coord_number", 5400: "_current_tool"}.get(key, "") if isinstance(key, int) else key)
     if found is None:
-        raise BlockError(f"{label} is a parameter of the control which the proof cannot know; write the number instead")
+        raise BlockError(f"{label} is a parameter of the control that the proof cannot know; write the number instead")
     if math.isnan(found):
-        raise BlockError(f"{label} is read before the program states it; state it first")
+        raise BlockError(f"{label} is unknown because the program has not stated it; state it first")
     return found
 
 
 def _mode(s: State, name: str) -> float | None:
-    """What a name says about the modes; None where the reader does not keep it."""
+    """Value of a named mode; None where the reader does not keep it."""
     offset = next(g for g, word in WORK_OFFSETS.items() if word == s.work_offset)
     motion = math.nan if s.motion is None else s.motion * 10
     modes: dict[str, float] = {

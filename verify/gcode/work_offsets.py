@@ -1,7 +1,7 @@
-"""Where program zero lies: G92 and its kin, G52, G10 L20, and the places that polar words name.
+"""Program zero: G92 to G92.3, G52, G10 L20, and the places of polar words.
 
-All of it is known to the bit, because the zero of the setup is: a shift is the place of the tip less the number the
-program gives that place. Only what depends on the machine's own zero (G10 L2) is refused.
+All of them are exact, because the zero of the setup is known: a shift is the place of the tip minus its programmed
+number. The reader refuses only words that depend on the zero of the machine (G10 L2).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ Axes = list[float | None]
 
 
 class Origins(Modes):
-    """Shifts of program zero, and polar words of the block being run."""
+    """Shifts of program zero, and polar words of the running block."""
 
     polar: tuple[float | None, float | None] | None = None
 
@@ -24,7 +24,7 @@ class Origins(Modes):
         word = next(g for g in block.codes if g in (10, 52, 92, 92.1, 92.2, 92.3))
         moved = [g for g in block.codes if g in MOTION_CODES - {80}]
         if moved:
-            raise BlockError(f"G{word:g} and G{moved[0]:g} in one block: both take the coordinates")
+            raise BlockError(f"G{word:g} and G{moved[0]:g} in one block: both use the coordinates")
         if self.polar:
             raise BlockError(f"polar words with G{word:g}: it takes X, Y and Z")
         if turned := [letter for letter in self.rotary if letter in block.values]:
@@ -52,17 +52,17 @@ class Origins(Modes):
             s.kept = [0.0] * 3
         if word == 92.3:
             if not any(s.shift):
-                raise BlockError("G92.3 brings back a shift that the program has not set: it is left from the program "
-                                 "before; set it with G92")
+                raise BlockError("G92.3 restores a shift that the program has not set but a program before; set it "
+                                 "with G92")
             self._tell("G92.3")
 
     def _table(self, values: dict[str, float], axes: Axes) -> None:
-        """G10 L20 of the work offset of the setup: the tip's place gets the numbers given."""
+        """G10 L20 of the work offset of the setup: the place of the tip gets the programmed numbers."""
         s = self.s
         names = list(WORK_OFFSETS.values())
         if values.get("L") != 20:
             kind = f"L{values['L']:g}" if "L" in values else "without L"
-            raise BlockError(f"G10 {kind} (a changed offset table): only L20 can be read, which states a place")
+            raise BlockError(f"G10 {kind} (a changed offset table): only L20 can be read; it states a place")
         if "R" in values:
             raise BlockError("G10 with R (a rotated frame)")
         number = 0 if values.get("P") == 0 else whole(values, "P", len(names) + 1)
@@ -75,18 +75,18 @@ class Origins(Modes):
         for k, axis in enumerate(axes):
             if axis is not None:
                 s.table[k] = self._known(k, 10) - s.shift[k] - axis * s.scale
-        self.log.remark("offset_table", f"G10 L20 writes {own} into the offset table of the control, where it "
-                        "stays: run again, the program starts from another zero", self.log.line)
+        self.log.remark("offset_table", f"G10 L20 writes {own} into the offset table of the control: the next run of "
+                        "the program starts from another zero", self.log.line)
 
     def _known(self, k: int, word: float) -> float:
         s = self.s
         place = s.position[k]
         if k == 2 and s.length_off:
-            raise BlockError(f"G{word:g} Z with the length offset off: the place it names is not the tip's; give G43 "
+            raise BlockError(f"G{word:g} Z while the length offset is off does not name the place of the tip; give G43 "
                              f"H{s.tool} first")
         if math.isnan(place):
-            raise BlockError(f"G{word:g} {'XYZ'[k]} where the program has not stated {'XYZ'[k]}: the shift is not "
-                             "known; state the place first")
+            raise BlockError(f"G{word:g} {'XYZ'[k]} sets an unknown shift because the program has not stated "
+                             f"{'XYZ'[k]}; state the place first")
         return place
 
     def _tell(self, word: str) -> None:
@@ -94,7 +94,7 @@ class Origins(Modes):
         self.log.note(f"line {self.log.line}: {word} moves program zero to {shift or 'the zero of the setup'} mm")
 
     def _polar_words(self, block: Block) -> None:
-        """Take the polar words of a block; its coordinates come from them in ``_polar_place``."""
+        """Store the polar words of a block; ``_polar_place`` gives its coordinates."""
         self.polar = None
         values = block.values
         if values.keys().isdisjoint("@^"):
@@ -102,23 +102,23 @@ class Origins(Modes):
         if self.s.plane != 17:
             raise BlockError(f"polar words in plane G{self.s.plane}: they are read in G17 only")
         if not values.keys().isdisjoint("XY"):
-            raise BlockError("polar words beside X or Y")
+            raise BlockError("polar words and X or Y in one block")
         if not {28, 30, 53}.isdisjoint(block.codes):
-            raise BlockError("polar words on the way to a place of the machine's own")
+            raise BlockError("polar words in a move to a fixed place of the machine (G28, G30, G53)")
         self.polar = values.get("@"), values.get("^")
 
     def _polar_place(self, radius: float | None, angle: float | None) -> tuple[float, float]:
         """X and Y, mm in the setup frame, of the polar words: radius and angle round program zero from the X axis.
 
-        A word left out, and both of them in incremental coordinates, go on from where the tip is.
+        An absent word, and both words in incremental coordinates, continue from the place of the tip.
         """
         s = self.s
         x, y = s.position[0] - s.origin[0], s.position[1] - s.origin[1]
         whole_place = radius is not None and angle is not None and not s.relative
         if math.isnan(x + y) and not whole_place:
-            raise BlockError("a polar word that goes on from a place the program has not stated")
+            raise BlockError("a polar word continues from a place that the program has not stated")
         if x == 0 and y == 0 and (s.relative or (angle is None and radius is not None)):
-            raise BlockError("polar words that go on from program zero, where no angle is: give @ and ^ in G90")
+            raise BlockError("polar words continue from program zero, which has no angle: give @ and ^ in G90")
         here, turned = math.hypot(x, y), math.degrees(math.atan2(y, x)) if not whole_place else 0.0
         if s.relative:
             distance, turned = here + (radius or 0.0) * s.scale, turned + (angle or 0.0)

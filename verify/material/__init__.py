@@ -1,4 +1,4 @@
 """The material model of the proof: stock lines, stock field, collisions, the machined part.
 
-The planner's stock and drop kernels are not used.
+It does not use the stock and drop kernels of the planner.
 """

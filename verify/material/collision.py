@@ -1,4 +1,7 @@
-"""Necks, shanks and holders that lean or turn against the part itself and the fixtures (exact, without a grid)."""
+"""Collisions of tilted or turning necks, shanks and holders with part and fixtures, exact and without a grid.
+
+Points are float64, mm, in the setup frame.
+"""
 
 from __future__ import annotations
 
@@ -19,22 +22,24 @@ from verify.tool_axes import ToolAxes
 from verify.tool_bodies import Bodies
 
 FIXTURE_SPACING = 0.25
-DIP = 0.005  # mm a ball may be in a fixture, between its points, before it meets one
-MOST_FIXTURE_POINTS = 1_500_000
+DIP = 0.005  # mm, largest unseen penetration of a ball between the points of a fixture
+MAX_FIXTURE_POINTS = 1_500_000
 
 
 def fixture_points(setup: ProofSetup, bounds: F64, moves: Moves, tools: Sequence[ToolBody]) -> tuple[F64, float]:
-    """Points on the faces of the fixtures where a tool may come near, at most 0.25 mm apart, and closer
-    for fine tools: half a radius, and so that no ball dips 0.005 mm in between them.
+    """Points on the faces of the fixtures near the moves.
 
-    bounds : (2, 3) float64, mm, of the part; a fixture stands down to its underside, or lower where it begins lower
-    moves, tools : what is farther from every tip than the longest tool reaches is left out
+    They are at most 0.25 mm apart, and closer for thin tools: half a radius, and close enough that no ball enters a
+    face by 0.005 mm between them.
+
+    bounds : (2, 3) float64, mm, setup frame, of the part; a fixture reaches down to its underside, or lower
+    moves, tools : places that no tool can reach are left out
 
     Returns
     -------
-    points : (n, 3) float64, mm: tops, sides and undersides, edges and corners included
-    dip    : mm a ball of any of the tools' radii may be in a face before it meets a point; more than 0.005 only where
-             points so close would be over 1.5 million
+    points : (n, 3) float64, mm, setup frame: tops, sides and undersides, edges and corners included
+    dip    : mm, largest unseen penetration of a ball of any of the tool radii; more than 0.005 only where that would
+             need over 1.5 million points
     """
     boxes = _near_boxes(setup, bounds, moves, tools)
     radii = [t.radius for t in tools]
@@ -50,21 +55,21 @@ def fixture_points(setup: ProofSetup, bounds: F64, moves: Moves, tools: Sequence
 
 
 def _fixture_spacing(boxes: Sequence[tuple[F64, F64, float]], radii: Sequence[float]) -> float:
-    """mm between the points of ``fixture_points``; boxes as ``_near_boxes`` gives them."""
+    """Distance between the points of ``fixture_points``, mm; boxes as ``_near_boxes`` gives them."""
     area = sum(float(2 * w * d + 2 * h * (w + d)) for w, d, h in (high - low for low, high, _ in boxes))
-    least = min((min(0.5 * r, (4.0 * DIP * r - 2.0 * DIP**2) ** 0.5) for r in radii if r > DIP),
+    finest = min((min(0.5 * r, (4.0 * DIP * r - 2.0 * DIP**2) ** 0.5) for r in radii if r > DIP),
                 default=FIXTURE_SPACING)
-    return max(min(FIXTURE_SPACING, least), (area / MOST_FIXTURE_POINTS) ** 0.5)
+    return max(min(FIXTURE_SPACING, finest), (area / MAX_FIXTURE_POINTS) ** 0.5)
 
 
 def _dip(radius: float, spacing: float) -> float:
-    """mm a ball is in a face when it meets the corner of a square of points it came down in the middle of."""
+    """Penetration of a ball, mm, when it meets the corners of a square of points above whose middle it comes down."""
     return radius - float(max(radius * radius - 0.5 * spacing * spacing, 0.0)) ** 0.5
 
 
 def _near_boxes(setup: ProofSetup, bounds: F64, moves: Moves,
                 tools: Sequence[ToolBody]) -> list[tuple[F64, F64, float]]:
-    """Lower and upper corner and underside of the fixtures, cut to where a tool may come."""
+    """Lower and upper corner and underside of the fixtures, clipped to the reach of the tools."""
     if len(moves) == 0 or not setup.fixtures:
         return []
     cutters, bodies = cutter_table(tools), Bodies.of(tools, setup)
@@ -92,12 +97,14 @@ def _sheet(x: F64, y: F64, z: F64) -> F64:
 def run_clashes(points: F64, fixed: NDArray[np.bool_], moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *,
                 threads: int = 2, progress: Progress | None = None, bow: float = BOW,
                 free: NDArray[np.bool_] | None = None) -> tuple[F64, int]:
-    """Bodies of all moves, and in rapids the cutting part, against (n, 3) float64 points, mm.
+    """Contacts of bodies, and in rapids of the cutting part, with points.
 
-    fixed : (n,) bool, points of fixtures, which the cutting part must not touch either
-    free  : (m,) bool, rapids that no clearance is asked of; found from the moves where None
+    points : (n, 3) float64, mm, setup frame
+    fixed  : (n,) bool, points of fixtures, which the cutting part must not touch either
+    free   : (m,) bool, rapids that need no clearance; found from the moves where None
+    bow    : mm, error allowed where the tool turns
 
-    Returns the events (e, 7) sorted by move and the number beyond the table.
+    Returns the events, (e, 7) float64, mm, sorted by move, and the number of events lost because a table is full.
     """
     if len(points) == 0 or len(moves) == 0:
         return np.zeros((0, 7)), 0

@@ -1,9 +1,8 @@
 """Rapids of machines that run each linear axis at its own speed: the whole box of the move, as sweeps that fill it.
 
-Which way through the box such a machine takes depends on rates and accelerations nobody states, so everything between
-both ends along the linear axes must be clear. The box is filled with sweeps along its longest side, a quarter of the
-tool radius apart: between them a cylinder misses 1/128 of its radius at the sides of the box, and a ball as much below.
-A box that would take over 20 000 sweeps is not filled but a finding.
+The path through the box depends on unknown rates and accelerations, so the whole box between both ends must be clear.
+Sweeps along its longest side fill it, a quarter of the tool radius apart: between them a cylinder misses 1/128 of its
+radius at the sides of the box, and a ball as much below. A box that needs over 20 000 sweeps is a finding instead.
 """
 
 from __future__ import annotations
@@ -19,28 +18,29 @@ from verify.tool_axes import ToolAxes
 
 STILL = 1e-9
 SHARE = 4.0
-MOST_SWEEPS = 20_000
+MAX_SWEEPS = 20_000
 
 
 def spread(moves: Moves, slides: F64 | None, radius: F64, clear: float) -> tuple[Moves, NDArray[np.int64]]:
     """Rapids in several linear axes as sweeps through their box.
 
     moves  : of a machine with doglegs
-    slides : (m, 3, 3) float64, rows: where the linear axes of the machine point on the part; None: along the frame
-    radius : (m,) float64, mm, of the tool of each move
-    clear  : mm, a rapid of an upright tool that stays above it meets nothing and is left as it is
+    slides : (m, 3, 3) float64, dimensionless, rows: directions of the linear axes in the frame of the part; None: along
+             the frame
+    radius : (m,) float64, mm, tool radius of each move
+    clear  : mm, height above which a rapid of an upright tool meets nothing and stays as it is
 
     Returns
     -------
-    The moves with each such rapid replaced, and (k,) int64, which move each of them comes from.
+    The moves with each such rapid replaced, and (k,) int64, index, the original move of each of them.
 
     Notes
     -----
-    Rapids that turn the tool are left as they are, and so are boxes of too many sweeps (``box_findings``). Sweeps never
-    go up the tool, so none is taken for a lift.
+    Rapids that turn the tool stay as they are, and so do boxes of too many sweeps (``box_findings``). Sweeps never go
+    up the tool axis, so none counts as a lift.
     """
     boxed, parts = _boxed(moves, slides, clear)
-    chosen = np.flatnonzero(boxed & (_sweep_counts(parts, radius) <= MOST_SWEEPS))
+    chosen = np.flatnonzero(boxed & (_sweep_counts(parts, radius) <= MAX_SWEEPS))
     if len(chosen) == 0:
         return moves, np.arange(len(moves), dtype=np.int64)
     starts, ends, origin = [], [], []
@@ -63,18 +63,23 @@ def spread(moves: Moves, slides: F64 | None, radius: F64, clear: float) -> tuple
 
 
 def box_findings(moves: Moves, slides: F64 | None, radius: F64, clear: float, source: Source) -> list[Finding]:
-    """Rapids whose box would take too many sweeps; parameters as of ``spread``, radius (m,) float64 mm."""
+    """Findings of rapids whose box needs too many sweeps.
+
+    slides : (m, 3, 3) float64, dimensionless, directions of the linear axes in the frame of the part, or None
+    radius : (m,) float64, mm, tool radius of each move
+    clear  : mm, as for ``spread``
+    """
     boxed, parts = _boxed(moves, slides, clear)
     counts = _sweep_counts(parts, radius)
     return [Finding(FindingKind.RAPID, source.names[source.program[m]], int(source.line[m]), None, None,
                     tuple(round(float(v), 6) for v in moves.end[m]), 0.0, 0.0,  # type: ignore[arg-type]
                     f"T{source.tool[m]}: the box of this rapid ({np.abs(parts[m]).max():.0f} mm long, rapid_motion "
-                    "dogleg) is too large to be looked through with so thin a tool: move Z alone, or X and Y alone")
-            for m in np.flatnonzero(boxed & (counts > MOST_SWEEPS)).tolist()]
+                    "dogleg) is too large to be checked for so thin a tool: move Z alone, or X and Y alone")
+            for m in np.flatnonzero(boxed & (counts > MAX_SWEEPS)).tolist()]
 
 
 def _boxed(moves: Moves, slides: F64 | None, clear: float) -> tuple[NDArray[np.bool_], F64]:
-    """(m,) rapids in several linear axes that may meet something, and (m, 3) mm, how far each axis goes."""
+    """(m,) rapids in several linear axes that may meet something, and (m, 3) mm, the travel of each axis."""
     d = moves.end - moves.start
     parts = d if slides is None else np.einsum("mij,mj->mi", slides, d)
     several = (np.abs(parts) > STILL).sum(axis=1) > 1
@@ -86,7 +91,7 @@ def _boxed(moves: Moves, slides: F64 | None, clear: float) -> tuple[NDArray[np.b
 
 
 def _sweep_counts(parts: F64, radius: F64) -> F64:
-    """(m,) how many sweeps fill each box: rows across its two shorter sides."""
+    """(m,) number of sweeps that fill each box: rows across its two shorter sides."""
     rows = 1.0 + np.ceil(np.sort(np.abs(parts), axis=1)[:, :2] * SHARE / radius[:, None])
     return np.asarray(rows.prod(axis=1))
 

@@ -1,4 +1,4 @@
-"""How much of a cutter is in stock: angle of its front, by tool, and where that is above a limit."""
+"""Engaged angle of cutters: by tool, and findings where it is above a limit."""
 
 from __future__ import annotations
 
@@ -18,11 +18,14 @@ from verify.moves import Moves
 from verify.tool_axes import sector_frames
 
 RESOLUTION = 2 * math.pi / FRONT
-"""rad: sectors at both ends of an engaged arc are counted whole."""
+"""rad, width of a sector; the sectors at both ends of an engaged arc count whole."""
 
 
 def in_parts(moves: Moves, tools: Sequence[ToolBody]) -> tuple[Moves, NDArray[np.int64]]:
-    """Moves cut up as ``verify.material.stock_pass.parts`` has them, p in all, and the row (p,) of the move each is of."""
+    """Split moves into the parts of ``verify.material.stock_pass.parts``.
+
+    Returns the p parts as moves, in mm, and (p,) int64, index, the original move of each.
+    """
     first = parts(moves, tools)
     count = np.diff(first)
     of = np.repeat(np.arange(len(moves)), count)
@@ -34,7 +37,12 @@ def in_parts(moves: Moves, tools: Sequence[ToolBody]) -> tuple[Moves, NDArray[np
 
 
 def engaged_angles(bits: NDArray[np.int64], moves: Moves, tools: Sequence[ToolBody]) -> F64:
-    """(m,) float64, rad, 0 to pi: engaged angle of each of m parts of moves; bits (m,) as ``StockPass.engaged``."""
+    """Engaged angle of each part of a move.
+
+    bits : (m,) int64, as ``StockPass.engaged``
+
+    Returns (m,) float64, rad, 0 to pi.
+    """
     start, end = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end)
     radius = np.array([t.radius for t in tools])
     return np.asarray(window_angles(bits, start, end, *sector_frames(moves.axes, len(moves)), moves.tool, moves.feed,
@@ -42,7 +50,7 @@ def engaged_angles(bits: NDArray[np.int64], moves: Moves, tools: Sequence[ToolBo
 
 
 def engagements(angle: F64, moves: Moves, tools: Sequence[ToolBody]) -> dict[int, Engagement]:
-    """Largest engaged angle of each tool that met stock, and what 99 % of its way in stock stays under, by T number.
+    """Largest engaged angle of each tool in stock, and the 99th percentile over its path in stock, by T number.
 
     angle : (m,) float64, rad, as ``engaged_angles``
     """
@@ -60,11 +68,13 @@ def engagements(angle: F64, moves: Moves, tools: Sequence[ToolBody]) -> dict[int
 
 def engagement_findings(angle: F64, moves: Moves, of: NDArray[np.int64], source: Source,
                         limits: Mapping[int, float]) -> list[Finding]:
-    """Where the engaged angle is above the limit of the tool, rad by T number; by neighbouring lines.
+    """Findings where the engaged angle is above the limit of the tool, by neighbouring lines.
 
-    angle : (m,) float64, rad, as ``engaged_angles``; moves, of : parts of moves, as ``in_parts``
+    angle     : (m,) float64, rad, as ``engaged_angles``
+    moves, of : parts of moves and their original moves, (m,) int64, index, as ``in_parts``
+    limits    : rad by T number
 
-    Angles are known to ``RESOLUTION``, so a finding needs more than the limit and that.
+    Angles are known to ``RESOLUTION``, so a finding needs more than the limit plus ``RESOLUTION``.
     """
     source = Source(source.names, source.program[of], source.line[of], source.tool[of])
     limit = np.array([limits.get(int(t), math.inf) for t in source.tool.tolist()])
@@ -78,6 +88,6 @@ def engagement_findings(angle: F64, moves: Moves, of: NDArray[np.int64], source:
         span = "" if lines.min() == lines.max() else f", lines {lines.min()} to {lines.max()}"
         out.append(Finding(FindingKind.ENGAGEMENT, source.names[source.program[m]], int(source.line[m]), None, None,
                            (x, y, z), float(math.degrees(angle[m] - limit[m])), float(math.degrees(limit[m])),
-                           f"T{source.tool[m]}: {math.degrees(angle[m]):.0f} deg of the cutter are in stock (limit "
+                           f"T{source.tool[m]}: engaged angle {math.degrees(angle[m]):.0f} deg (limit "
                            f"{math.degrees(limit[m]):.0f} deg){span}", len(rows), tip=(x, y, z)))
     return out

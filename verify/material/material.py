@@ -1,4 +1,7 @@
-"""What the moves do to the stock and what they touch, by the model that suits their tool axes."""
+"""Runs the moves through the stock and collects contacts, with the stock model that suits their tool axes.
+
+Arrays of coordinates are float64, mm, in the setup frame.
+"""
 
 from __future__ import annotations
 
@@ -15,25 +18,25 @@ from verify.checks.clear_height import top_of_all
 from verify.kernels.stock import FIXTURE, HOLDER, NECK, PLUNGE, SHANK
 from verify.material.collision import fixture_points, run_clashes
 from verify.material.dogleg_rapids import spread
-from verify.material.stock_field import Field, run_field, stock_field
+from verify.material.stock_field import DistanceField, run_field, stock_field
 from verify.material.stock_lines import blank, run_bodies, run_stock
 from verify.material.stock_pass import StockPass, end_radii, free_rapids, parts
 from verify.model import ProofSetup
 from verify.moves import Moves
-from verify.progress import Report, Stages
+from verify.progress import Report, StageProgress
 from verify.tool_axes import ToolAxes
 
 LINES_APART, NODES_APART = 0.7, 0.6  # radii of the finest end between lines, and between nodes
 
 
 @dataclass(frozen=True, eq=False)
-class Contacts:
-    """What one pass over the stock and the points of the part found.
+class MaterialContacts:
+    """Result of one pass over the stock and the points of the part.
 
-    run     : StockPass; its events hold those of the part as well, the deeper first
+    run     : StockPass; its events include those of the part, the deeper first
     spacing : mm between the lines or nodes of the stock
-    upright : whether those were lines of one height
-    dip     : mm a ball may be in a fixture, between the points looked at, before it is seen
+    upright : whether the stock was a field of vertical lines
+    dip     : mm, largest unseen penetration of a ball into a fixture
     """
 
     run: StockPass
@@ -43,16 +46,18 @@ class Contacts:
 
 
 def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
-             slides: F64 | None, threads: int, progress: Callable[[float], None]) -> Contacts:
+             slides: F64 | None, threads: int, progress: Callable[[float], None]) -> MaterialContacts:
     """Run all moves through the stock and past the part.
 
-    mesh, points : of the part, mm, setup frame; points (n, 3) are watched for necks, shanks and holders
-    slides       : where the linear axes point, move by move (``verify.material.dogleg_rapids``); only used where rapids are doglegs
+    mesh   : of the part, mm, setup frame
+    points : (n, 3) float64, mm, of the part; necks, shanks and holders are checked against them
+    slides : (m, 3, 3) float64, dimensionless, directions of the linear axes for each move, setup frame, or None; used
+             only where rapids are doglegs (``verify.material.dogleg_rapids``)
 
-    Lines of one height serve tools along Z, a field of distances those that lean (``verify.material.stock_lines``, ``verify.material.stock_field``)
-    and those whose flutes cut under what stands.
+    Tools along Z use vertical lines of one height (``verify.material.stock_lines``) [VanHook1986]. Tilted tools, and
+    flutes that cut below overhangs, use a field of distances (``verify.material.stock_field``).
     """
-    stages, given, origin = Stages(progress), moves, None
+    stages, given, origin = StageProgress(progress), moves, None
     spacing = stock_spacing(setup, moves, tools)
     if setup.dogleg:
         moves, origin = spread(moves, slides, *dogleg_limits(mesh, moves, tools, setup))
@@ -60,7 +65,7 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
     if upright:
         run, spacing = _lines(mesh, spacing, moves, tools, setup, threads, stages.span(0.0, 0.6))
         upright = not _undercuts(run, moves, setup)
-        dug = dug if upright else run.events[run.events[:, 1] == PLUNGE]  # line by line they are known better
+        dug = dug if upright else run.events[run.events[:, 1] == PLUNGE]  # lines know plunges better than the field
         moves = moves if upright else replace(moves, axes=ToolAxes.upright(len(moves)))
     held, dip = fixture_points(setup, mesh.bounds, moves, tools)
     if upright:
@@ -78,22 +83,22 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
         known = (run.events[:, 1] == PLUNGE) & np.isin(run.events[:, 0], dug[:, 0])
         run = replace(run, events=np.concatenate([run.events[~known], dug]))
         spacing = field.step
-    return Contacts(_of_origin(_merge(run.events, met), run, lost, origin, moves, given, tools),
+    return MaterialContacts(_of_origin(_merge(run.events, met), run, lost, origin, moves, given, tools),
                     spacing, upright, dip)
 
 
 def _lines(mesh: TriangleMesh, spacing: float, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
            threads: int, progress: Report) -> tuple[StockPass, float]:
     """The pass over lines of one height, and mm between them."""
-    stages = Stages(progress)
+    stages = StageProgress(progress)
     lines = blank(mesh, spacing, setup, threads=threads, progress=stages.span(0.0, 0.2))
     return run_stock(lines, moves, tools, setup, threads=threads, progress=stages.span(0.2, 1.0)), lines.step
 
 
 def _undercuts(run: StockPass, moves: Moves, setup: ProofSetup) -> bool:
-    """Whether flutes went under stock or part that no body above them met, which lines of one height cannot follow.
+    """Whether flutes cut below stock or part without contact of a body above them; lines of one height cannot show it.
 
-    Stock of a box or an upright cylinder stands under itself until a feed move takes it from below.
+    A box or an upright cylinder has no overhang until a feed move cuts it from below.
     """
     if run.under is None:
         return False
@@ -104,10 +109,10 @@ def _undercuts(run: StockPass, moves: Moves, setup: ProofSetup) -> bool:
 
 
 def stock_spacing(setup: ProofSetup, moves: Moves, tools: Sequence[ToolBody]) -> float:
-    """mm wanted between lines or nodes of the stock: what the setup says, or what the finest end that cuts still meets.
+    """Distance between lines or nodes of the stock, mm: that of the setup, or less for the thinnest cutting end.
 
-    A square lattice has a line in every circle of 1 / sqrt 2 of its spacing. Lines lie twice as close and nodes closer
-    still, as an end may come down on a rest that is narrower than itself.
+    A square lattice has a line in every circle of radius 1 / sqrt 2 of its spacing. Lines are twice as close, and nodes
+    closer still, since an end may come down on rest material that is narrower than itself.
     """
     used = np.unique(moves.tool[moves.feed])
     share = LINES_APART if moves.axes is None else NODES_APART
@@ -116,8 +121,8 @@ def stock_spacing(setup: ProofSetup, moves: Moves, tools: Sequence[ToolBody]) ->
 
 def unseen(tools: Sequence[ToolBody], spacing: float, upright: bool) -> list[ToolBody]:
     """The tools whose end may come down between lines or nodes of the stock that are ``spacing`` mm apart."""
-    least = spacing / (LINES_APART if upright else NODES_APART) - 1e-9
-    return [t for t, end in zip(tools, end_radii(tools).tolist(), strict=True) if end < least]
+    min_radius = spacing / (LINES_APART if upright else NODES_APART) - 1e-9
+    return [t for t, end in zip(tools, end_radii(tools).tolist(), strict=True) if end < min_radius]
 
 
 def dogleg_limits(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup) -> tuple[F64, float]:
@@ -128,7 +133,7 @@ def dogleg_limits(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], s
 
 def _with_points(met: F64, lost: int, points: F64, chosen: NDArray[np.bool_], fixed: bool, moves: Moves,
                  tools: Sequence[ToolBody], setup: ProofSetup, threads: int) -> tuple[F64, int]:
-    """Events and losses with those of the chosen moves at points, of fixtures or of the part, added."""
+    """Events and losses, with the contacts of the chosen moves at points of fixtures or part added."""
     rows = np.flatnonzero(chosen)
     more, away = run_clashes(points, np.full(len(points), fixed), moves.only(chosen), tools, setup, threads=threads,
                              free=free_rapids(moves)[chosen])
@@ -138,7 +143,7 @@ def _with_points(met: F64, lost: int, points: F64, chosen: NDArray[np.bool_], fi
 
 def _of_origin(events: F64, run: StockPass, lost: int, origin: NDArray[np.int64] | None, moves: Moves, given: Moves,
                tools: Sequence[ToolBody]) -> StockPass:
-    """The pass in terms of the moves given, where some of them, rapids, were spread out."""
+    """The pass in terms of the original moves, where some rapids were spread out."""
     if origin is None:
         return StockPass(events, run.lost + lost, run.cut, run.engaged, run.taken)
     events = events.copy()
@@ -155,21 +160,22 @@ def _of_origin(events: F64, run: StockPass, lost: int, origin: NDArray[np.int64]
 
 
 def machined(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, step: float, *,
-             box: F64 | None = None, threads: int = 2, progress: Callable[[float], None] | None = None) -> Field:
-    """The stock after all feed moves, as fine as asked.
+             box: F64 | None = None, threads: int = 2,
+             progress: Callable[[float], None] | None = None) -> DistanceField:
+    """The stock after all feed moves.
 
-    step : mm between nodes, wider where that would take over 24 million of them
-    box  : (2, 3) float64, mm, the piece of space looked at, a few steps wider; all of the stock where None
+    step : mm between nodes, wider where that needs over 24 million nodes
+    box  : (2, 3) float64, mm, setup frame, region of interest, made a few steps wider; all of the stock where None
     progress : called with 0..1, never less than before; an exception from it ends the work at once
     """
-    stages = Stages(progress)
+    stages = StageProgress(progress)
     field = stock_field(mesh, setup, step, box=box, threads=threads, progress=stages.span(0.0, 0.2))
     run_field(field, moves.only(moves.feed), tools, setup, bare=True, threads=threads, progress=stages.span(0.2, 1.0))
     return field
 
 
 def _merge(a: F64, b: F64) -> F64:
-    """Events of both passes, the deeper first where both saw the same body in the same move."""
+    """Events of both passes, the deeper first where both have the same body in the same move."""
     events = np.concatenate([a, b])
     order = np.lexsort((events[:, 6], events[:, 5], events[:, 4], -events[:, 2], events[:, 1], events[:, 0]))
     return np.asarray(events[order])

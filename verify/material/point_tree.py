@@ -1,4 +1,4 @@
-"""Points in nested balls: what a tool that may lean any way is near to."""
+"""Points in nested balls, to find those near a tool of any tilt. Coordinates are float64, mm, in the setup frame."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ BITS = 16
 
 @dataclass(frozen=True, eq=False)
 class PointTree:
-    """Points along a space-filling curve, in chunks of 4096, each a tree of balls of 512, 64 and 8 points.
+    """Points along a Z-order curve [Morton1966], in chunks of 4096, each a tree of balls of 512, 64 and 8 points.
 
-    order : (n,) int64, numbers of the points along the curve
+    order : (n,) int64, index, numbers of the points along the curve
     balls : four (k, 4) float64 tables, centre and radius in mm of the balls of 8, 64, 512 and 4096 points in that
             order, whole chunks; radius -1 where a ball is empty
     """
@@ -29,7 +29,10 @@ class PointTree:
 
     @classmethod
     def build(cls, points: F64) -> PointTree:
-        """Sort (n, 3) points, mm; n may be 0."""
+        """Sort points along the curve of [Morton1966] and enclose them in balls.
+
+        points : (n, 3) float64, mm, any frame; n may be 0
+        """
         order = np.argsort(curve_keys(points), kind="stable")
         chunks = -(-len(points) // CHUNK)
         padded = np.full((chunks * CHUNK, 3), np.nan)
@@ -38,12 +41,17 @@ class PointTree:
 
     @property
     def chunks(self) -> int:
-        """How many chunks there are."""
+        """Number of chunks."""
         return len(self.balls[3])
 
 
 def curve_keys(points: F64) -> NDArray[np.uint64]:
-    """(n,) uint64 places of (n, 3) points, mm, on a Z-order curve of 2^16 cells a side round them."""
+    """Places of points on a Z-order curve of 2^16 cells a side round them: interleaved bits [Morton1966].
+
+    points : (n, 3) float64, mm, any frame
+
+    Returns (n,) uint64, index.
+    """
     if len(points) == 0:
         return np.zeros(0, np.uint64)
     lower = points.min(axis=0)

@@ -1,8 +1,8 @@
-"""The stock in process where tools lean or turn: signed distances on a grid, cut in place.
+"""The stock in process where tools tilt or turn: signed distances on a grid, cut in place.
 
-Where the axis never leaves Z, vertical lines of one height do (``verify.material.stock_lines``); a tool that leans cuts under what
-stands above it. The error is that of the grid (``verify.kernels.field``): nothing is taken for stock that is gone, and
-what stands between nodes is seen unless it is thinner than their distance. Residuals on the part do not come from here.
+Vertical lines of one height suffice where the axis stays along Z (``verify.material.stock_lines``); a tilted tool can
+cut under an overhang. The error is that of the grid (``verify.kernels.field``): removed stock never counts as standing,
+and stock between nodes is seen unless it is thinner than their distance. Residuals on the part do not come from here.
 """
 
 from __future__ import annotations
@@ -40,17 +40,19 @@ from verify.tool_axes import ToolAxes, sector_frames
 from verify.tool_bodies import Bodies
 
 F32 = NDArray[np.float32]
-MOST_NODES = 24_000_000
+MAX_NODES = 24_000_000
 TILE = 64
-WHOLE, LEAST_NODES = 0.85, 4.0  # of the end, and nodes: what stands on stock is known no better
+WHOLE, MIN_NODES = 0.85, 4.0  # share of the end, and nodes: accuracy of the area of an end that stands on stock
 SLAB = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Field:
-    """Node (i, j, k) at origin + (i, j, k) step: distance into the stock, cut off at ``band`` either way.
+class DistanceField:
+    """Signed distances into the stock, limited to ``band``; node (i, j, k) is at origin + (i, j, k) step.
 
-    origin : (3,) float64, mm; values : (nx, ny, nz) float32, mm, above zero where stock stands
+    origin : (3,) float64, mm, setup frame
+    step   : mm between nodes
+    values : (nx, ny, nz) float32, mm, above zero where stock stands
     """
 
     origin: F64
@@ -59,17 +61,17 @@ class Field:
 
     @property
     def band(self) -> float:
-        """Where distances are cut off, mm: the step as a float32, so that a node that is gone is known for one."""
+        """Limit of the distances, mm: the step as a float32, so that a removed node is recognised."""
         return float(np.float32(self.step))
 
     @property
     def volume(self) -> float:
-        """Stock, mm³."""
+        """Volume of the stock, mm³."""
         cells = sum(float(np.clip(0.5 + v / self.step, 0.0, 1.0).sum(dtype=np.float64)) for v in self.values)
         return cells * self.step**3
 
     def surface(self) -> TriangleMesh:
-        """The stock as a closed mesh; facets of a face number 0. Empty where no stock stands."""
+        """The stock as a closed surface net [Gibson1998], all facets of face number 0; empty where no stock stands."""
         padded = np.pad(self.values, 1, constant_values=-self.step)
         number = np.empty(tuple(n - 1 for n in padded.shape), np.int32)
         vertices = np.empty((net_vertices(padded, number, np.empty((0, 3)), self.step), 3))
@@ -80,14 +82,15 @@ class Field:
 
 
 def stock_field(mesh: TriangleMesh, setup: ProofSetup, step: float, *, box: F64 | None = None,
-                threads: int = 2, progress: Progress | None = None) -> Field:
+                threads: int = 2, progress: Progress | None = None) -> DistanceField:
     """The stock before the first cut.
 
-    mesh : of the part, mm; step : mm between nodes, wider where that would take over 24 million
-    box  : (2, 3) float64, mm, the piece of space wanted; all of the stock where None
+    mesh : of the part, mm
+    step : mm between nodes, wider where that needs over 24 million nodes
+    box  : (2, 3) float64, mm, setup frame, region of interest; all of the stock where None
     """
     lower, upper = stock_bounds(mesh.bounds, setup) if box is None else np.asarray(box, dtype=np.float64)
-    step = max(step, float(np.cbrt((upper - lower + 4 * step).prod() / MOST_NODES)))
+    step = max(step, float(np.cbrt((upper - lower + 4 * step).prod() / MAX_NODES)))
     counts = np.ceil((upper - lower) / step).astype(int) + 4
     origin = 0.5 * (lower + upper) - 0.5 * step * (counts - 1)
     values = np.empty(tuple(counts.tolist()), np.float32)
@@ -97,7 +100,7 @@ def stock_field(mesh: TriangleMesh, setup: ProofSetup, step: float, *, box: F64 
         _grown(values, origin, step, blank_mesh(setup), setup.uncertainty, threads, progress)
     else:
         _simple(values, origin, step, mesh.bounds, setup)
-    return Field(origin, step, values)
+    return DistanceField(origin, step, values)
 
 
 def _simple(values: F32, origin: F64, step: float, bounds: F64, setup: ProofSetup) -> None:
@@ -118,7 +121,7 @@ def _simple(values: F32, origin: F64, step: float, bounds: F64, setup: ProofSetu
 
 def _grown(values: F32, origin: F64, step: float, mesh: TriangleMesh, reach: float, threads: int,
            progress: Progress | None) -> None:
-    """Part or blank grown by ``reach`` all round: the surface of nodes near it is looked up, others are in or not."""
+    """Part or blank grown by ``reach``: nodes near the surface get their distance, others are inside or outside."""
     inside = np.zeros(values.shape, np.bool_)
     cuts = np.linspace(0, len(values), 4 * max(threads, 1) + 1).astype(int)
 
@@ -139,18 +142,18 @@ def _grown(values: F32, origin: F64, step: float, mesh: TriangleMesh, reach: flo
 
 def _grown_slab(values: F32, inside: NDArray[np.bool_], origin: F64, step: float, tree: TriangleTree,
                 reach: float) -> None:
-    """Four layers of nodes: bricks of 4, then of 2, are wholly stock, wholly not, or looked up node by node."""
-    # where the margin is a step or more, whatever is inside the part is a step from the air
+    """Four layers of nodes: bricks of 4, then of 2, are wholly inside, wholly outside, or computed node by node."""
+    # where the margin is a step or more, places inside the part are at least a step from the surface
     unsure = ~inside if reach >= step else np.ones_like(inside)
     values[:] = step
     for size in (4, 2):
         half = 0.5 * math.sqrt(3.0) * (size - 1) * step
-        asked = np.logical_or.reduceat(unsure, np.arange(0, unsure.shape[0], size), axis=0)
+        lookup = np.logical_or.reduceat(unsure, np.arange(0, unsure.shape[0], size), axis=0)
         for axis in (1, 2):
-            asked = np.logical_or.reduceat(asked, np.arange(0, unsure.shape[axis], size), axis=axis)
-        gap = np.full(asked.shape, reach)
-        centres = (np.argwhere(asked) * size + 0.5 * (size - 1)) * step + origin
-        gap[asked] = nearest(tree, centres, reach + step + half)[0]
+            lookup = np.logical_or.reduceat(lookup, np.arange(0, unsure.shape[axis], size), axis=axis)
+        gap = np.full(lookup.shape, reach)
+        centres = (np.argwhere(lookup) * size + 0.5 * (size - 1)) * step + origin
+        gap[lookup] = nearest(tree, centres, reach + step + half)[0]
         for axis, count in enumerate(unsure.shape):
             gap = np.repeat(gap, size, axis=axis).take(np.arange(count), axis=axis)
         values[unsure & ~inside & (gap > reach + step + half)] = -step
@@ -159,21 +162,21 @@ def _grown_slab(values: F32, inside: NDArray[np.bool_], origin: F64, step: float
     values[unsure] = np.clip(np.where(inside[unsure], reach + gap, reach - gap), -step, step)
 
 
-def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *, bare: bool = False,
+def run_field(field: DistanceField, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *, bare: bool = False,
               threads: int = 2, progress: Progress | None = None, bow: float = BOW) -> StockPass:
-    """Run all moves through the stock, in place, and collect what touches.
+    """Run all moves through the stock, in place, and collect contacts.
 
-    bare : cutting parts alone: bodies are not looked at
+    bare : whether only cutting parts are simulated, without bodies
 
     Returns StockPass. Raises VerificationError as ``cutter_table``. Same bytes for any number of threads.
 
     Notes
     -----
-    Plunge: the volume that a steep descent takes off within the end-cutting region, over the area that region goes
-    over (straight down: that part of it which stands on stock then, where that is not all), is the mean depth it dug,
-    and where in the region it lay says how much deeper its middle is than its rim; so a round end has its full depth,
-    which is told. Both add up over the moves, way made aside works them off at the
-    slope of a ramp, and what was dug where the region no longer stands is another hole.
+    Plunge: the mean depth of a steep descent is the volume that the end-cutting region removes, over the area that the
+    region covers; straight down, over the part of it that stands on stock. The distribution of the volume over the
+    region tells how much deeper its middle is than its rim, so a round end gets its full depth. Depths add up over the
+    moves. Sideways travel reduces them at the slope of a ramp. A depth that the region no longer covers is another
+    hole.
     """
     cutters, ends = cutter_table(tools), end_radii(tools)
     bodies = Bodies(np.zeros((0, 6)), np.zeros(len(tools) + 1, np.int64)) if bare else Bodies.of(tools, setup)
@@ -204,8 +207,8 @@ def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     aside = np.linalg.norm(_across(moves.end - moves.start, axes.middle), axis=1)
     over = (np.pi * end**2 + 2.0 * end * aside)
     stands = taken[:, 3] / VOLUME_UNITS
-    # straight down beside an edge only what stands on stock has dug; a few nodes alone do not say how much that is
-    partly = (aside <= 0.25 * end) & (stands < WHOLE * over) & (stands > LEAST_NODES * field.step**2)
+    # straight down beside an edge only the area on stock digs; a few nodes do not measure that area
+    partly = (aside <= 0.25 * end) & (stands < WHOLE * over) & (stands > MIN_NODES * field.step**2)
     over = np.where(partly, stands, over)[:, None]
     plunges = _plunges(moves, axes, taken[:, [1, 2]] / VOLUME_UNITS / over, end, earned,
                        setup.plunge_skin * 2.0 * cutters[:, 0], round_off(tools))
@@ -213,12 +216,12 @@ def run_field(field: Field, moves: Moves, tools: Sequence[ToolBody], setup: Proo
 
 
 def _across(way: F64, axis: F64) -> F64:
-    """Vectors (n, 3) less what of them goes along unit vectors (n, 3)."""
+    """Vectors (n, 3) less their components along unit vectors (n, 3)."""
     return np.asarray(way - (way * axis).sum(axis=1, keepdims=True) * axis)
 
 
 def round_off(tools: Sequence[ToolBody]) -> F64:
-    """(k,) float64, mm: how much less than its middle the end of each tool digs on the mean, for the shape it has."""
+    """(k,) float64, mm: depth of the middle of each tool end minus the mean depth of the end, from its shape."""
     share = (np.arange(400) + 0.5) / 400.0  # of the area of the end
     out = []
     for tool, end in zip(tools, end_radii(tools).tolist(), strict=True):
@@ -228,13 +231,13 @@ def round_off(tools: Sequence[ToolBody]) -> F64:
 
 
 def _plunges(moves: Moves, axes: ToolAxes, dug: F64, end: F64, earned: F64, skins: F64, rounds: F64) -> F64:
-    """Rows (move, PLUNGE, depth, 0, x, y, z) of the moves with which more than the skin of their tool is open.
+    """Rows (move, PLUNGE, depth, 0, x, y, z) of the moves that make the open depth larger than the skin of their tool.
 
-    dug    : (m, 2) float64, mm, mean depth of each move, and the mean of it times the square of the share of the radius
-    end    : (m,) float64, mm, radius of the end that dug it; rounds (k,) float64, mm, as ``round_off``
+    dug    : (m, 2) float64, mm, mean depth of each move, and its mean times the square of the share of the radius
+    end    : (m,) float64, mm, radius of the end that dug it; rounds : (k,) float64, mm, as ``round_off``
 
-    What was dug before counts by the share of its width that the end still stands over, so a way that goes on
-    downhill is as deep as the stock it leaves, not as deep as all its steps together.
+    Earlier depth counts by the share of the width that the end still covers. A path that goes on downhill is then as
+    deep as the stock at its end, not as deep as all its steps together.
     """
     digging = np.flatnonzero(dug[:, 0] > 0.0)
     gone = np.zeros(len(digging))
@@ -246,7 +249,7 @@ def _plunges(moves: Moves, axes: ToolAxes, dug: F64, end: F64, earned: F64, skin
         moment = kept / mean * moment + dug[m, 1] if mean > 0.0 else dug[m, 1]
         mean = kept + dug[m, 0]
         paid = earned[m]
-        # of a depth that falls with the square of the radius 4 mean - 6 moment is that of the middle
+        # for a depth that falls with the square of the radius, 4 mean - 6 moment is the depth of the middle
         depth = min(max(4.0 * mean - 6.0 * moment, mean), mean + rounds[moves.tool[m]])
         if depth > skins[moves.tool[m]]:
             rows.append((m, PLUNGE, depth, 0.0, *moves.end[m].tolist()))

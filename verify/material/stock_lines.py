@@ -1,22 +1,21 @@
-"""The stock in process, and everything that must not touch it.
+"""The stock in process as vertical lines, and the contacts of tools with it.
 
-Stock is a field of vertical lines, ``line_spacing`` apart, each solid up to one height. Blank and cuts are
-exact on every line (closed forms, no cell is ever rounded up or down), so nothing is flagged that does not
-happen; what stands wholly between two lines, thinner than the spacing, is not seen. A flank beside a wall is
-left to the normal rays, and necks, shanks and holders beside the part are checked on points of the part
-itself, so the spacing only matters for stock that is not part.
+Stock is a field of vertical lines, ``line_spacing`` apart, each solid up to one height, as in [VanHook1986] and
+[Chappel1983]. Blank and cuts are exact on every line (closed forms, no rounding to cells), so every finding is real;
+stock between two lines that is thinner than the spacing is not seen. Normal rays check flanks beside walls, and points
+of the part check necks, shanks and holders, so the spacing matters only for stock beyond the part.
 
-- A line is lowered only where the flutes reach its top when the cutter first touches it: what stands higher
-  stays and meets the neck.
-- A body no wider than the cutting part runs where the cutting part has been; its clearance never reaches
-  beyond the cutting radius, and it may overlap by the gouge tolerance.
-- In a rapid the whole assembly is grown radially by the rapid clearance, heights are not; a straight lift
-  leaves the place it stands in with no clearance asked.
-- Plunge: what feed moves steeper than the ramp angle take off a line with the end-cutting region of the tool adds
-  up, and is worked off by going sideways, at the slope of the ramp. It is a plunge where more than ``plunge_skin``
-  tool diameters are open; so one descent broken by steps aside, lifts or pecks is still one. The region is the
-  whole end of a flat, the flat and half the corner of a bull nose, and the inner half radius of a ball (to
-  30 degrees of its sphere); so a ball that finishes downhill through a thin skin does not plunge.
+- A line is lowered only where the flutes reach its top when the cutter first touches it. Higher stock stays and meets
+  the neck.
+- A body no wider than the cutting part follows it: its clearance never reaches beyond the cutting radius, and it may
+  overlap by the gouge tolerance.
+- In a rapid the whole assembly is grown radially by the rapid clearance, not in height. A straight lift needs no
+  clearance where it starts.
+- Plunge: feed moves steeper than the ramp angle remove depth from a line with the end-cutting region of the tool. The
+  depths add up; sideways travel reduces them at the slope of the ramp. It is a plunge where more than ``plunge_skin``
+  tool diameters are open, so a descent interrupted by side steps, lifts or pecks is still one descent. The end-cutting
+  region is the whole end of a flat, the flat and half the corner of a bull nose, and the inner half radius of a ball
+  (to 30 degrees of its sphere). A ball that finishes downhill through a thin skin therefore does not plunge.
 """
 
 from __future__ import annotations
@@ -48,7 +47,7 @@ from verify.material.stock_pass import (
 from verify.material.tiles import CellGrid, run_tiles
 from verify.model import ProofSetup, StockKind
 from verify.moves import Moves, Progress, cutter_table
-from verify.progress import Stages
+from verify.progress import StageProgress
 from verify.tool_bodies import Bodies
 
 MAX_LINES = 6_000_000
@@ -57,10 +56,12 @@ NEVER = -1e30
 
 
 @dataclass(frozen=True, eq=False)
-class StockField:
+class StockLines:
     """Vertical lines: line (i, j) stands at origin + ((i, j) + 0.5) step.
 
-    origin : (2,) float64, mm; height : (nx, ny) float64, mm, top of the stock
+    origin : (2,) float64, mm, setup frame
+    step   : mm between lines
+    height : (nx, ny) float64, mm, top of the stock
     """
 
     origin: F64
@@ -69,11 +70,13 @@ class StockField:
 
 
 def blank(mesh: TriangleMesh, spacing: float, setup: ProofSetup, *, threads: int = 2,
-          progress: Progress | None = None) -> StockField:
-    """The stock before the first cut, never below the part; lines are spacing mm apart, or wider to be six million.
+          progress: Progress | None = None) -> StockLines:
+    """The stock before the first cut, never below the part, as vertical lines [VanHook1986].
 
-    Exact on every line: an offset blank, or a mesh grown, is the union of spheres on the surface, by facets, edges and
-    corners.
+    spacing : mm between lines, wider where that needs over six million lines
+
+    The heights are exact on every line: an offset blank, or a grown mesh, is the union of spheres on the surface, by
+    facets, edges and corners.
     """
     box = stock_bounds(mesh.bounds, setup)
     corners = [box, mesh.bounds]
@@ -89,12 +92,12 @@ def blank(mesh: TriangleMesh, spacing: float, setup: ProofSetup, *, threads: int
     elif setup.stock_kind == StockKind.CYLINDER:
         tops = blank_cylinder(mesh.bounds, setup).tops(*np.meshgrid(x, y, indexing="ij"))
         np.copyto(height, tops, where=np.isfinite(tops))
-    stages = Stages(progress)
+    stages = StageProgress(progress)
     if setup.stock_kind == StockKind.STEP:
         _raise(height, origin, step, blank_mesh(setup), setup.uncertainty, threads, stages.span(0.0, 0.5))
     reach = setup.margin + setup.uncertainty if setup.stock_kind == StockKind.PART_OFFSET else 0.0
     _raise(height, origin, step, mesh, reach, threads, stages.span(0.5, 1.0))
-    return StockField(origin, step, height)
+    return StockLines(origin, step, height)
 
 
 def _raise(height: F64, origin: F64, step: float, mesh: TriangleMesh, reach: float, threads: int,
@@ -111,9 +114,9 @@ def _raise(height: F64, origin: F64, step: float, mesh: TriangleMesh, reach: flo
     run_tiles([job(int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True) if b > a], threads, progress)
 
 
-def run_stock(field: StockField, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *, threads: int = 2,
+def run_stock(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *, threads: int = 2,
               progress: Progress | None = None) -> StockPass:
-    """Run all moves through the stock, in place, and collect what touches.
+    """Run all moves through the stock, in place, and collect contacts; lines are cut as in [VanHook1986].
 
     Returns StockPass. Raises VerificationError as ``cutter_table``. Same bytes for any number of threads.
     """
@@ -143,9 +146,11 @@ def run_stock(field: StockField, moves: Moves, tools: Sequence[ToolBody], setup:
 
 def run_bodies(points: F64, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *, threads: int = 2,
                progress: Progress | None = None) -> tuple[F64, int]:
-    """Necks, shanks and holders of all feed moves against (n, 3) float64 points of the part, mm.
+    """Contacts of necks, shanks and holders of all feed moves with points of the part.
 
-    Returns the events (e, 7) sorted by move and the number beyond the table.
+    points : (n, 3) float64, mm, setup frame
+
+    Returns the events, (e, 7) float64, mm, sorted by move, and the number of events lost because a table is full.
     """
     if len(points) == 0 or len(moves) == 0:
         return np.zeros((0, 7)), 0

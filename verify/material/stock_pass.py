@@ -1,4 +1,7 @@
-"""What every pass over the stock shares: which moves plunge or need no clearance, and tables of what is found."""
+"""Shared by all passes over the stock: moves that plunge or need no clearance, and tables of events.
+
+Tables of events are float64 rows (move, code, depth, clearance, x, y, z), mm, in the setup frame.
+"""
 
 from __future__ import annotations
 
@@ -18,20 +21,20 @@ from verify.moves import Moves
 
 EVENTS = 4096
 ANOTHER_TOOL = 1e6  # mm
-SAME = 1e-6  # mm, and rad: ends of moves and axes that are the same
+SAME = 1e-6  # mm, and rad: closer ends of moves and axes are the same
 Spare = queue.SimpleQueue[NDArray[np.int64]]
 
 
 def descents(moves: Moves, ramp_angle: float) -> tuple[NDArray[np.bool_], F64]:
-    """Feed moves that descend steeper than ``ramp_angle`` (rad), and what ramps could have taken since the beginning.
+    """Feed moves that descend steeper than ``ramp_angle``, rad, and the depth that ramps could have removed so far.
 
-    Down is along the tool, for one that turns along its axis half way.
+    Down is along the tool axis, for a turning tool along its axis half way.
 
     Returns
     -------
-    steep : (m,) bool
-    earned : (m,) float64, mm: sideways way of all feed moves before that are not steep, times the tangent of the angle;
-             without end at a change of the tool
+    steep  : (m,) bool
+    earned : (m,) float64, mm: sideways travel of all feed moves so far that are not steep, times the tangent of the
+             angle; a tool change adds ``ANOTHER_TOOL``
     """
     d, slope = moves.end - moves.start, math.tan(ramp_angle)
     if moves.axes is None:
@@ -47,8 +50,10 @@ def descents(moves: Moves, ramp_angle: float) -> tuple[NDArray[np.bool_], F64]:
 
 
 def ways_before(moves: Moves) -> F64:
-    """(m,) float64, mm: sideways way of all upright feed moves before each; ``ANOTHER_TOOL`` mm more after each rapid
-    and each change of the tool."""
+    """(m,) float64, mm: sideways travel of all upright feed moves before each move.
+
+    Each rapid and each tool change adds ``ANOTHER_TOOL`` mm.
+    """
     d = moves.end - moves.start
     cuts = ~moves.feed
     cuts[1:] |= moves.tool[1:] != moves.tool[:-1]
@@ -57,26 +62,27 @@ def ways_before(moves: Moves) -> F64:
 
 
 def parts(moves: Moves, tools: Sequence[ToolBody]) -> NDArray[np.int64]:
-    """(m + 1,) int64: the first of the even parts of each move that engaged angles are told in, and how many there are.
+    """(m + 1,) int64, index: first of the even parts of each move that engaged angles refer to; last, their number.
 
-    Feed moves of a tool that does not turn have parts of half a radius at most, so that what is met at one end of a
-    long move is not put together with what is met at the other; the rest are one each.
+    Feed moves of a tool that does not turn have parts of half a radius at most. Contacts at one end of a long move then
+    do not add to those at the other end. All other moves have one part.
     """
-    most = WINDOW * np.array([t.radius for t in tools])[moves.tool] if len(moves) else np.zeros(0)
+    part_length = WINDOW * np.array([t.radius for t in tools])[moves.tool] if len(moves) else np.zeros(0)
     length = np.linalg.norm(moves.end - moves.start, axis=1)
     whole = ~moves.feed if moves.axes is None else ~moves.feed | (moves.axes.angle > 0.0)
-    count = np.where(whole, 1, np.maximum(np.ceil(length / np.maximum(most, 1e-9) - 1e-9), 1)).astype(np.int64)
+    count = np.where(whole, 1, np.maximum(np.ceil(length / np.maximum(part_length, 1e-9) - 1e-9), 1)).astype(np.int64)
     return np.concatenate([[0], np.cumsum(count)])
 
 
 @dataclass(frozen=True, eq=False)
 class StockPass:
-    """What one pass over the stock found.
+    """Result of one pass over the stock.
 
-    events : (e, 7) float64 rows (move, code, depth, clearance, x, y, z) sorted by move; lost : events beyond the table
-    cut    : (m,) bool, moves that took stock
-    engaged : (p,) int64, sectors of the cutter that met stock (``kernels.engaged``), by parts of moves (``parts``)
-    taken  : (m,) float64, mm³ by move, or None where that is not known
+    events : (e, 7) float64, mm, rows (move, code, depth, clearance, x, y, z) sorted by move
+    lost   : number of events lost because a table is full
+    cut    : (m,) bool, moves that removed stock
+    engaged : (p,) int64, bits, sectors of the cutter in stock (``verify.kernels.engaged``), by parts of moves
+    taken  : (m,) float64, mm³ by move, or None where unknown
     under  : (m,) bool, moves whose flutes were under stock, or None where that makes no difference
     """
 
@@ -89,28 +95,32 @@ class StockPass:
 
 
 def end_radii(tools: Sequence[ToolBody]) -> F64:
-    """(k,) float64, mm: radius of the region that cuts when the tool goes straight down (see ``verify.material.stock_lines``)."""
+    """(k,) float64, mm: radius of the end-cutting region of each tool (see ``verify.material.stock_lines``)."""
     share = {"flat": lambda t: t.radius, "ball": lambda t: 0.5 * t.radius,
              "bull": lambda t: t.radius - 0.5 * t.corner_radius}
     return np.array([share[t.kind](t) for t in tools])
 
 
 def event_table() -> F64:
-    """An empty table of events (e + 1, 7), in mm; the kernels keep in its last row how many it holds."""
+    """An empty table of events, (e + 1, 7) float64, mm; the kernels keep the number of events in its last row."""
     return np.zeros((EVENTS + 1, 7))
 
 
 def noted(events: F64) -> F64:
-    """The rows (e, 7) of a table that hold events, in mm."""
+    """The events of a table.
+
+    events : (k + 1, 7) float64, mm, as ``event_table``
+
+    Returns its filled rows, (e, 7) float64, mm.
+    """
     return events[:int(events[-1, 0])].copy()
 
 
 def free_rapids(moves: Moves) -> NDArray[np.bool_]:
-    """(m,) bool: rapids that no clearance is asked of.
+    """(m,) bool: rapids that need no clearance.
 
-    Those that draw the tool straight out along its axis, and those that put it straight back no deeper than a feed
-    move had it, with no move aside since: a peck out of its hole and into it again. A way nobody wrote down, as after
-    a visit to the machine's own zero, counts as one aside.
+    They are retracts along the tool axis, and returns along it no deeper than a feed move before, without a sideways
+    move since: a peck. An unprogrammed move, as after a visit to a fixed place of the machine, counts as sideways.
     """
     d = moves.end - moves.start
     up = np.tile([0.0, 0.0, 1.0], (len(d), 1)) if moves.axes is None else moves.axes.axis
@@ -133,9 +143,11 @@ def free_rapids(moves: Moves) -> NDArray[np.bool_]:
 
 
 def gather(results: list[object]) -> tuple[F64, int]:
-    """Events of all jobs in one table (e, 7), sorted by move, code and the deeper first, and how many were lost.
+    """Events of all jobs in one table, and the number of lost events.
 
-    results : of every job its events (k, 7), depths and places in mm, and how many it found
+    results : for every job its events, (k, 7) float64, mm, and the number it found
+
+    Returns the events, (e, 7) float64, mm, sorted by move, code and falling depth, and the number lost.
     """
     parts = [r for r in results if isinstance(r, tuple)]
     if not parts:
@@ -147,9 +159,12 @@ def gather(results: list[object]) -> tuple[F64, int]:
 
 
 def tables_for(threads: int, shape: tuple[int, ...]) -> tuple[list[NDArray[np.int64]], Spare]:
-    """A table of int64 zeros for each thread, and all of them in a queue that jobs take one from and put it back.
+    """A table of zeros for each thread, and a queue from which jobs borrow them.
 
-    Put together by an operation that knows no order, they say the same whichever thread did what.
+    shape : of a table, such as (m, 4)
+
+    Returns the tables, int64, count or bits, and the queue. An operation that does not depend on order combines them,
+    so the result is the same for any assignment of jobs to threads.
     """
     tables, spare = [np.zeros(shape, np.int64) for _ in range(max(1, threads))], Spare()
     for table in tables:

@@ -1,4 +1,4 @@
-"""Cells of samples, worked on tile by tile by several threads."""
+"""Cells of samples, processed tile by tile by several threads."""
 
 from __future__ import annotations
 
@@ -22,7 +22,9 @@ PULSE = 0.1
 class CellGrid:
     """Samples sorted into the cells of a 3-D grid.
 
-    order : (n,) int64, sample numbers sorted by cell; first : (cells + 1,) int64 start of each cell in it
+    origin : (3,) float64, mm, lower corner; size : mm, of a cell; shape : (3,) int64, count of cells
+    order  : (n,) int64, index, sample numbers sorted by cell
+    first  : (cells + 1,) int64, index, start of each cell in ``order``
     """
 
     origin: F64
@@ -33,7 +35,10 @@ class CellGrid:
 
     @classmethod
     def build(cls, points: F64, size: float = 0.35) -> CellGrid:
-        """Sort (n, 3) points in mm into cells of about ``size`` mm, coarser where that needs over 4 M cells."""
+        """Sort points into cells of about ``size`` mm, coarser where that needs over 4 million cells.
+
+        points : (n, 3) float64, setup frame, mm
+        """
         lower, upper = points.min(axis=0), points.max(axis=0)
         extent = np.maximum(upper - lower, 1e-6)
         size = max(size, float(np.cbrt(extent.prod() / MAX_CELLS)))
@@ -57,8 +62,8 @@ class CellGrid:
 def run_tiles(jobs: Sequence[Callable[[], object]], threads: int, progress: Progress | None = None) -> list[object]:
     """Run independent jobs on ``threads`` threads and return their results in order.
 
-    progress receives the share done after each job, and again every ``PULSE`` s while one takes longer. An exception
-    it raises (a cancelled job) ends the run at once: jobs that wait are dropped, those that run are not waited for.
+    progress : called with the share done after each job, and every ``PULSE`` s during longer ones. An exception from it
+               (a cancelled job) ends the run at once: waiting jobs are dropped, and running jobs are not awaited.
     """
     ended: queue.SimpleQueue[Future[object]] = queue.SimpleQueue()
     pool = ThreadPoolExecutor(max(1, threads))

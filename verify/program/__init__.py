@@ -1,4 +1,4 @@
-"""A program as the proof sees it: moves, arcs as chords, times, axes.
+"""A program as the proof takes it: moves, arcs as chords, times, axes.
 
-How a control spells them is not known here.
+The words of controls are not known here.
 """

@@ -20,7 +20,7 @@ class ArcError(ValueError):
 
 
 class ArcTooLong(ArcError):
-    """An arc that would need more points than allowed; ``points`` is how many."""
+    """An arc that needs more points than allowed; ``points`` is their number."""
 
     def __init__(self, points: float) -> None:
         super().__init__(f"an arc of {points:.3g} points")
@@ -28,9 +28,18 @@ class ArcTooLong(ArcError):
 
 
 def centre_from_radius(start: F64, end: F64, radius: float, clockwise: bool, axes: tuple[int, int, int]) -> F64:
-    """Centre (2,) in plane axes of an arc given by R; a negative radius asks for the longer way.
+    """Centre of an arc given by R, as in [Kramer2000]; a negative radius means the longer arc.
 
-    Raises ArcError where both ends coincide or lie further apart than 2 R (more than 0.01 mm).
+    start, end : (3,) float64, mm, coordinates of X, Y, Z
+    radius     : mm
+    axes       : axes of the plane and the third axis, as ``PLANE_AXES``
+
+    Returns (2,) float64, mm, coordinates along the axes of the plane.
+
+    Raises
+    ------
+    ArcError
+        Both ends coincide, or are more than 2 R + 0.01 mm apart.
     """
     a, b = start[list(axes[:2])], end[list(axes[:2])]
     chord = b - a
@@ -45,17 +54,28 @@ def centre_from_radius(start: F64, end: F64, radius: float, clockwise: bool, axe
 
 
 def arc_points(start: F64, end: F64, centre: F64, clockwise: bool, axes: tuple[int, int, int], turns: int = 1,
-               chord: float = CHORD, most: int = 200_000) -> F64:
+               chord: float = CHORD, max_points: int = 200_000) -> F64:
     """Points of an arc or helix after its start.
 
-    start, end : (3,) float64, mm; centre : (2,) float64, mm, in plane axes
-    turns      : as the P word: full turns begun
-    chord      : mm, largest distance of the polyline from the arc; the points lie on it
-    most       : points at most
+    start, end : (3,) float64, mm, coordinates of X, Y, Z
+    centre     : (2,) float64, mm, coordinates along the axes of the plane
+    turns      : the P word: full turns begun
+    chord      : mm, largest distance of the polyline from the arc; the points lie on the arc
+    max_points : largest number of points
 
     Returns (k, 3) float64, mm, the last row equal to ``end``. Equal ends in the plane make a full circle.
-    Raises ArcError where the two radii differ by more than 0.01 mm and 0.1 %, or 0.5 mm; ArcTooLong, before any
-    memory is taken, where ``most`` would not do.
+
+    Raises
+    ------
+    ArcError
+        The two radii differ by more than 0.01 mm and 0.1 %, or by 0.5 mm.
+    ArcTooLong
+        The arc needs more than ``max_points``; no memory is used before.
+
+    Notes
+    -----
+    Sense, helix and turns are those of RS274/NGC [Kramer2000]. A chord of the angle a leaves a circle of radius r by
+    r (1 - cos(a / 2)).
     """
     i, j, k = axes
     u, v = start[[i, j]] - centre, end[[i, j]] - centre
@@ -63,7 +83,8 @@ def arc_points(start: F64, end: F64, centre: F64, clockwise: bool, axes: tuple[i
     if r0 < 1e-9:
         raise ArcError("the centre of the arc lies on its start")
     if abs(r0 - r1) > min(max(0.01, 1e-3 * r0), 0.5):
-        raise ArcError(f"start and end lie {abs(r0 - r1):.4g} mm off one circle (radii {r0:g} and {r1:g})")
+        raise ArcError(f"start and end of the arc lie on circles of different radii, {r0:g} and {r1:g} mm "
+                       f"({abs(r0 - r1):.4g} mm apart)")
     a0 = math.atan2(u[1], u[0])
     sweep = math.atan2(v[1], v[0]) - a0
     sweep = -((-sweep) % math.tau) if clockwise else sweep % math.tau
@@ -74,7 +95,7 @@ def arc_points(start: F64, end: F64, centre: F64, clockwise: bool, axes: tuple[i
     # 4 asin(sqrt(c / 2r)) is 2 acos(1 - c / r) without its loss of digits on large radii
     step = 4 * math.asin(math.sqrt(min(chord / max(r0, r1), 0.5) / 2))
     n = max(1, math.ceil(abs(sweep) / step))
-    if n > most:
+    if n > max_points:
         raise ArcTooLong(n)
     f = np.arange(1, n + 1) / n
     radius = r0 + (r1 - r0) * f

@@ -1,7 +1,7 @@
-"""Where the rotary axes stand move by move, and how long turning moves take: notes beside the rows of the log.
+"""Angles of the rotary axes and times of turning moves, kept apart from the rows of the log.
 
-Most moves of most programs turn nothing, and of those the log writes nothing here: an entry holds from its move on,
-so what stands between two entries stands where the first one ended.
+Most moves turn no axis and have no entry here. An entry holds from its move on: between two entries the axes stand
+where the first one ends.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ class TurnLog:
         self._minutes: list[tuple[int, float]] = []
 
     def stand(self, move: int, turn: Sequence[float]) -> None:
-        """Note that the axes stand at ``turn`` (2,) deg from a move on, however they got there."""
+        """Record that the axes stand at ``turn`` (2,) deg from a move on."""
         self._entries.append((move, turn[0], turn[1], turn[0], turn[1]))
 
     def swing(self, move: int, start: Sequence[float], end: Sequence[float], minutes: float) -> None:
-        """Note that a move turns the axes from ``start`` to ``end`` (2,) deg in ``minutes``, nan for a rapid."""
+        """Record that a move turns the axes from ``start`` to ``end`` (2,) deg in ``minutes``, nan for a rapid."""
         self._entries.append((move, start[0], start[1], end[0], end[1]))
         self._minutes.append((move, minutes))
 
     def poses(self, moves: int, machine: Kinematics | None) -> Poses | None:
         """Poses of all moves of a program; None where no axis ever leaves 0.
 
-        moves   : how many there are
-        machine : whose axes they are; None without any
+        moves   : number of moves
+        machine : rotary axes of the machine, or None
         """
         entries = np.array(self._entries)
         if machine is None:
@@ -50,13 +50,13 @@ class TurnLog:
         return Poses(machine.axis(start), machine.axis(end), start, end)
 
     def minutes(self, length: F64, feed: F64) -> F64:
-        """(m,) float64, min every move takes; nan for rapids.
+        """(m,) float64, min: time of every move; nan for rapids.
 
-        length : (m,) float64, mm, what the tip moves
-        feed   : (m,) float64, mm/min, nan for rapids; where an axis turns, the time noted counts instead
+        length : (m,) float64, mm, path of the tip
+        feed   : (m,) float64, mm/min, nan for rapids; the recorded time replaces it where an axis turns
         """
         out = np.where(np.isnan(feed), np.nan, 0.0)
-        with np.errstate(over="ignore"):  # a feed of next to none takes for ever
+        with np.errstate(over="ignore"):  # a feed near 0 takes infinitely long
             np.divide(length, feed, out=out, where=(length > 0) & (feed != 0))
         if self._minutes:
             noted = np.array(self._minutes)

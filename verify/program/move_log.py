@@ -1,4 +1,4 @@
-"""What a reading writes down: moves, remarks, errors, each with its line, none of them without bound."""
+"""Record of a reading: moves, remarks and errors with their lines, each of bounded number."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from geometry.errors import ProgramError, VerificationError
 from geometry.mesh import F64
 from verify.program.axis_log import TurnLog
 from verify.program.move_kinds import FEED
-from verify.program.program import Pause, Remark, Stop
+from verify.program.program import Pause, Remark, StopPoint
 
 MAX_ERRORS = 20
 MAX_REMARKS = 20
-MOST_MOVES = 5_000_000
-MOST_MOVES_A_BLOCK = 200_000
+MAX_MOVES = 5_000_000
+MAX_MOVES_A_BLOCK = 200_000
 _CHUNK = 65_536
 Row = tuple[float, float, float, float, float, float, int, float, int, int]
 
 
 class Log:
-    """Notes of one reading.
+    """Record of one reading.
 
     name : of the program
-    line : 1-based, the one being read
+    line : 1-based number of the current line
     speeds, unknown, stops, blend, leaves, changes, unbounded, pauses : as in ``Program``
     rows : latest moves as (start x, y, z, end x, y, z, kind, feed, tool, line), mm and mm/min; call ``flush`` at 65 536
     """
@@ -45,7 +45,7 @@ class Log:
         self._feeds = False
         self.speeds: dict[int, tuple[float, int]] = {}
         self.unknown: list[tuple[int, int]] = []
-        self.stops: list[Stop] = []
+        self.stops: list[StopPoint] = []
         self.blend = self.leaves = 0.0
         self.changes = 0
         self.unbounded = False
@@ -65,13 +65,13 @@ class Log:
         return bool(self.rows) or self._moves > 0
 
     def error(self, message: str, line: int | None = None, remedy: str | None = None) -> None:
-        """Note a line that cannot be read; the present one where ``line`` is None. The first error's remedy is told."""
+        """Record a line that cannot be read, the current one where ``line`` is None; the first remedy is reported."""
         if not self.errors:
             self._remedy = remedy
         self.errors.append((line or self.line, message))
 
     def remark(self, key: str, message: str, detail: object = None, line: int | None = None) -> None:
-        """Note what should not be run, once for each key and detail; of one key 20 are kept and the rest counted."""
+        """Record a remark, once for each key and detail; 20 of one key are kept and the rest counted."""
         if (key, detail) in self._remarks:
             return
         self._count[key] = self._count.get(key, 0) + 1
@@ -79,12 +79,12 @@ class Log:
             self._remarks[key, detail] = Remark(line or self.line, message)
 
     def note(self, message: str) -> None:
-        """Note what should be known and hinders nothing, once each, twenty at most."""
+        """Record a note, once each, twenty at most."""
         if message not in self.notes and len(self.notes) < MAX_REMARKS:
             self.notes.append(message)
 
     def remarks(self) -> tuple[Remark, ...]:
-        """All remarks by line; the last kept of a key says how many more there are."""
+        """All remarks by line; the last one kept of a key gives the number of those left out."""
         kept = {key: max((r for (k, _), r in self._remarks.items() if k == key), key=lambda r: r.line)
                 for key, n in self._count.items() if n > MAX_REMARKS}
         more = {id(r): f" (and {self._count[key] - MAX_REMARKS} more such lines)" for key, r in kept.items()}
@@ -100,41 +100,41 @@ class Log:
         self.rows.append((*start, *end, kind, feed, tool, self.line))  # type: ignore[arg-type]
 
     def turns(self, tool: int, speed: float) -> None:
-        """Note that a tool turns at ``speed``, 1/min."""
+        """Record that a tool turns at ``speed``, 1/min."""
         if speed > self.speeds.get(tool, (0.0, 0))[0]:
             self.speeds[tool] = speed, self.line
 
     def runs(self, speed: float, coolant: bool) -> None:
-        """Note that from the next move on the spindle turns at ``speed``, 1/min, 0 where it stands, and the coolant."""
+        """Record spindle speed, 1/min (0: it stands), and coolant from the next move on."""
         if (speed, coolant) != self._states[-1][1:]:
             self._states.append((self.count, speed, coolant))
 
     def states(self) -> tuple[F64, NDArray[np.bool_]]:
-        """(m,) float64, 1/min, and (m,) bool: speed and coolant of all moves."""
+        """Spindle speed, (m,) float64, 1/min, and coolant, (m,) bool, of all moves."""
         begun, speed, coolant = zip(*self._states, strict=True)
         row = np.searchsorted(np.array(begun), np.arange(self.count), side="right") - 1
         return np.array(speed)[row], np.array(coolant)[row]
 
     def room(self, moves: float) -> None:
-        """Refuse a block of ``moves`` moves that would be too long, before it is written out.
+        """Refuse a block of ``moves`` moves that is too long, before it is written.
 
         Raises
         ------
         VerificationError
             Code program_too_long: over 200 000 moves in the block or 5 000 000 in the program.
         """
-        if moves > MOST_MOVES_A_BLOCK:
-            self._too_long(f"one block makes {moves:.6g} moves", moves, MOST_MOVES_A_BLOCK, self.line)
-        if self.count + moves > MOST_MOVES:
-            self._too_long("the program makes too many moves", self.count + moves, MOST_MOVES, self.line)
+        if moves > MAX_MOVES_A_BLOCK:
+            self._too_long(f"one block makes {moves:.6g} moves", moves, MAX_MOVES_A_BLOCK, self.line)
+        if self.count + moves > MAX_MOVES:
+            self._too_long("the program makes too many moves", self.count + moves, MAX_MOVES, self.line)
 
     def flush(self) -> None:
-        """Pack the latest moves; refuses the program as ``room`` does where they are too many by now."""
+        """Pack the latest moves; refuse the program as ``room`` does where it has too many."""
         if not self.rows:
             return
-        if self.count > MOST_MOVES:
-            self._too_long("the program makes too many moves", self.count, MOST_MOVES,
-                           self.rows[MOST_MOVES - self._moves][9])
+        if self.count > MAX_MOVES:
+            self._too_long("the program makes too many moves", self.count, MAX_MOVES,
+                           self.rows[MAX_MOVES - self._moves][9])
         self._moves += len(self.rows)
         chunk = np.array(self.rows, dtype=np.float64)
         self._feeds |= bool((chunk[:, 6] == FEED).any())
@@ -148,12 +148,18 @@ class Log:
         return feeds
 
     def table(self) -> F64:
-        """(m, 10) float64, mm: all rows."""
+        """(m, 10) float64, mm: all rows, as ``rows`` has them, in the setup frame."""
         self.flush()
         return np.concatenate(self._chunks) if self._chunks else np.zeros((0, 10))
 
     def raise_errors(self) -> None:
-        """Raise ProgramError where a line could not be read."""
+        """Refuse a program with lines that cannot be read.
+
+        Raises
+        ------
+        ProgramError
+            The subjects name the lines.
+        """
         if not self.errors:
             return
         errors = list(dict.fromkeys(self.errors))  # a line in a loop is named once
@@ -161,10 +167,11 @@ class Log:
         more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
         raise ProgramError(f"{self.name}, line {line}: {message}{more}",
                            subjects=tuple(f"line {n}" for n, _ in errors), measured=[m for _, m in errors],
-                           remedy=self._remedy or "correct the lines named, or leave out what the reader does not know")
+                           remedy=self._remedy or "correct the named lines, or remove words that the reader does not "
+                                                  "know")
 
-    def _too_long(self, what: str, moves: float, limit: int, line: int) -> None:
-        raise VerificationError(f"{self.name}, line {line}: {what}, and {limit} are allowed", code="program_too_long",
+    def _too_long(self, problem: str, moves: float, limit: int, line: int) -> None:
+        raise VerificationError(f"{self.name}, line {line}: {problem} ({limit} allowed)", code="program_too_long",
                                 subjects=(f"line {line}",), measured=int(min(moves, 1e18)), limit=limit,
                                 remedy="correct the turns, radius, peck, repeats or rotary words of the line, or split "
                                        "the program")

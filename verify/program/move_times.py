@@ -1,4 +1,4 @@
-"""How long a machine takes for each move of a program."""
+"""Times of the moves of a program on a machine."""
 
 from __future__ import annotations
 
@@ -14,17 +14,21 @@ from verify.program.move_kinds import RAPID
 from verify.program.program import Program
 
 RAPID_TURN = float(np.radians(7200.0))
-"""rad/min, of a rotary axis in a rapid, where nobody says: 20 turns."""
+"""rad/min, of a rotary axis in a rapid where the setup gives no rate: 20 turns."""
 PATH = 0.001
-"""mm, by which corners are passed where a program allows less, or says nothing: its coordinates are no finer."""
+"""mm, deviation at corners where a program allows less or states none: its coordinates are no finer."""
 
 
 def minutes_of(program: Program, setup: ProofSetup) -> F64:
-    """Minutes (m,) float64 of the moves of a program, speeding up and slowing down counted, dwells not.
+    """Time of each move of a program with acceleration and deceleration, without dwells.
 
-    The control stands still where the tool is changed, where a rotary axis alone moves, and between rapids and feed
-    moves, which no control blends. Moves of one line are chords of its arc. A feed move whose minutes nobody knows, as
-    nobody knows where it starts, counts as a rapid.
+    Returns (m,) float64, min.
+
+    Notes
+    -----
+    The control stops at tool changes, where only a rotary axis moves, and between rapids and feed moves, which no
+    control blends. Moves of one line are chords of its arc. A feed move of unknown time, since its start is unknown,
+    counts as a rapid. The profile between is that of ``geometry.move_timing``.
     """
     way, rapid = program.end - program.start, program.kind == RAPID
     length = np.linalg.norm(way, axis=1)
@@ -44,10 +48,11 @@ def minutes_of(program: Program, setup: ProofSetup) -> F64:
 
 
 def spent(read: Sequence[Program], took: F64, known: NDArray[np.bool_], cut: NDArray[np.bool_]) -> Spent:
-    """Where the time of programs goes.
+    """Times of programs by kind of move.
 
-    took  : (m,) float64, minutes of all moves, program after program
-    known : (m,) bool, moves with a tool; cut : of those, whether they take stock
+    took  : (m,) float64, min, of all moves, program after program
+    known : (m,) bool, moves with a tool
+    cut   : (k,) bool, for each of those, whether it removes stock
     """
     if not read:
         return Spent(0.0, 0.0, 0.0, 0, 0)

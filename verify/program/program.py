@@ -1,4 +1,4 @@
-"""What a reading gives, and the modal state it keeps."""
+"""Result of a reading, and its modal state."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ NAN = math.nan
 
 @dataclass(frozen=True)
 class Remark:
-    """Something readable that should not be run: where and what."""
+    """A readable word or block that should not be run: line and message."""
 
     line: int
     message: str
 
 
 @dataclass(frozen=True)
-class Stop:
-    """Where the program stops to change the tool, or ends: line, what it is, tool in the spindle, its tip and its axis.
+class StopPoint:
+    """Place where the program stops for a tool change or ends: line, event, tool in the spindle, its tip and axis.
 
     tip, axis : (3,) mm and unit, tip to spindle, setup frame; X and Y of the tip may be nan where the axis is +Z
     """
 
     line: int
-    what: str
+    event: str
     tool: int
     tip: tuple[float, float, float]
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
@@ -37,19 +37,20 @@ class Stop:
 
 @dataclass(frozen=True)
 class Pause:
-    """How a program leaves the machine where it changes a tool, waits for somebody (M0, M1) or ends.
+    """State of the machine where a program changes a tool, waits for the operator (M0, M1) or ends.
 
-    what    : 'tool change', 'M0', 'M1' or 'end of the program'
-    tool    : T number that is put in, 0 for none; of other pauses the one in the spindle
-    moves   : that were made before it
-    speed   : 1/min, 0 where the spindle stands;  coolant, tcp : whether it runs, whether the control keeps the tip
+    event   : 'tool change', 'M0', 'M1' or 'end of the program'
+    tool    : T number of the new tool, 0 for none; at other events the tool in the spindle
+    moves   : number of moves before it
+    speed   : 1/min, 0 where the spindle stands
+    coolant : whether it is on; tcp : whether tool centre point control is on
     relative : whether coordinates are incremental (G91)
-    home    : whether the spindle was sent to a place of the machine's own and has not come down since
-    counted : whether a length offset is in force, or may be, as no word has said
+    home    : whether the spindle went to a fixed place of the machine and has not come down since
+    counted : whether a length offset is in force, or may be because the program has not stated it
     """
 
     line: int
-    what: str
+    event: str
     tool: int
     moves: int
     speed: float
@@ -62,10 +63,10 @@ class Pause:
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """How the tool stands on the part, move by move.
+    """Tool axes and rotary angles of moves.
 
-    start_axis, end_axis : (m, 3) float64 unit vectors, tip to spindle, setup frame; between them the axis goes along
-        the shorter great circle, within ``dividing.TURN`` rad of what the control does
+    start_axis, end_axis : (m, 3) float64 unit vectors, tip to spindle, setup frame; between them the axis follows the
+        shorter great circle, within ``turn_subdivision.TURN`` rad of the control
     start_turn, end_turn : (m, 2) float64, rad, the rotary axes, the tilting one first
     """
 
@@ -81,28 +82,28 @@ class Program:
 
     name    : of the program
     start, end : (m, 3) float64, mm; an axis whose start is unknown starts where it ends
-    unknown : (k, 2) int64, moves with such axes, and which as a sum of 1 for X, 2 for Y, 4 for Z, and of 8 where a
-              rotary axis turns or stands off 0: such a move holds where it ends, the way there is not known
+    unknown : (k, 2) int64, moves with such axes, and the axes as a sum of 1 for X, 2 for Y, 4 for Z, and 8 where a
+              rotary axis turns or is not at 0: only the end of such a move is known
     kind    : (m,) int8, RAPID or FEED (arcs are FEED polylines within 1e-3 mm)
     feed    : (m,) float64, mm/min along X, Y, Z of the program, 0 where only a rotary axis turns; nan for rapids
-    minutes : (m,) float64, min a feed move takes; nan for rapids
+    minutes : (m,) float64, min, of feed moves; nan for rapids
     tool    : (m,) int32, T number in the spindle, 0 for none
     line    : (m,) int32, 1-based line of the source
     dwell   : s of G4 and drilling dwells
     speeds  : by T number, the highest S it turned at, 1/min, and the line
-    stops   : where a tool change or the end came at a known height
-    assumed : words in force without having been stated before the first move
-    blend   : mm, the most G64 lets the control round a corner by, as far as a P bounds it
-    leaves  : mm, the most it lets the control leave the path by: that, and what points may be left out by (Q) beside it
+    stops   : tool changes and the end, where their height is known
+    assumed : words that the first move needs and the program has not stated before it
+    blend   : mm, largest rounding of a corner that G64 P allows
+    leaves  : mm, largest deviation from the path that G64 allows: ``blend`` and the tolerance Q of dropped points
     lines   : number of lines read
-    remarks : what should not be run
+    remarks : words and blocks that should not be run
     poses   : None where the tool stands along Z throughout: no rotary axis ever leaves 0
-    notes   : what was done and should be known
-    speed   : (m,) float64, 1/min, at which the spindle turns, 0 where it stands
+    notes   : notes to report
+    speed   : (m,) float64, 1/min, of the spindle, 0 where it stands
     coolant : (m,) bool
-    changes : times a tool was taken out of the spindle for another, or for nothing
-    dialect : whose words it was written in
-    unbounded : whether no word bounds, somewhere, what the control leaves the path by: ``leaves`` does not hold there
+    changes : number of times that a tool left the spindle
+    dialect : dialect of the text
+    unbounded : whether, somewhere, no word bounds the deviation from the path: ``leaves`` does not hold there
     pauses  : in order
     """
 
@@ -118,7 +119,7 @@ class Program:
     lines: int
     remarks: tuple[Remark, ...]
     unknown: NDArray[np.int64]
-    stops: tuple[Stop, ...]
+    stops: tuple[StopPoint, ...]
     assumed: tuple[str, ...]
     blend: float
     minutes: F64
@@ -138,19 +139,19 @@ class Program:
 
 @dataclass
 class State:
-    """Everything modal.
+    """The modal state.
 
-    position  : mm, nan where the program has not stated it or a machine move left it; the tip with tool centre point
-                control, else the linear joints
-    turn      : deg, the rotary axes, tilting one first
+    position  : mm, nan where the program has not stated it or after a move in machine coordinates; the tip with tool
+                centre point control, else the linear joints
+    turn      : deg, the rotary axes, the tilting one first
     tcp_word, tcp_switch : tool centre point control by G43.4, by M428
-    speed     : as S, nan before the first
-    sent      : whether Z was ever sent to a place of the machine's own
-    parked    : whether X or Y stand at a place of the machine's own (G53, G28, G30)
-    cycle     : words of the drilling cycle in force, and where its series began
-    table     : mm, by how much G10 moved the zero of the work offset
-    shift     : mm, by how much G92 or G52 moved program zero
-    kept      : mm, the shift that G92.3 brings back
+    speed     : the S word, nan before the first
+    sent      : whether Z was ever sent to a fixed place of the machine
+    parked    : whether X or Y stand at a fixed place of the machine (G53, G28, G30)
+    cycle     : words of the drilling cycle in force, and the height where its series began
+    table     : mm, shift of the work offset by G10
+    shift     : mm, shift of program zero by G92 or G52
+    kept      : mm, the shift that G92.3 restores
     """
 
     position: list[float] = field(default_factory=lambda: [NAN, NAN, NAN])
@@ -187,12 +188,12 @@ class State:
 
     @property
     def length_off(self) -> bool:
-        """Whether Z of the control is not that of the tip, for want of the length offset of the tool."""
+        """Whether Z of the control is not that of the tip because the length offset of the tool is off."""
         return self.tool > 0 and self.offset != self.tool
 
     @property
     def home(self) -> bool:
-        """Whether Z was sent to a place of the machine's own and has not been stated since."""
+        """Whether Z went to a fixed place of the machine and has not been stated since."""
         return self.sent and math.isnan(self.position[2])
 
     @property
@@ -202,10 +203,10 @@ class State:
 
     @property
     def tcp(self) -> bool:
-        """Whether the control keeps the tip where the program says while axes turn."""
+        """Whether tool centre point control is on."""
         return self.tcp_word or self.tcp_switch
 
     @property
     def tilted(self) -> bool:
-        """Whether a rotary axis stands off 0."""
+        """Whether a rotary axis is not at 0."""
         return self.turn[0] != 0 or self.turn[1] != 0

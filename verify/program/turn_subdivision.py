@@ -1,16 +1,15 @@
-"""Into how many pieces a turning block is cut, so that each goes straight and its axis along a great circle.
+"""Number of pieces of a turning block, so that each goes straight and its axis along a great circle.
 
-A path c on t = 0..1 whose second derivative is at most D lies within D h² / 8 of the straight, even way between two of
-its places that are h apart in t. So n = ceil(sqrt(D / (8 e))) pieces keep it within e: no trial, only bounds on D.
+A path c on t = 0..1 whose second derivative is at most D lies within D h² / 8 of the straight, even segment between two
+of its places that are h apart in t. So n = ceil(sqrt(D / (8 e))) pieces keep it within e; only bounds on D are needed.
 
 Tool axis. It is a point on the unit sphere at the tilt u from the pole and at the angle v round it, both even in t:
 u' = a, v' = b. Its acceleration on the sphere is (-b² sin u cos u, 2 a b cos u), no longer than
-|b| cos u sqrt(b² sin² u + 4 a²). Great circles take the place of straight lines; over an arc l they answer an
-acceleration with (1 / cos(l / 2) - 1) / (l² / 8) times as much deviation, at most 1.003 where no piece turns an axis
-by more than ``MOST_TURN``.
+|b| cos u sqrt(b² sin² u + 4 a²). Great circles take the place of straight lines; over an arc l the deviation is
+(1 / cos(l / 2) - 1) / (l² / 8) times as large, at most 1.003 where no piece turns an axis by more than ``MAX_TURN``.
 
-Tip without tool centre point control. The joints go even, and each frame that turns at the rate w adds to the second
-derivative of a point at distance r with speed s at most 2 w s + w² r.
+Tip without tool centre point control. The joints move evenly. Each frame that turns at the rate w adds at most
+2 w s + w² r to the second derivative of a point at distance r with speed s.
 """
 
 from __future__ import annotations
@@ -21,35 +20,35 @@ from collections.abc import Sequence
 from verify.kinematics import Kinematics
 
 TURN = 2e-5
-"""rad, the most by which a tool axis may leave the great circle of its piece."""
+"""rad, largest deviation of a tool axis from the great circle of its piece."""
 TIP = 0.5e-3
-"""mm, the most by which a tip may leave the chord of its piece; as much again is left for the chords of an arc."""
-MOST_TURN = 0.1
-"""rad, the most a piece turns an axis: what joints do between its ends is then within 1/800 of their radius."""
-_CURVED = 1.01  # the 1.003 above, and the sphere's own share of higher order
+"""mm, largest deviation of a tip from the chord of its piece; the chords of an arc have as much again."""
+MAX_TURN = 0.1
+"""rad, largest turn of an axis in a piece: joints then stay within 1/800 of their radius between its ends."""
+_CURVED = 1.01  # the 1.003 above, and terms of higher order on the sphere
 
 
 def axis_pieces(start: Sequence[float], end: Sequence[float]) -> int:
-    """Pieces that keep the tool axis within ``TURN`` of great circles.
+    """Pieces that keep the tool axis within ``TURN`` of great circles [Shoemake1985].
 
     start, end : (2,) rad, tilt and turn where the block begins and ends
 
     Returns at least 1.
     """
     a, b = abs(end[0] - start[0]), abs(end[1] - start[1])
-    if max(a, b) <= MOST_TURN and _CURVED * b * math.hypot(b, 2 * a) <= 8 * TURN:
-        return 1  # wherever the axis points
+    if max(a, b) <= MAX_TURN and _CURVED * b * math.hypot(b, 2 * a) <= 8 * TURN:
+        return 1  # for any tilt
     cosine, sine = _most_cosine(start[0], end[0]), _most_cosine(start[0] - math.pi / 2, end[0] - math.pi / 2)
     bend = b * cosine * math.hypot(b * sine, 2 * a)
-    return max(1, math.ceil(max(a, b) / MOST_TURN), math.ceil(math.sqrt(_CURVED * bend / (8 * TURN))))
+    return max(1, math.ceil(max(a, b) / MAX_TURN), math.ceil(math.sqrt(_CURVED * bend / (8 * TURN))))
 
 
 def tip_pieces(machine: Kinematics, start: Sequence[float], end: Sequence[float], turns: tuple[float, float],
                gauge: float) -> int:
-    """Pieces that keep the tip within ``TIP`` of chords, where all joints go even.
+    """Pieces that keep the tip within ``TIP`` of chords, where all joints move evenly.
 
     start, end : (3,) mm, the joints
-    turns      : rad, how far the tilting and the turning axis turn
+    turns      : rad, turns of the tilting and the turning axis
     gauge      : mm, spindle face to tip
 
     Returns at least 1. Raises VerificationError (no_pivots) where no pivots are given.

@@ -1,9 +1,9 @@
-"""STEP-NC as AP238 (ISO 10303-238, both schema names), read: what its workplan makes the tool do.
+"""Reader of STEP-NC as AP238 (both schema names): records the tool motion of its workplan [ISO10303-238].
 
-The application model stands in the file as methods, relationships between them and properties with representations;
-which parameter a property is, its name says. A name or a value that the reader does not know is refused by instance,
-and so is what could move the tool and is not read: strategies without a path, contact trajectories, splines, branches.
-Lengths, feeds and speeds are taken in the units the file gives them.
+The file holds the application model as methods, relationships between them and properties with representations; the
+name of a property tells its parameter. The reader refuses, by instance, an unknown name or value. It also refuses what
+could move the tool and is not read: strategies without a path, contact trajectories, splines, branches. Lengths, feeds
+and speeds are in the units of the file.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from verify.stepnc.ap238_attributes import EXECUTABLES, RECORDS, REPRESENTATIONS
 from verify.stepnc.attribute_checks import FARTHEST, Checked, shown
 from verify.stepnc.curves import curve_points
 from verify.stepnc.iso14649 import sane_rates, shape_of, tool_number
-from verify.stepnc.part21 import Part21, Ref, Typed
-from verify.stepnc.tool_motion import MOST_DWELL, Course, Cutter
+from verify.stepnc.part21 import Part21File, Ref, Typed
+from verify.stepnc.tool_motion import MAX_DWELL, CutterRecord, MotionRecorder
 
 SCHEMAS = frozenset({"MODEL_BASED_INTEGRATED_MANUFACTURING_SCHEMA", "INTEGRATED_CNC_SCHEMA"})
 _PREFIX = {None: 1.0, "KILO": 1e3, "HECTO": 1e2, "DECA": 1e1, "DECI": 1e-1, "CENTI": 1e-2, "MILLI": 1e-3,
            "MICRO": 1e-6, "NANO": 1e-9}
 _BASE = {"METRE": ("length", 1000.0), "SECOND": ("time", 1.0 / 60.0), "RADIAN": ("angle", 1.0),
          "STERADIAN": ("solid angle", 1.0)}  # mm and min
-_SMALLEST, _LARGEST, _MOST_POWER = 1e-12, 1e12, 3.0  # of units, and of one in another; those in use are far within
+_SMALLEST, _LARGEST, _MAX_POWER = 1e-12, 1e12, 3.0  # sizes of units, and exponents; real units are far within
 _FEED, _SPEED = {"length": 1.0, "time": -1.0}, {"turn": 1.0, "time": -1.0}
 _SYMBOLS = {
     "priority": ("required", "suggested"),
@@ -62,23 +62,23 @@ _ITEMS = ("effective cutting diameter", "maximum depth of cut", "overall assembl
           "number of effective teeth", "edge radius", "coolant through tool", "functional length")
 
 
-def read_aim(file: Part21, course: Course) -> None:
-    """Tell a course what the main workplan of a file makes the tool do.
+def read_ap238(file: Part21File, recorder: MotionRecorder) -> None:
+    """Record the tool motion of the main workplan of a file [ISO10303-238].
 
     Raises
     ------
     ProgramError
-        An instance, which the subjects name, is not what the form wants of it, or moves the tool in a way that is not
-        read.
+        An instance, which the subjects name, does not have the required form, or moves the tool in a way that the
+        reader does not know.
     """
-    _Aim(file, course).run()
+    Ap238Reader(file, recorder).run()
 
 
-class _Aim:
-    """One reading; look-ups of what refers to what."""
+class Ap238Reader:
+    """One reading of an AP238 file: tables of references, and the walk through the workplan."""
 
-    def __init__(self, file: Part21, course: Course) -> None:
-        self.file, self.course = file, course
+    def __init__(self, file: Part21File, recorder: MotionRecorder) -> None:
+        self.file, self.recorder = file, recorder
         self.data = Checked(file, TABLE, RECORDS)
         self.properties = self._properties("ACTION_PROPERTY", "definition")
         self._check_properties()
@@ -86,31 +86,38 @@ class _Aim:
         self.scales: dict[int, float] = {}
         self.secure = self._security_plane()
         self.rates: dict[int, tuple[float, float]] = {}
-        self.cutters: dict[int, Cutter] = {}
+        self.cutters: dict[int, CutterRecord] = {}
         self.tools = self._tools_by_operation()
         self.below = {entity: self._ordered(entity) for entity in (
             "MACHINING_PROCESS_SEQUENCE_RELATIONSHIP", "MACHINING_TOOLPATH_SEQUENCE_RELATIONSHIP")}
-        self.beside = {entity: self._related(entity) for entity in (
+        self.related_methods = {entity: self._related(entity) for entity in (
             "MACHINING_OPERATION_RELATIONSHIP", "MACHINING_TECHNOLOGY_RELATIONSHIP", "MACHINING_FUNCTIONS_RELATIONSHIP",
             "MACHINING_FEATURE_RELATIONSHIP")}
         self.placements = self._placements()
         self.seen: set[int] = set()
 
     def run(self) -> None:
+        """Record the motion of the main workplan.
+
+        Raises
+        ------
+        ProgramError
+            The file does not have exactly one project and one main workplan, or an instance is wrong.
+        """
         projects = self.data.of("MACHINING_PROJECT")
         plans = [self.data.ref(n, "PRODUCT_DEFINITION_PROCESS", "chosen_method")
                  for n in self.data.of("PRODUCT_DEFINITION_PROCESS") if self._word(n, "PRODUCT_DEFINITION_PROCESS",
                                                                                   "name", ("machining", "setup"))
                  == "machining"]
-        for what, found in (("MACHINING_PROJECT", projects), ("main MACHINING_WORKPLAN", plans)):
+        for entity, found in (("MACHINING_PROJECT", projects), ("main MACHINING_WORKPLAN", plans)):
             if len(found) != 1:
-                raise ProgramError(f"{self.file.name}: one {what} expected, not {len(found)}",
+                raise ProgramError(f"{self.file.name}: one {entity} expected, not {len(found)}",
                                    subjects=tuple(f"#{n}" for n in found), measured=len(found), limit=1,
-                                   remedy="send one project a file")
+                                   remedy="send one project per file")
         self._execute(plans[0])
 
     def _word(self, number: int, entity: str, attribute: str, allowed: Iterable[str]) -> str:
-        """A string that has to be one of a few."""
+        """A string attribute that must be one of ``allowed``."""
         value = str(self.data.one(number, entity, attribute))
         if value not in allowed:
             raise self.file.error(number, f", {attribute}: one of {', '.join(map(repr, allowed))} expected, not "
@@ -118,12 +125,12 @@ class _Aim:
         return value
 
     def _properties(self, entity: str, owner: str) -> dict[int, dict[str, tuple[int, int]]]:
-        """By owner and name: a property and its representation."""
+        """Properties and their representations, by owner and name."""
         shown_by: dict[int, int] = {}
         for n in self.data.of(f"{entity}_REPRESENTATION"):
             prop = self.data.ref(n, f"{entity}_REPRESENTATION", "property")
             if prop in shown_by:
-                raise self.file.error(n, f", property: #{prop} has a representation already")
+                raise self.file.error(n, f", property: #{prop} already has a representation")
             shown_by[prop] = self.data.ref(n, f"{entity}_REPRESENTATION", "representation")
         out: dict[int, dict[str, tuple[int, int]]] = defaultdict(dict)
         for n in self.data.of(entity):
@@ -131,7 +138,7 @@ class _Aim:
             if n not in shown_by:
                 raise self.file.error(n, f"'{name}' has no {entity}_REPRESENTATION")
             if name in out[mine]:
-                raise self.file.error(n, f", name: #{mine} has a property '{name}' already")
+                raise self.file.error(n, f", name: #{mine} already has a property '{name}'")
             out[mine][name] = n, shown_by[n]
         return out
 
@@ -141,8 +148,8 @@ class _Aim:
             entity = self.file.names(owner)[0]
             for name, (prop, representation) in named.items():
                 if name not in _NAMES.get(entity, ()):
-                    raise self.file.error(prop, f", name: '{name}' is no property of {entity} that is read; "
-                                                f"{', '.join(_NAMES.get(entity, ())) or 'none is'}")
+                    raise self.file.error(prop, f", name: unknown property '{name}' of {entity}; known are "
+                                                f"{', '.join(_NAMES.get(entity, ())) or 'none'}")
                 if name in _SYMBOLS:
                     self._symbol(representation, _SYMBOLS[name])
 
@@ -156,7 +163,7 @@ class _Aim:
         self.data.get(item, "DESCRIPTIVE_REPRESENTATION_ITEM")
         return self._word(item, "DESCRIPTIVE_REPRESENTATION_ITEM", "description", allowed)
 
-    def _told(self, owner: int, name: str) -> str | None:
+    def _setting(self, owner: int, name: str) -> str | None:
         found = self.properties.get(owner, {}).get(name)
         return None if found is None else self._symbol(found[1], _SYMBOLS[name])
 
@@ -167,60 +174,60 @@ class _Aim:
         return out
 
     def _ordered(self, entity: str) -> dict[int, list[int]]:
-        """By what is above: what is below it in the order of positions."""
+        """Methods below each method, in the order of their positions."""
         rows: dict[int, dict[float, int]] = defaultdict(dict)
         for n in self.data.of(entity):
             above, place = self.data.ref(n, entity, "relating_method"), self.data.real(n, entity, "sequence_position")
             if place is None or place in rows[above]:
-                raise self.file.error(n, f", sequence_position: {place} stands twice below #{above}")
+                raise self.file.error(n, f", sequence_position: {place} appears twice below #{above}")
             rows[above][place] = self.data.ref(n, entity, "related_method")
         return {above: [found[k] for k in sorted(found)] for above, found in rows.items()}
 
-    def _one_beside(self, entity: str, number: int) -> int:
-        found = self.beside[entity].get(number, [])
+    def _only_related(self, entity: str, number: int) -> int:
+        found = self.related_methods[entity].get(number, [])
         if len(found) != 1:
-            raise self.file.error(number, f"has {len(found)} {entity}, one is due")
+            raise self.file.error(number, f"has {len(found)} {entity}, one is required")
         return found[0]
 
     def _execute(self, number: int) -> None:
         if number in self.seen:
-            raise self.file.error(number, "stands in two places of the workplans, or in itself")
+            raise self.file.error(number, "appears in two places of the workplans, or inside itself")
         self.seen.add(number)
         entity = self.data.get(number, *EXECUTABLES)[0]
         if entity == "MACHINING_WORKPLAN":
             below = self.below["MACHINING_PROCESS_SEQUENCE_RELATIONSHIP"].get(number)
             if below is None:
-                raise self.file.error(number, "has no elements: a MACHINING_PROCESS_SEQUENCE_RELATIONSHIP is due")
+                raise self.file.error(number, "has no elements: a MACHINING_PROCESS_SEQUENCE_RELATIONSHIP is required")
             for element in below:
                 self._execute(element)
         elif entity == "MACHINING_NC_FUNCTION":
             if self._word(number, entity, "description", (*_NC_STOPS, *_NC_QUIET)) in _NC_STOPS:
-                self.course.stop("program stop", self.file.line(number))
+                self.recorder.stop("program stop", self.file.line(number))
         elif entity == "MACHINING_PROCESS_EXECUTABLE":
             self._word(number, entity, "description", ("setup instructions",))
         else:
             self._workingstep(number)
 
     def _workingstep(self, number: int) -> None:
-        operation = self._one_beside("MACHINING_OPERATION_RELATIONSHIP", number)
+        operation = self._only_related("MACHINING_OPERATION_RELATIONSHIP", number)
         line = self.file.line(number)
         if self.secure is not None:
-            self.course.over(*self.secure, line)
+            self.recorder.over(*self.secure, line)
         tool = self.tools.get(operation)
         if tool is None:
-            raise self.file.error(operation, "has no tool: a MACHINING_TOOL whose usage holds it is due")
-        self.course.take(self._cutter(tool), line)
-        technology = self._one_beside("MACHINING_TECHNOLOGY_RELATIONSHIP", operation)
-        functions = self._one_beside("MACHINING_FUNCTIONS_RELATIONSHIP", operation)
-        coolant = self._told(functions, "coolant")
+            raise self.file.error(operation, "has no tool: a MACHINING_TOOL whose usage holds it is required")
+        self.recorder.take(self._cutter(tool), line)
+        technology = self._only_related("MACHINING_TECHNOLOGY_RELATIONSHIP", operation)
+        functions = self._only_related("MACHINING_FUNCTIONS_RELATIONSHIP", operation)
+        coolant = self._setting(functions, "coolant")
         if coolant is None:
-            raise self.file.error(functions, "has no 'coolant': an ACTION_PROPERTY of that name is due")
-        self.course.coolant = coolant == "coolant on"
+            raise self.file.error(functions, "has no 'coolant': an ACTION_PROPERTY of that name is required")
+        self.recorder.coolant = coolant == "coolant on"
         paths = self.below["MACHINING_TOOLPATH_SEQUENCE_RELATIONSHIP"].get(operation)
         if paths is None:
             raise self.file.error(operation, "has no tool path: strategies without one are not read")
         place = np.eye(4)
-        for process in self.beside["MACHINING_FEATURE_RELATIONSHIP"].get(number, []):
+        for process in self.related_methods["MACHINING_FEATURE_RELATIONSHIP"].get(number, []):
             place = self.placements.get(process, place)
         for path in paths:
             self._path(path, place, technology)
@@ -228,12 +235,12 @@ class _Aim:
     def _path(self, number: int, place: F64, technology: int) -> None:
         kind = self._word(number, "MACHINING_TOOLPATH", "description", ("cutter location trajectory", "feedstop"))
         named = self.properties.get(number, {})
-        own = self.beside["MACHINING_TECHNOLOGY_RELATIONSHIP"].get(number, [])
+        own = self.related_methods["MACHINING_TECHNOLOGY_RELATIONSHIP"].get(number, [])
         if len(own) > 1:
-            raise self.file.error(number, f"has {len(own)} MACHINING_TECHNOLOGY_RELATIONSHIP, one at most is due")
+            raise self.file.error(number, f"has {len(own)} MACHINING_TECHNOLOGY_RELATIONSHIP, one at most is allowed")
         if kind == "feedstop":
             dwell = 60.0 * self._measure(number, "dwell", {"time": 1.0})
-            self.course.dwell += self.data.within(number, "'dwell', s", dwell, 0.0, MOST_DWELL)
+            self.recorder.dwell += self.data.within(number, "'dwell', s", dwell, 0.0, MAX_DWELL)
             return
         tips, lines = self._curve(number, "basic curve", lengths=True)
         if "tool axis" in named:
@@ -241,18 +248,18 @@ class _Aim:
             axes = self.data.unit_axes(number, "'tool axis'", axes, len(tips))
         else:
             axes = np.tile([0.0, 0.0, 1.0], (len(tips), 1))
-        if self._told(number, "direction") == "end to beginning":
+        if self._setting(number, "direction") == "end to beginning":
             tips, axes, lines = tips[::-1], axes[::-1], lines[::-1]
-        rapid = self._told(number, "speed profile") is not None
+        rapid = self._setting(number, "speed profile") is not None
         feed, speed = self._rates(own[0] if own else technology)
-        self.course.follow(tips @ place[:3, :3].T + place[:3, 3], axes @ place[:3, :3].T, rapid=rapid, feed=feed,
+        self.recorder.follow(tips @ place[:3, :3].T + place[:3, 3], axes @ place[:3, :3].T, rapid=rapid, feed=feed,
                            speed=speed, lines=lines)
 
     def _curve(self, number: int, name: str, *, lengths: bool) -> tuple[F64, F64]:
         """Points (n, 3) of a property, mm of a curve where they are lengths, else of a polyline; their lines (n,)."""
         found = self.properties.get(number, {}).get(name)
         if found is None:
-            raise self.file.error(number, f"has no '{name}': an ACTION_PROPERTY of that name is due")
+            raise self.file.error(number, f"has no '{name}': an ACTION_PROPERTY of that name is required")
         items = self._items(found[1])
         if len(items) != 1:
             raise self.file.error(found[1], f", items: one curve expected, not {len(items)}")
@@ -262,7 +269,7 @@ class _Aim:
         return self.data.curve(items[0])
 
     def _scale(self, representation: int) -> float:
-        """mm in the unit of the points of a representation."""
+        """Size of the length unit of a representation, mm."""
         entity = self.data.get(representation, *REPRESENTATIONS, *SHAPES)[0]
         context = self.data.ref(representation, entity, "context_of_items")
         if context not in self.scales:
@@ -275,7 +282,7 @@ class _Aim:
         return self.scales[context]
 
     def _unit(self, number: int) -> tuple[dict[str, float], float]:
-        """What a unit measures, as exponents, and how many mm, min or turns it is."""
+        """Dimensions of a unit, as exponents, and its size in mm, min or turns."""
         if number in self.units:
             return self.units[number]
         entity, values = self.data.get(number, *UNITS)
@@ -284,7 +291,7 @@ class _Aim:
         if entity == "SI_UNIT":
             name, prefix = str(values[1]), None if values[0] is None else str(values[0])
             if name not in _BASE or prefix not in _PREFIX:
-                raise self.file.error(number, f"is a unit that is not read: {shown(values[0])} {name}")
+                raise self.file.error(number, f"is an unknown unit: {shown(values[0])} {name}")
             dimensions, factor = {_BASE[name][0]: 1.0}, _BASE[name][1] * _PREFIX[prefix]
         elif entity == "CONVERSION_BASED_UNIT":
             dimensions, factor = self._measured(self.data.ref(number, entity, "conversion_factor"))
@@ -295,7 +302,7 @@ class _Aim:
             for element in self.data.refs(number, entity, "elements"):
                 inner, size = self._unit(self.data.ref(element, "DERIVED_UNIT_ELEMENT", "unit"))
                 exponent = self.data.real(element, "DERIVED_UNIT_ELEMENT", "exponent") or 0.0
-                self.data.within(element, "exponent", exponent, -_MOST_POWER, _MOST_POWER)
+                self.data.within(element, "exponent", exponent, -_MAX_POWER, _MAX_POWER)
                 for dimension, power in inner.items():
                     dimensions[dimension] = dimensions.get(dimension, 0.0) + power * exponent
                 factor *= size**exponent
@@ -304,7 +311,7 @@ class _Aim:
         return dimensions, factor
 
     def _measured(self, number: int) -> tuple[dict[str, float], float]:
-        """A value with a unit: what it measures, and how much, in mm, min and turns."""
+        """A value with a unit: its dimensions, and its size in mm, min and turns."""
         for name, values in self.file.records(number):
             if len(values) >= 2 and isinstance(values[-2], Typed) and isinstance(values[-1], Ref):
                 dimensions, factor = self._unit(int(values[-1]))
@@ -313,17 +320,17 @@ class _Aim:
                     return dimensions, value * factor
             if name == "MEASURE_WITH_UNIT":
                 break
-        raise self.file.error(number, "is to be a measure with its unit")
+        raise self.file.error(number, "must be a measure with its unit")
 
     def _measure(self, owner: int, name: str, wanted: dict[str, float]) -> float:
         """A measured property of a method, in mm, min and turns."""
         found = self.properties.get(owner, {}).get(name)
         if found is None:
-            raise self.file.error(owner, f"has no '{name}': an ACTION_PROPERTY of that name is due")
+            raise self.file.error(owner, f"has no '{name}': an ACTION_PROPERTY of that name is required")
         item = self._items(found[1])[0]
         dimensions, value = self._measured(item)
         if dimensions != wanted:
-            raise self.file.error(item, f"'{name}' is in a unit of {dimensions or 'nothing'}, {wanted} is due")
+            raise self.file.error(item, f"'{name}' has a unit of {dimensions or 'nothing'}, {wanted} is required")
         return value
 
     def _rates(self, technology: int) -> tuple[float, float]:
@@ -338,16 +345,16 @@ class _Aim:
         for tool in self.data.of("MACHINING_TOOL"):
             for operation in self.data.refs(tool, "MACHINING_TOOL", "usage"):
                 if operation in out:
-                    raise self.file.error(tool, f", usage: #{operation} has the tool #{out[operation]} already")
+                    raise self.file.error(tool, f", usage: #{operation} already has the tool #{out[operation]}")
                 out[operation] = tool
         return out
 
-    def _cutter(self, tool: int) -> Cutter:
+    def _cutter(self, tool: int) -> CutterRecord:
         if tool not in self.cutters:
             self.cutters[tool] = self._body(tool)
         return self.cutters[tool]
 
-    def _body(self, tool: int) -> Cutter:
+    def _body(self, tool: int) -> CutterRecord:
         bodies = [n for n in self.data.of("RESOURCE_PROPERTY")
                   if self.data.ref(n, "RESOURCE_PROPERTY", "resource") == tool
                   and self._word(n, "RESOURCE_PROPERTY", "name", ("tool body",)) == "tool body"]
@@ -355,7 +362,7 @@ class _Aim:
                     for n in self.data.of("RESOURCE_PROPERTY_REPRESENTATION")
                     if self.data.ref(n, "RESOURCE_PROPERTY_REPRESENTATION", "property") in bodies]
         if len(shown_by) != 1:
-            raise self.file.error(tool, f"has {len(shown_by)} representations of its 'tool body', one is due")
+            raise self.file.error(tool, f"has {len(shown_by)} representations of its 'tool body', one is required")
         self.data.get(shown_by[0], "MACHINING_TOOL_BODY_REPRESENTATION")
         sizes: dict[str, float] = {}
         for item in self._items(shown_by[0]):
@@ -367,8 +374,8 @@ class _Aim:
                 dimensions, sizes[name] = self._measured(item)
                 wanted = {} if name == "number of effective teeth" else {"length": 1.0}
                 if dimensions != wanted:
-                    raise self.file.error(item, f"'{name}' is in a unit of {dimensions or 'nothing'}, "
-                                                f"{wanted or 'nothing'} is due")
+                    raise self.file.error(item, f"'{name}' has a unit of {dimensions or 'nothing'}, "
+                                                f"{wanted or 'nothing'} is required")
                 self.data.within(item, f"'{name}'", sizes[name], 0.0, FARTHEST)
         kind = _TOOLS[self._word(tool, "MACHINING_TOOL", "description", _TOOLS)]
         diameter = sizes.get("effective cutting diameter", 0.0)
@@ -380,15 +387,15 @@ class _Aim:
             raise self.file.error(shown_by[0], f", items: an 'edge radius' that suits a {kind} of {diameter:g} mm "
                                                f"expected, not {given}")
         name = str(self.data.one(tool, "MACHINING_TOOL", "name"))
-        return Cutter(tool_number(name), name, shape_of(diameter, corner), diameter, corner,
+        return CutterRecord(tool_number(name), name, shape_of(diameter, corner), diameter, corner,
                       sizes.get("maximum depth of cut"), sizes.get("overall assembly length"), tool)
 
     def _item_name(self, item: int) -> str:
-        """What an item of a tool body says it is."""
+        """The name of an item of a tool body."""
         records = self.file.records(item)
         entity, values = next((r for r in records if r[0] == "REPRESENTATION_ITEM"), records[0])
         if not values or not isinstance(values[0], str):
-            raise self.file.error(item, f"is to be an item with a name, not {entity}")
+            raise self.file.error(item, f"must be an item with a name, not {entity}")
         if values[0] not in _ITEMS:
             raise self.file.error(item, f", name: one of {', '.join(map(repr, _ITEMS))} expected, not {values[0]!r}")
         return values[0]
@@ -399,8 +406,8 @@ class _Aim:
         for n in self.data.of("PROPERTY_DEFINITION"):
             owner = self.data.ref(n, "PROPERTY_DEFINITION", "definition")
             if "MACHINING_SETUP_WORKPIECE_RELATIONSHIP" in self.file.names(owner):
-                raise self.file.error(n, ", definition: where the workpiece stands in its setup is not read; send the "
-                                         "paths in the system of the setup", owner)
+                raise self.file.error(n, ", definition: a placement of the workpiece in its setup is not read; send "
+                                         "the paths in the frame of the setup", owner)
             if "PRODUCT_DEFINITION" in self.file.names(owner):
                 formation = self.data.ref(owner, "PRODUCT_DEFINITION", "formation")
                 product = self.data.ref(formation, "PRODUCT_DEFINITION_FORMATION", "of_product")
@@ -413,7 +420,7 @@ class _Aim:
         setups = self.data.of("MACHINING_SETUP")
         if len(planes) > 1 or len(planes) < len(setups):
             at = setups[0] if setups else planes[0]
-            raise self.file.error(at, f"{len(planes)} representations of a 'security plane', one a setup is due")
+            raise self.file.error(at, f"{len(planes)} representations of a 'security plane', one per setup is required")
         if not planes:
             return None
         item = self._items(planes[0])[0]
@@ -422,7 +429,7 @@ class _Aim:
         return place[:3, 3], place[:3, 2]
 
     def _placements(self) -> dict[int, F64]:
-        """(4, 4) by feature process: from the feature to the workpiece, where it is said."""
+        """(4, 4) by feature process: transformation from the feature to the workpiece, where it is given."""
         process_of = {n: self.data.ref(n, "PROPERTY_PROCESS", "chosen_method")
                       for n in self.data.of("PROPERTY_PROCESS")}
         feature_of = {process_of[self.data.ref(n, "PROCESS_PROPERTY_ASSOCIATION", "process")]:
@@ -441,8 +448,8 @@ class _Aim:
         for feature in feature_of.values():
             if feature not in placed:
                 raise self.file.error(feature, "has no placement: a SHAPE_DEFINITION_REPRESENTATION with an "
-                                               "AXIS2_PLACEMENT_3D is due")
+                                               "AXIS2_PLACEMENT_3D is required")
         return {process: placed[feature] for process, feature in feature_of.items()}
 
 
-__all__ = ["SCHEMAS", "read_aim"]
+__all__ = ["SCHEMAS", "read_ap238"]

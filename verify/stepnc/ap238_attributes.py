@@ -1,4 +1,4 @@
-"""What the entities of AP238 (ISO 10303-238) are to hold: their attributes in order, each with its kind."""
+"""Attributes of the entities of AP238 in order, each with its kind [ISO10303-238]."""
 
 from __future__ import annotations
 

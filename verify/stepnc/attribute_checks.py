@@ -1,7 +1,8 @@
-"""What attributes of instances have to be, and the words in which one that is not is refused.
+"""Checks attributes of instances, and words the errors.
 
-A form of STEP-NC is read with a table: by entity its attributes in order, each with the kind of its value. Every
-instance of the table is held against it before anything is made of it, so that a reader may take what it finds.
+A form of STEP-NC has a table: by entity its attributes in order, each with the kind of its value. Every instance of an
+entity of the table is checked before use, so a reader can rely on the values. Arrays of coordinates are float64, mm, in
+the frame of the file.
 """
 
 from __future__ import annotations
@@ -14,62 +15,62 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from verify.stepnc.part21 import DERIVED, Part21, Record, Ref, Typed, Value, Word
+from verify.stepnc.part21 import DERIVED, EnumItem, Part21File, Record, Ref, Typed, Value
 
 FARTHEST = 1e6  # mm, of the coordinates of a path and the sizes of a tool
-UNIT = 1e-3  # what the length of a tool axis may be off one
-LONGEST_VECTOR = 1e9  # of ratios of a direction; squares of much more have no place in a float
+UNIT = 1e-3  # largest deviation of the length of a tool axis from one
+LONGEST_VECTOR = 1e9  # largest ratio of a direction; squares of much larger ones overflow
 
 
-class Kind:
-    """What a value has to be; ``problem`` says what it is instead, or None where it is right."""
+class AttributeKind:
+    """Kind of a value; ``problem`` words the error of a wrong value, or gives None."""
 
-    def problem(self, value: Value, file: Part21) -> str | None:
+    def problem(self, value: Value, file: Part21File) -> str | None:
         """Words for the error, or None."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True)
-class Text(Kind):
+class Text(AttributeKind):
     """A string."""
 
-    def problem(self, value: Value, file: Part21) -> str | None:
-        right = isinstance(value, str) and not isinstance(value, Word)
+    def problem(self, value: Value, file: Part21File) -> str | None:
+        right = isinstance(value, str) and not isinstance(value, EnumItem)
         return None if right else f"a string expected, not {shown(value)}"
 
 
 @dataclass(frozen=True)
-class Real(Kind):
-    """A real number, with a decimal point; over ``above`` and up to ``most`` where they say so."""
+class Real(AttributeKind):
+    """A real number, with a decimal point, above ``above`` and up to ``limit``."""
 
     above: float = -math.inf
-    most: float = math.inf
+    limit: float = math.inf
 
-    def problem(self, value: Value, file: Part21) -> str | None:
+    def problem(self, value: Value, file: Part21File) -> str | None:
         if not isinstance(value, float) or not math.isfinite(value):
             return f"a real number expected, not {shown(value)}"
-        if value > self.most:
-            return f"a number up to {self.most:g} expected, not {value:g}"
+        if value > self.limit:
+            return f"a number up to {self.limit:g} expected, not {value:g}"
         return None if value > self.above else f"a number over {self.above:g} expected, not {value:g}"
 
 
 @dataclass(frozen=True)
-class Whole(Kind):
+class Whole(AttributeKind):
     """A whole number."""
 
-    def problem(self, value: Value, file: Part21) -> str | None:
+    def problem(self, value: Value, file: Part21File) -> str | None:
         right = isinstance(value, int) and not isinstance(value, Ref | bool)
         return None if right else f"a whole number expected, not {shown(value)}"
 
 
 @dataclass(frozen=True)
-class OneOf(Kind):
-    """An enumeration item of a few."""
+class OneOf(AttributeKind):
+    """One of some enumeration items."""
 
     items: tuple[str, ...]
 
-    def problem(self, value: Value, file: Part21) -> str | None:
-        if isinstance(value, Word) and value in self.items:
+    def problem(self, value: Value, file: Part21File) -> str | None:
+        if isinstance(value, EnumItem) and value in self.items:
             return None
         return f"one of {', '.join(f'.{i}.' for i in self.items)} expected, not {shown(value)}"
 
@@ -79,12 +80,12 @@ LOGICAL = OneOf(("T", "F", "U"))
 
 
 @dataclass(frozen=True)
-class To(Kind):
+class To(AttributeKind):
     """A reference to an instance of one of some entities; of any where none is named."""
 
     entities: tuple[str, ...] = ()
 
-    def problem(self, value: Value, file: Part21) -> str | None:
+    def problem(self, value: Value, file: Part21File) -> str | None:
         if isinstance(value, Ref) and file.has(value):
             names = file.names(value)
             if not self.entities or any(name in self.entities for name in names):
@@ -93,44 +94,44 @@ class To(Kind):
         if not isinstance(value, Ref):
             return f"a reference to {wanted} expected, not {shown(value)}"
         if not file.has(value):
-            return f"{value!r}, to be {wanted}, is not in the file"
+            return f"{value!r}, which must be {wanted}, is not in the file"
         return f"a reference to {wanted} expected, but {value!r} is {' '.join(names)}"
 
 
 @dataclass(frozen=True)
-class Many(Kind):
-    """A list of values of one kind, from ``least`` to ``most`` of them."""
+class Many(AttributeKind):
+    """A list of values of one kind, from ``min_count`` to ``max_count`` of them."""
 
-    of: Kind
-    least: int = 0
-    most: int | None = None
+    of: AttributeKind
+    min_count: int = 0
+    max_count: int | None = None
 
-    def problem(self, value: Value, file: Part21) -> str | None:
+    def problem(self, value: Value, file: Part21File) -> str | None:
         if not isinstance(value, list):
             return f"a list expected, not {shown(value)}"
-        if len(value) < self.least or (self.most is not None and len(value) > self.most):
-            return f"a list of {self.least} or more expected, not of {len(value)}" if self.most is None else \
-                f"a list of {self.least} to {self.most} expected, not of {len(value)}"
+        if len(value) < self.min_count or (self.max_count is not None and len(value) > self.max_count):
+            return f"a list of {self.min_count} or more expected, not of {len(value)}" if self.max_count is None else \
+                f"a list of {self.min_count} to {self.max_count} expected, not of {len(value)}"
         return next((p for v in value if (p := self.of.problem(v, file)) is not None), None)
 
 
 @dataclass(frozen=True)
-class Maybe(Kind):
+class Maybe(AttributeKind):
     """A value that may be left out."""
 
-    of: Kind
+    of: AttributeKind
 
-    def problem(self, value: Value, file: Part21) -> str | None:
+    def problem(self, value: Value, file: Part21File) -> str | None:
         return None if value is None else self.of.problem(value, file)
 
 
 @dataclass(frozen=True)
-class Named(Kind):
+class Named(AttributeKind):
     """A value with the name of its type before it."""
 
-    types: tuple[tuple[str, Kind], ...]
+    types: tuple[tuple[str, AttributeKind], ...]
 
-    def problem(self, value: Value, file: Part21) -> str | None:
+    def problem(self, value: Value, file: Part21File) -> str | None:
         wanted = " or ".join(f"{name}(...)" for name, _ in self.types)
         if not isinstance(value, Typed) or value.name not in dict(self.types):
             return f"{wanted} expected, not {shown(value)}"
@@ -138,46 +139,47 @@ class Named(Kind):
 
 
 @dataclass(frozen=True)
-class Nothing(Kind):
+class Nothing(AttributeKind):
     """``*``: the value follows from others."""
 
-    def problem(self, value: Value, file: Part21) -> str | None:
+    def problem(self, value: Value, file: Part21File) -> str | None:
         return None if value is DERIVED else f"* expected, not {shown(value)}"
 
 
 @dataclass(frozen=True)
-class Either(Kind):
-    """Whatever suits one of several kinds."""
+class Either(AttributeKind):
+    """A value of one of several kinds."""
 
-    kinds: tuple[Kind, ...]
+    kinds: tuple[AttributeKind, ...]
 
-    def problem(self, value: Value, file: Part21) -> str | None:
+    def problem(self, value: Value, file: Part21File) -> str | None:
         problems = [kind.problem(value, file) for kind in self.kinds]
         return None if None in problems else problems[0]
 
 
-Attributes = tuple[tuple[str, Kind], ...]
+Attributes = tuple[tuple[str, AttributeKind], ...]
 Table = Mapping[str, Attributes]
 
 
 def shown(value: Value) -> str:
-    """A value for an error, cut short."""
+    """A value for an error message, shortened."""
     text = "$, nothing," if value is None else repr(value)
     return text if len(text) <= 50 else text[:47] + "..."
 
 
 class Checked:
-    """The instances of a file, each held against the tables of its form.
+    """The instances of a file, each checked against the tables of its form.
 
-    table   : by entity; records : by the names of the records of complex instances, which hold no inherited attributes
+    table   : by entity
+    records : by the names of the records of complex instances, which hold no inherited attributes
 
     Raises
     ------
     ProgramError
-        Subjects name the instance: one whose values are not what the tables say.
+        An instance has values of wrong kinds; the subjects name it.
     """
 
-    def __init__(self, file: Part21, table: Table, records: Table | None = None) -> None:
+    def __init__(self, file: Part21File, table: Table, records: Table | None = None) -> None:
         self.file, self._table, self._records = file, table, records or {}
         self._columns = {many: {entity: {name: k for k, (name, _) in enumerate(kinds)}
                                   for entity, kinds in these.items()}
@@ -195,19 +197,19 @@ class Checked:
         return self.file.of(entity)
 
     def get(self, number: int, *entities: str) -> Record:
-        """Name and values of an instance, which is of one of some entities; ProgramError where it is of none.
+        """Name and values of an instance of one of some entities; ProgramError where it is of none.
 
-        An entity that its form writes alone is refused among the records of a complex instance, and the other way
-        round: its values were held against no table.
+        An entity that its form writes alone is refused among the records of a complex instance, and vice versa: no
+        table checks its values there.
         """
         records = self.file.records(number)
         for record in records:
             if record[0] in entities:
                 if record[0] not in (self._records if len(records) > 1 else self._table):
                     raise self.file.error(number, f"has {record[0]} {'among' if len(records) > 1 else 'without'} "
-                                                  "other records, as its form does not write it")
+                                                  "other records, which its form does not allow")
                 return record
-        raise self.file.error(number, f"is to be {' or '.join(entities)}")
+        raise self.file.error(number, f"must be {' or '.join(entities)}")
 
     def one(self, number: int, entity: str, attribute: str) -> Value:
         """One attribute of an instance."""
@@ -226,7 +228,7 @@ class Checked:
         return None if self.one(number, entity, attribute) is None else self.ref(number, entity, attribute)
 
     def refs(self, number: int, entity: str, attribute: str) -> list[int]:
-        """The numbers a list refers to."""
+        """The numbers of the instances that a list refers to."""
         value = self.one(number, entity, attribute)
         return [int(v) for v in value if isinstance(v, Ref)] if isinstance(value, list) else []
 
@@ -235,14 +237,19 @@ class Checked:
         value = self.one(number, entity, attribute)
         return value if isinstance(value, float) else None
 
-    def within(self, number: int, what: str, value: float, least: float, most: float) -> float:
-        """The value, which has a sane size; ProgramError, naming the instance, where it has none."""
-        if not least <= value <= most:  # nor where it is nan
-            raise self.file.error(number, f", {what}: {least:g} to {most:g} expected, not {value:g}")
+    def within(self, number: int, label: str, value: float, low: float, high: float) -> float:
+        """The value, which must lie from ``low`` to ``high``; ProgramError names the instance where it does not."""
+        if not low <= value <= high:  # nor where it is nan
+            raise self.file.error(number, f", {label}: {low:g} to {high:g} expected, not {value:g}")
         return value
 
     def placement(self, number: int, scale: float = 1.0) -> F64:
-        """(4, 4) float64, mm: from an AXIS2_PLACEMENT_3D to what it is placed in; ``scale`` is mm in its unit."""
+        """Transformation of an AXIS2_PLACEMENT_3D to the frame that it is placed in.
+
+        scale : mm in the unit of the file
+
+        Returns (4, 4) float64: a rotation, dimensionless, and an origin, mm.
+        """
         entity = "AXIS2_PLACEMENT_3D"
         out = np.eye(4)
         out[:3, 3] = self._places(number, np.array([self.ref(number, entity, "location")], np.int64), scale)[0]
@@ -257,7 +264,7 @@ class Checked:
         return out
 
     def vector(self, number: int) -> F64:
-        """(3,) float64, unit: a DIRECTION."""
+        """(3,) float64, dimensionless, frame of the file: a DIRECTION of length one."""
         ratios = self.one(number, "DIRECTION", "direction_ratios")
         out = np.array([v for v in ratios if isinstance(v, float)] if isinstance(ratios, list) else [])
         length = float(np.linalg.norm(out)) if len(out) and np.abs(out).max() <= LONGEST_VECTOR else 0.0
@@ -267,9 +274,16 @@ class Checked:
         return out / length
 
     def unit_axes(self, number: int, words: str, axes: F64, count: int) -> F64:
-        """Tool axes (n, 3) of a path of ``count`` points made exactly unit; ProgramError where they cannot be axes."""
+        """Tool axes of a path made exactly unit; ProgramError where they cannot be axes.
+
+        words : name of the attribute, for the error
+        axes  : (n, 3) float64, dimensionless, frame of the file
+        count : number of points of the path
+
+        Returns (n, 3) float64, dimensionless, same frame.
+        """
         if len(axes) != count:
-            raise self.file.error(number, f", {words}: {count} points expected, as the path has, not {len(axes)}")
+            raise self.file.error(number, f", {words}: {count} points expected as in the path, not {len(axes)}")
         size = np.linalg.norm(axes, axis=1)
         if (bad := np.flatnonzero(np.abs(size - 1.0) > UNIT)).size:
             raise self.file.error(number, f", {words}: unit vectors expected, but point {bad[0] + 1} has length "
@@ -277,7 +291,12 @@ class Checked:
         return axes / size[:, None]
 
     def curve(self, number: int, scale: float = 1.0) -> tuple[F64, F64]:
-        """Points (n, 3) of a polyline, times ``scale``, and the lines (n,) of the file they stand in, as floats."""
+        """Points of a polyline and their lines in the file.
+
+        scale : mm in the unit of the file
+
+        Returns (n, 3) float64, mm, frame of the file, and (n,) float64, index, 1-based lines.
+        """
         numbers = self.file.plain_polyline(number)
         if numbers is None:
             self._check(number, "POLYLINE")
@@ -286,7 +305,7 @@ class Checked:
         return self._places(number, numbers, scale), self.file.lines_of(numbers).astype(np.float64)
 
     def point(self, number: int, scale: float = 1.0) -> F64:
-        """(3,) float64: a CARTESIAN_POINT, times ``scale``."""
+        """(3,) float64, mm, frame of the file: a CARTESIAN_POINT; ``scale`` is mm in the unit of the file."""
         self.get(number, "CARTESIAN_POINT")
         return np.asarray(self._places(number, np.array([number], np.int64), scale)[0])
 
@@ -295,7 +314,7 @@ class Checked:
         points = self.file.points(numbers)
         for k in np.flatnonzero(np.isnan(points).any(axis=1)).tolist():  # those not written plainly
             points[k] = np.array(self.one(int(numbers[k]), "CARTESIAN_POINT", "coordinates"), np.float64)
-        with np.errstate(over="ignore"):  # what has no place in a float any more is far away too
+        with np.errstate(over="ignore"):  # an overflow is beyond FARTHEST too
             points = points * scale
         if (far := np.flatnonzero(~(np.abs(points) <= FARTHEST).all(axis=1))).size:
             raise self.file.error(int(numbers[far[0]]), f", coordinates: numbers within {FARTHEST / scale:g} expected",
@@ -303,7 +322,7 @@ class Checked:
         return points
 
     def _check_points(self, number: int, numbers: NDArray[np.int64]) -> None:
-        """Refuse a polyline that refers to what is no point."""
+        """Refuse a polyline that refers to an instance that is not a point."""
         for target in numbers[self.file.rows(numbers) < 0].tolist():
             problem = To(("CARTESIAN_POINT",)).problem(Ref(target), self.file)
             if problem is not None:
@@ -313,18 +332,18 @@ class Checked:
         records = self.file.records(number)
         record = next((r for r in records if r[0] == entity), None)
         if record is None:
-            raise self.file.error(number, f"is to be {entity}")
+            raise self.file.error(number, f"must be {entity}")
         kinds = (self._records if len(records) > 1 else self._table).get(entity)
         if kinds is None:
             return
         if len(record[1]) != len(kinds):
-            raise self.file.error(number, f"has {len(record[1])} attributes of {entity}, {len(kinds)} are due")
+            raise self.file.error(number, f"has {len(record[1])} attributes of {entity}, {len(kinds)} are required")
         for (name, kind), value in zip(kinds, record[1], strict=True):
             problem = kind.problem(value, self.file)
             if problem is not None:
                 raise self.file.error(number, f", {name}: {problem}")
 
 
-def attributes(**kinds: Kind) -> Attributes:
+def attributes(**kinds: AttributeKind) -> Attributes:
     """The attributes of an entity, in order."""
     return tuple(kinds.items())

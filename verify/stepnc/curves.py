@@ -1,6 +1,6 @@
-"""Curves of both STEP-NC forms along which a tip goes: polylines, arcs of circles, and such one after the other.
+"""Path curves of both STEP-NC forms: polylines, arcs of circles, and sequences of them.
 
-An arc is read as a G2 or G3 is (``verify.program.arc_chords``): as chords that leave it by 0.001 mm at most.
+An arc is read like a G2 or G3 (``verify.program.arc_chords``): as chords that leave it by 0.001 mm at most.
 """
 
 from __future__ import annotations
@@ -31,9 +31,11 @@ CURVE_TABLE: Table = {
 
 
 def curve_points(data: Checked, number: int, scale: float = 1.0) -> tuple[F64, F64]:
-    """Points (n, 3) of a curve, mm, and the lines (n,) of the file they stand in; of an arc that of the arc.
+    """Points of a curve and their lines in the file; points of an arc have the line of the arc.
 
-    scale : mm in the unit of its lengths
+    scale : mm in the unit of the file
+
+    Returns (n, 3) float64, mm, frame of the file, and (n,) float64, index, 1-based lines.
     """
     entity = data.get(number, *CURVES)[0]
     if entity == "POLYLINE":
@@ -50,7 +52,7 @@ def curve_points(data: Checked, number: int, scale: float = 1.0) -> tuple[F64, F
         if points:
             gap = float(np.abs(p[0] - points[-1][-1]).max())
             if gap > JOIN:
-                raise data.file.error(segment, f", parent_curve: begins {gap:g} mm from the end of the one before",
+                raise data.file.error(segment, f", parent_curve: begins {gap:g} mm from the end of the segment before",
                                       number)
             p, at = p[1:], at[1:]
         points.append(p)
@@ -67,13 +69,13 @@ def _arc(data: Checked, number: int, scale: float) -> tuple[F64, F64]:
     for trim in ("trim_1", "trim_2"):
         found = [int(v) for v in data.refs(number, entity, trim)]
         if len(found) != 1:
-            raise file.error(number, f", {trim}: one CARTESIAN_POINT expected; parameters alone are not read")
+            raise file.error(number, f", {trim}: one CARTESIAN_POINT expected; parameters are not read")
         ends.append(data.point(found[0], scale))
     local = [(p - place[:3, 3]) @ place[:3, :3] for p in ends]
     for trim, p in zip(("trim_1", "trim_2"), local, strict=True):
         off = max(abs(float(p[2])), abs(float(np.hypot(p[0], p[1])) - radius))
         if not off <= FLAT:
-            raise file.error(number, f", {trim}: a point of the circle expected, it is {off:g} mm off", circle)
+            raise file.error(number, f", {trim}: a point on the circle expected, it is {off:g} mm off", circle)
     clockwise = data.one(number, entity, "sense_agreement") == "F"
     try:
         rows = arc_points(local[0], local[1], np.zeros(2), clockwise, (0, 1, 2))

@@ -1,9 +1,9 @@
-"""STEP-NC as ISO 14649 (MACHINING_SCHEMA, MILLING_SCHEMA), read: what its main workplan makes the tool do.
+"""Reader of STEP-NC as ISO 14649 (MACHINING_SCHEMA, MILLING_SCHEMA): records the tool motion of its main workplan.
 
-Lengths are mm, feeds m/s, spindle speeds 1/s, positive counter-clockwise, as ISO 14649-10 has it where nothing is said.
-Paths are in the system of their feature, that in the workpiece, and this as the setup places it. What the reader has no
-motion for (strategies without a path, contact trajectories, splines, branches) is refused by instance: nothing is
-passed over that could move the tool.
+Lengths are mm, feeds m/s, spindle speeds 1/s, positive counter-clockwise: the defaults of [ISO14649-10]. Paths are in
+the frame of their feature, features in that of the workpiece, and the setup places the workpiece. The reader refuses,
+by instance, what could move the tool and is not read: strategies without a path, contact trajectories, splines and
+branches.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from verify.stepnc.attribute_checks import (
     attributes,
 )
 from verify.stepnc.curves import CURVE_TABLE, CURVES, curve_points
-from verify.stepnc.part21 import Part21, Ref, Typed, Value
-from verify.stepnc.tool_motion import LEAST_FEED, MOST_DWELL, MOST_FEED, MOST_SPEED, Course, Cutter
+from verify.stepnc.part21 import Part21File, Ref, Typed, Value
+from verify.stepnc.tool_motion import MAX_DWELL, MAX_FEED, MAX_SPEED, MIN_FEED, CutterRecord, MotionRecorder
 
 SCHEMAS = frozenset({"MACHINING_SCHEMA", "MILLING_SCHEMA", "COMBINED_SCHEMA"})
 MM_MIN = 60_000.0  # of one m/s
@@ -112,7 +112,7 @@ TABLE: Table = {
     "CUTTER_LOCATION_TRAJECTORY": attributes(**_PATH, its_direction=Maybe(FLAG), basiccurve=To(CURVES),
                                              its_toolaxis=Maybe(To(("POLYLINE",))),
                                              surface_normal=Maybe(To(("POLYLINE",)))),
-    "FEEDSTOP": attributes(**_PATH, dwell=Real(-1e-9, MOST_DWELL)),
+    "FEEDSTOP": attributes(**_PATH, dwell=Real(-1e-9, MAX_DWELL)),
     "MILLING_TECHNOLOGY": attributes(
         feedrate=Maybe(Real(0.0)), feedrate_reference=OneOf(("TCP", "CCP")), cutspeed=Maybe(Real(0.0)),
         spindle=Maybe(Real()), feedrate_per_tooth=Maybe(Real(0.0)), synchronize_spindle_with_feed=FLAG,
@@ -160,43 +160,50 @@ RECORDS: Table = {
 }
 
 
-def read_arm(file: Part21, course: Course) -> None:
-    """Tell a course what the main workplan of a file makes the tool do.
+def read_iso14649(file: Part21File, recorder: MotionRecorder) -> None:
+    """Record the tool motion of the main workplan of a file [ISO14649-10; ISO14649-11].
 
     Raises
     ------
     ProgramError
-        An instance, which the subjects name, is not what the form wants of it, or moves the tool in a way that is not
-        read.
+        An instance, which the subjects name, does not have the required form, or moves the tool in a way that the
+        reader does not know.
     """
-    _Arm(file, course).run()
+    Iso14649Reader(file, recorder).run()
 
 
-class _Arm:
-    """One reading: where workpieces stand, and what stands in force."""
+class Iso14649Reader:
+    """One reading of an ISO 14649 file: placements of workpieces, and the walk through the workplan."""
 
-    def __init__(self, file: Part21, course: Course) -> None:
-        self.file, self.course = file, course
+    def __init__(self, file: Part21File, recorder: MotionRecorder) -> None:
+        self.file, self.recorder = file, recorder
         self.data = Checked(file, TABLE, RECORDS)
         self.place = np.eye(4)
         self.elements: list[tuple[int, F64]] = []
         self.seen: set[int] = set()
 
     def run(self) -> None:
+        """Record the motion of the main workplan.
+
+        Raises
+        ------
+        ProgramError
+            The file does not have exactly one project, or an instance is wrong.
+        """
         projects = self.data.of("PROJECT")
         if len(projects) != 1:
             raise ProgramError(f"{self.file.name}: one PROJECT expected, not {len(projects)}",
                                subjects=tuple(f"#{n}" for n in projects), measured=len(projects), limit=1,
-                               remedy="send one project a file")
+                               remedy="send one project per file")
         self._flatten(self.data.ref(projects[0], "PROJECT", "main_workplan"), np.eye(4))
         for k, (number, place) in enumerate(self.elements):
             self.place = place
             self._execute(k, number)
 
     def _flatten(self, number: int, place: F64) -> None:
-        """Note the elements of a workplan, those of workplans in it too, with the frame their workpiece is in."""
+        """List the elements of a workplan and of the workplans in it, with the frame of their workpiece."""
         if number in self.seen:
-            raise self.file.error(number, "stands in two places of the workplans, or in itself")
+            raise self.file.error(number, "appears in two places of the workplans, or inside itself")
         self.seen.add(number)
         if self.data.get(number, *_EXECUTABLES)[0] != "WORKPLAN":
             self.elements.append((number, place))
@@ -206,7 +213,7 @@ class _Arm:
             self._flatten(element, place if setup is None else self._setup(setup))
 
     def _setup(self, number: int) -> F64:
-        """(4, 4): from the workpiece to the setup frame."""
+        """(4, 4): transformation from the workpiece to the setup frame."""
         holdings = self.data.refs(number, "SETUP", "its_workpiece_setup")
         if not holdings:
             return np.eye(4)
@@ -219,9 +226,9 @@ class _Arm:
     def _execute(self, place: int, number: int) -> None:
         entity, line = self.data.get(number, *_EXECUTABLES)[0], self.file.line(number)
         if entity in ("PROGRAM_STOP", "OPTIONAL_STOP"):
-            self.course.stop("program stop", line)
+            self.recorder.stop("program stop", line)
         elif entity == "RETURN_HOME":
-            self.course.stop("return to home", line)
+            self.recorder.stop("return to home", line)
         elif entity == "RAPID_MOVEMENT":
             self._rapid(place, number, line)
         elif entity == "MACHINING_WORKINGSTEP":
@@ -229,14 +236,14 @@ class _Arm:
             self._operation(operation, self._feature(feature, operation))
 
     def _rapid(self, place: int, number: int, line: int) -> None:
-        """One without a path brings the tool of the next workingstep over the security plane to where that begins."""
+        """Rapid movement; without a path it takes the next tool over the security plane to the next workingstep."""
         entity = "RAPID_MOVEMENT"
         paths = self.data.maybe(number, entity, "its_toolpath")
         if paths is not None:
             self._paths(paths, np.eye(4), self._direction(number, entity), number, None, rapid=True)
             return
         point, normal = self._plane(self.data.ref(number, entity, "its_secplane"))
-        self.course.over(point, normal, line)
+        self.recorder.over(point, normal, line)
         for later, _ in self.elements[place + 1:]:
             if self.data.get(later, *_EXECUTABLES)[0] == "MACHINING_WORKINGSTEP":
                 operation = self.data.ref(later, "MACHINING_WORKINGSTEP", "its_operation")
@@ -244,10 +251,10 @@ class _Arm:
                 return
 
     def _take(self, tool: int, line: int) -> None:
-        self.course.take(self._cutter(tool), line)
+        self.recorder.take(self._cutter(tool), line)
 
     def _feature(self, number: int, operation: int) -> F64:
-        """(4, 4): from the feature, which has to list the operation on it, to the workpiece."""
+        """(4, 4): transformation from the feature, which must list the operation on it, to the workpiece."""
         for _, values in self.file.records(number)[:1]:
             listed = values[2] if len(values) > 2 else None
             if not isinstance(listed, list) or Ref(operation) not in listed:
@@ -266,16 +273,16 @@ class _Arm:
             raise self.file.error(number, ", its_toolpath: TOOLPATH_LIST expected; strategies without one are not read")
         for attribute in ("approach", "retract"):
             if self.data.one(number, entity, attribute) is not None:
-                raise self.file.error(number, f", {attribute}: $ expected, as the tool path holds it")
+                raise self.file.error(number, f", {attribute}: $ expected; the tool path contains it")
         self._take(self.data.ref(number, entity, "its_tool"), self.file.line(number))
         technology = self.data.ref(number, entity, "its_technology")
         functions = self.data.ref(number, entity, "its_machine_functions")
-        self.course.coolant = self.data.one(functions, "MILLING_MACHINE_FUNCTIONS", "coolant") == "T"
+        self.recorder.coolant = self.data.one(functions, "MILLING_MACHINE_FUNCTIONS", "coolant") == "T"
         self._paths(paths, place, self._direction(number, entity), number, technology,
                     rapid=False)
 
     def _direction(self, number: int, entity: str) -> F64 | None:
-        """(3,): the tool axis where paths have none; None where they must."""
+        """(3,): the tool axis of paths without axes; None where paths must have axes."""
         target = self.data.maybe(number, entity, "its_tool_direction")
         if target is None:
             return None
@@ -288,10 +295,10 @@ class _Arm:
 
     def _paths(self, number: int, place: F64, direction: F64 | None, owner: int, technology: int | None, *,
                rapid: bool) -> None:
-        """Follow a list of paths; direction is the tool axis where they have none, as their owner says it."""
+        """Follow a list of paths; ``direction`` is the tool axis that their owner gives to paths without axes."""
         for path in self.data.refs(number, "TOOLPATH_LIST", "its_list"):
             if self.data.get(path, "CUTTER_LOCATION_TRAJECTORY", "FEEDSTOP")[0] == "FEEDSTOP":
-                self.course.dwell += self.data.real(path, "FEEDSTOP", "dwell") or 0.0
+                self.recorder.dwell += self.data.real(path, "FEEDSTOP", "dwell") or 0.0
             else:
                 self._trajectory(path, place, direction, owner, technology, rapid)
 
@@ -305,7 +312,7 @@ class _Arm:
             axes = self.data.unit_axes(number, "its_toolaxis", axes, len(tips))
         elif direction is None:
             raise self.file.error(number, f", its_toolaxis: POLYLINE expected, or THREE_AXES as its_tool_direction of "
-                                          f"#{owner}: nothing says how the tool stands", owner)
+                                          f"#{owner}: the tool axis is not given", owner)
         else:
             axes = np.tile(direction, (len(tips), 1))
         if self.data.one(number, entity, "its_direction") == "F":
@@ -314,7 +321,7 @@ class _Arm:
         own = self.data.maybe(number, entity, "its_technology")
         feed, speed = self._rates(number, own if own is not None else technology, fast)
         turn = self.place @ place
-        self.course.follow(tips @ turn[:3, :3].T + turn[:3, 3], axes @ turn[:3, :3].T, rapid=fast, feed=feed,
+        self.recorder.follow(tips @ turn[:3, :3].T + turn[:3, 3], axes @ turn[:3, :3].T, rapid=fast, feed=feed,
                            speed=speed, lines=lines)
 
     def _rates(self, path: int, technology: int | None, rapid: bool) -> tuple[float, float]:
@@ -326,14 +333,14 @@ class _Arm:
         entity = "MILLING_TECHNOLOGY"
         feed, spindle = (self.data.real(technology, entity, a) for a in ("feedrate", "spindle"))
         if feed is None and not rapid:
-            raise self.file.error(technology, ", feedrate: a real number, m/s, expected; feeds a tooth are not read")
+            raise self.file.error(technology, ", feedrate: a real number, m/s, expected; feeds per tooth are not read")
         if spindle is None:
             raise self.file.error(technology, ", spindle: a real number, 1/s, expected; cutting speeds are not read")
         if not rapid and self.data.one(technology, entity, "feedrate_reference") != "TCP":
             raise self.file.error(technology, ", feedrate_reference: .TCP. expected, the feed of the tip")
         return sane_rates(self.data, technology, math.nan if feed is None else feed * MM_MIN, -RPM * spindle)
 
-    def _cutter(self, number: int) -> Cutter:
+    def _cutter(self, number: int) -> CutterRecord:
         name = str(self.data.one(number, "MILLING_CUTTING_TOOL", "its_id"))
         body = self.data.ref(number, "MILLING_CUTTING_TOOL", "its_tool_body")
         kind = self.data.get(body, *_CUTTERS)[0]
@@ -349,9 +356,9 @@ class _Arm:
                 raise self.file.error(size, f", {angle}: $ or 0. expected; tapered cutters are not read")
         corner = 0.5 * wide if kind == "BALL_ENDMILL" else edge or 0.0
         if edge is not None and abs(edge - corner) > 1e-6 or corner > 0.5 * wide + 1e-9:
-            raise self.file.error(size, f", edge_radius: {0.5 * wide:g} expected, half of the diameter, or less on a "
+            raise self.file.error(size, f", edge_radius: {0.5 * wide:g} (half of the diameter) expected, or less on a "
                                         f"bull nose, not {edge}")
-        return Cutter(tool_number(name), name, shape_of(wide, corner), wide, corner, long,
+        return CutterRecord(tool_number(name), name, shape_of(wide, corner), wide, corner, long,
                       self.data.real(number, "MILLING_CUTTING_TOOL", "overall_assembly_length"), number)
 
     def _plane(self, number: int) -> tuple[F64, F64]:
@@ -361,16 +368,16 @@ class _Arm:
 
 
 def tool_number(name: str) -> int | None:
-    """The T number a tool's id opens with, 'T7: ball' or '7'; None where it does not."""
+    """The T number at the start of a tool id, as in 'T7: ball' or '7'; None where there is none."""
     found = re.match(r"\s*T?([0-9]{1,6})(?![0-9A-Za-z.])", name)
     return int(found.group(1)) if found else None
 
 
 def sane_rates(data: Checked, technology: int, feed: float, speed: float) -> tuple[float, float]:
-    """Feed, mm/min, nan where none is said, and speed, 1/min; ProgramError where one is of a size no machine has."""
+    """Feed, mm/min, nan where none is given, and speed, 1/min; ProgramError where no machine has such a value."""
     if not math.isnan(feed):
-        data.within(technology, "feedrate in mm/min", feed, LEAST_FEED, MOST_FEED)
-    return feed, data.within(technology, "spindle in 1/min", speed, -MOST_SPEED, MOST_SPEED)
+        data.within(technology, "feedrate in mm/min", feed, MIN_FEED, MAX_FEED)
+    return feed, data.within(technology, "spindle in 1/min", speed, -MAX_SPEED, MAX_SPEED)
 
 
 def shape_of(diameter: float, corner: float) -> str:
@@ -380,4 +387,4 @@ def shape_of(diameter: float, corner: float) -> str:
     return "ball" if corner >= 0.5 * diameter - 1e-6 else "bull"
 
 
-__all__ = ["SCHEMAS", "read_arm", "sane_rates", "shape_of", "tool_number"]
+__all__ = ["SCHEMAS", "read_iso14649", "sane_rates", "shape_of", "tool_number"]

@@ -1,12 +1,12 @@
-"""STEP Part 21 text (ISO 10303-21) as instances, each with the line it begins in; a reader of its own.
+"""The verifier's own reader of STEP Part 21 text: instances, each with its line [ISO10303-21].
 
-Comments may stand wherever blanks may, statements may be split into lines as they like, strings hold doubled quotes and
-the directives ``\\X\\``, ``\\X2\\``, ``\\X4\\``, ``\\S\\``. Instances are parsed when they are asked for; points of
-three coordinates, of which paths have millions, are read all at once. What the grammar does not allow is refused by
-its place, what an instance lacks by its number and name: ``#123 POLYLINE, points: ...``.
+Comments may stand wherever blanks may, statements may span lines, strings hold doubled quotes and the directives
+``\\X\\``, ``\\X2\\``, ``\\X4\\``, ``\\S\\``. The reader parses an instance when it is needed, and reads points of three
+coordinates, of which paths have millions, all at once. An error of the grammar names its line, an error of an instance
+its number and name: ``#123 POLYLINE, points: ...``.
 
-Files come from anybody, so every expression has to give up in one pass: repetitions are possessive, and what may begin
-anywhere is not begun again inside a run of its own letters.
+Files are untrusted, so every expression must fail in one pass: repetitions are possessive, and a match does not restart
+inside a run of its own letters.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from geometry.errors import ProgramError
 from geometry.mesh import F64, I32
 
-SHOWN = 60  # characters of a text that an error quotes
-DEEPEST = 20  # lists in lists
-LONGEST = 128  # letters of a name; the longest of the schemas have some 60
+SHOWN = 60  # characters of the text that an error quotes
+DEEPEST = 20  # nested lists
+LONGEST = 128  # letters of a name; the longest of the schemas have about 60
 _CHUNK = 65_536
 _PIECE = 1 << 20
 _FLAGS = re.DOTALL | re.ASCII  # blanks are those of ASCII: numpy reads lists of references and knows no others
@@ -62,7 +62,7 @@ class Ref(int):
         return f"#{int(self)}"
 
 
-class Word(str):
+class EnumItem(str):
     """An enumeration item, without its dots."""
 
     __slots__ = ()
@@ -80,7 +80,7 @@ class Typed:
 
 
 class Derived:
-    """What stands for a value that follows from others, ``*``."""
+    """Placeholder ``*`` of a value that follows from others."""
 
     def __repr__(self) -> str:
         return "*"
@@ -88,12 +88,12 @@ class Derived:
 
 DERIVED = Derived()
 Value = object
-"""float, int, str, Word, Ref, Typed, DERIVED, None for ``$``, or a list of these."""
+"""float, int, str, EnumItem, Ref, Typed, DERIVED, None for ``$``, or a list of these."""
 Record = tuple[str, list[Value]]
 
 
-class Part21:
-    """An exchange file.
+class Part21File:
+    """An exchange file; coordinates are in the unit and frame of the file.
 
     name    : of the file, for errors
     header  : values of the header by entity name
@@ -113,7 +113,7 @@ class Part21:
         self.lines = len(self._breaks) + (0 if text.endswith("\n") else 1)
 
     def of(self, entity: str) -> list[int]:
-        """Numbers of the instances of an entity, in the order they stand; of complex ones those it is a record of."""
+        """Numbers of the instances of an entity, in file order, complex ones with such a record included."""
         return self._named.get(entity, [])
 
     def entities(self) -> Mapping[str, Sequence[int]]:
@@ -121,7 +121,7 @@ class Part21:
         return self._named
 
     def has(self, number: int) -> bool:
-        """Whether there is an instance of a number."""
+        """Whether the file has an instance of a number."""
         return number in self._spans or self._point(number) >= 0
 
     def names(self, number: int) -> tuple[str, ...]:
@@ -133,7 +133,7 @@ class Part21:
         return self._names[number]
 
     def records(self, number: int) -> list[Record]:
-        """Names and values of an instance; ProgramError where its text breaks the grammar, or there is none."""
+        """Names and values of an instance; ProgramError where it breaks the grammar or does not exist."""
         if number not in self._records:
             if number not in self._spans:
                 row = self._point(number)
@@ -144,11 +144,16 @@ class Part21:
         return self._records[number]
 
     def line(self, number: int) -> int:
-        """1-based line that an instance begins in."""
+        """1-based line in which an instance begins."""
         return int(self.lines_of(np.array([number], np.int64))[0])
 
     def lines_of(self, numbers: NDArray[np.int64]) -> I32:
-        """(n,) int32: 1-based lines that instances (n,), by their numbers, begin in; 0 where there is none."""
+        """Lines in which instances begin.
+
+        numbers : (n,) int64, index, numbers of instances
+
+        Returns (n,) int32, index, 1-based lines; 0 where there is no such instance.
+        """
         row = self.rows(numbers)
         at = np.where(row >= 0, self._point_at[row], -1) if len(self._point_at) else np.full(len(numbers), -1)
         for k in np.flatnonzero(row < 0).tolist():
@@ -157,20 +162,26 @@ class Part21:
         return np.where(at < 0, 0, np.searchsorted(self._breaks, at) + 1).astype(np.int32)
 
     def points(self, numbers: NDArray[np.int64]) -> F64:
-        """(n, 3) float64: coordinates of points (n,) by their numbers, nan where one is no point of three."""
+        """Coordinates of points.
+
+        numbers : (n,) int64, index, numbers of instances
+
+        Returns (n, 3) float64, mm or the unit of the file, its frame; nan where an instance is not a plain point of
+        three coordinates.
+        """
         row = self.rows(numbers)
         out = np.full((len(numbers), 3), np.nan)
         out[row >= 0] = self._points[row[row >= 0]]
         return out
 
     def plain_polyline(self, number: int) -> NDArray[np.int64] | None:
-        """(n,) int64: what a POLYLINE of two or more references refers to; None where it is not plainly that."""
+        """(n,) int64, index: numbers of the points of a POLYLINE; None where it is not a plain list of references."""
         span = self._spans.get(number)
         found = None if span is None else _POLYLINE.match(self._text, span[1])
         return None if found is None else np.fromstring(found.group(1).replace("#", ""), np.int64, sep=",")
 
     def error(self, number: int, problem: str, also: int | None = None) -> ProgramError:
-        """The error that names an instance, and another one that has to do with it."""
+        """The error that names an instance, and where given a second one that it concerns."""
         span = self._spans.get(number)
         entity = ""
         if self._point(number) >= 0:
@@ -181,7 +192,7 @@ class Part21:
         line = (f"line {self.line(number)}",) if self.has(number) and self._breaks.size else ()
         subjects = (f"#{number}", *((f"#{also}",) if also is not None else ()), *line)
         return ProgramError(f"{self.name}, #{number}{entity}{'' if problem.startswith(',') else ' '}{problem}",
-                            subjects=subjects, remedy="correct the instance named")
+                            subjects=subjects, remedy="correct the named instance")
 
     def _broken(self, at: int, problem: str) -> ProgramError:
         line = self._text.count("\n", 0, at) + 1
@@ -193,7 +204,12 @@ class Part21:
         return k if k < len(self._point_ids) and self._point_ids[k] == number else -1
 
     def rows(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(n,) int64: which of the points written plainly, with three numbers, they are; -1 where one is none."""
+        """Rows of plain points, those with three numbers.
+
+        numbers : (n,) int64, index, numbers of instances
+
+        Returns (n,) int64, index; -1 where an instance is not a plain point.
+        """
         if not len(self._point_ids):
             return np.full(len(numbers), -1, np.int64)
         k = np.minimum(np.searchsorted(self._point_ids, numbers), len(self._point_ids) - 1)
@@ -208,10 +224,10 @@ class Part21:
             at = _SKIP.match(self._text, at).end()  # type: ignore[union-attr]
             found = _STATEMENT.match(self._text, at)
             if found is None:
-                raise self._broken(at, "the text breaks off before the data section")
+                raise self._broken(at, "the text ends before the data section")
             words = " ".join(_ASIDE.sub(" ", found.group(1)).split())
             if not sections and words != "ISO-10303-21":
-                raise self._broken(at, "a STEP file begins with ISO-10303-21;")
+                raise self._broken(at, "a STEP file must begin with ISO-10303-21;")
             if words.startswith("DATA"):
                 break
             if "(" in words:
@@ -226,7 +242,7 @@ class Part21:
         return given[0] if given and isinstance(given[0], list) else []
 
     def _scan(self, at: int) -> None:
-        """Find all instances up to the end of the section, points with their coordinates."""
+        """Find all instances up to the end of the section, and read the coordinates of points."""
         text, match = self._text, _INSTANCE.match
         numbers: list[int] = []
         words: list[str] = []
@@ -250,7 +266,7 @@ class Part21:
                     pack()
             else:
                 if number in self._spans:
-                    raise self._broken(found.start(1), f"#{number} stands twice")
+                    raise self._broken(found.start(1), f"#{number} appears twice")
                 self._spans[number] = found.start(1), found.start(5)
                 for name in _entity_names(body):
                     if len(name) > LONGEST:
@@ -265,26 +281,26 @@ class Part21:
         twice = self._point_ids[1:][self._point_ids[1:] == self._point_ids[:-1]].tolist()
         twice += [n for n in self._spans if self._point(n) >= 0]
         if twice:
-            raise self._broken(self._spans.get(twice[0], (0, 0))[0], f"#{twice[0]} stands twice")
+            raise self._broken(self._spans.get(twice[0], (0, 0))[0], f"#{twice[0]} appears twice")
         self._end(at)
 
     def _end(self, at: int) -> None:
         at = _SKIP.match(self._text, at).end()  # type: ignore[union-attr]
         tail = _ENDING.match(self._text, at)
         if tail is None:
-            raise self._broken(at, "an instance, #number=NAME(...);, or the end of the section was expected")
+            raise self._broken(at, "an instance, #number=NAME(...);, or the end of the section is expected")
         if tail.group(1) is None:
-            raise self._broken(tail.end(), "END-ISO-10303-21; was expected: the text breaks off, or holds a further "
+            raise self._broken(tail.end(), "END-ISO-10303-21; is expected: the text is incomplete, or has another "
                                            "section, which is not read")
 
     def _parse(self, number: int) -> list[Record]:
         span = self._spans[number]
         simple = _SIMPLE.match(self._text, span[1])
-        if simple is not None:  # most are: nothing in brackets, no blanks, strings that mean what they say
+        if simple is not None:  # most are: no brackets, no blanks, strings without directives
             return [(simple.group(1), [_plain(word) for word in simple.group(2).split(",")])]
         found = _STATEMENT.match(self._text, span[1])
         if found is None:
-            raise self.error(number, "breaks off")
+            raise self.error(number, "is incomplete")
         return self._values(found.group(1), span[1], number)
 
     def _values(self, text: str, at: int, number: int | None = None) -> list[Record]:
@@ -298,7 +314,7 @@ class Part21:
 
 
 def _newlines(text: str) -> NDArray[np.int64]:
-    """(n,) int64: where lines of a text end, found piece by piece so that it is not held twice."""
+    """(n,) int64: ends of the lines of a text, found piece by piece to save memory."""
     found = [low + np.flatnonzero(np.frombuffer(text[low:low + _PIECE].encode("ascii", "replace"), np.uint8) == 10)
              for low in range(0, len(text), _PIECE)]
     return np.concatenate([np.zeros(0, np.int64), *found])
@@ -332,11 +348,11 @@ def _plain(word: str) -> Value:
 
 
 def _too_long(name: str) -> str:
-    return f"has a name of {len(name)} letters, {name[:20]}..., {LONGEST} are allowed"
+    return f"has a name of {len(name)} letters, {name[:20]}... ({LONGEST} allowed)"
 
 
 class _Grammar(Exception):
-    """What the text of one statement breaks."""
+    """An error of the grammar in one statement."""
 
 
 class _Tokens:
@@ -359,7 +375,7 @@ class _Tokens:
                 name = _NAME.match(text, at)
                 if name is not None and len(name.group()) > LONGEST:
                     raise _Grammar(_too_long(name.group()))
-                raise _Grammar(f"holds {text[at:at + SHOWN].strip()!r}, which is no value")
+                raise _Grammar(f"holds {text[at:at + SHOWN].strip()!r}, which is not a value")
             yield str(found.lastgroup), found.group(str(found.lastgroup))
             at = found.end()
 
@@ -380,7 +396,7 @@ class _Tokens:
     def _record(self) -> Record:
         kind, name = self._next()
         if kind != "name":
-            raise _Grammar(f"has {name!r} where the name of an entity was expected")
+            raise _Grammar(f"has {name!r} where the name of an entity is expected")
         return name, self._list()
 
     def _list(self) -> list[Value]:
@@ -388,7 +404,7 @@ class _Tokens:
             raise _Grammar("lacks an opening bracket")
         self._depth += 1
         if self._depth > DEEPEST:
-            raise _Grammar(f"has lists more than {DEEPEST} deep in each other")
+            raise _Grammar(f"has more than {DEEPEST} nested lists")
         out: list[Value] = []
         if self._peek() == ("sign", ")"):
             self._at += 1
@@ -401,7 +417,7 @@ class _Tokens:
                 self._depth -= 1
                 return out
             if sign != ("sign", ","):
-                raise _Grammar(f"has {sign[1]!r} where a comma or a closing bracket was expected")
+                raise _Grammar(f"has {sign[1]!r} where a comma or a closing bracket is expected")
 
     def _value(self) -> Value:
         kind, word = self._peek()
@@ -417,23 +433,23 @@ class _Tokens:
         if kind == "text":
             return decoded(word)
         if kind == "word":
-            return Word(word)
+            return EnumItem(word)
         if kind == "bits":
             return Typed("BINARY", word)
         if kind == "name":
             inner = self._list()
             if len(inner) != 1:
-                raise _Grammar(f"gives {word} {len(inner)} values, where a type has one")
+                raise _Grammar(f"gives {word} {len(inner)} values; a type has one")
             return Typed(word, inner[0])
         if word == "$":
             return None
         if word == "*":
             return DERIVED
-        raise _Grammar(f"has {word!r} where a value was expected")
+        raise _Grammar(f"has {word!r} where a value is expected")
 
     def _peek(self) -> tuple[str, str]:
         if self._at >= len(self._tokens):
-            raise _Grammar("breaks off")
+            raise _Grammar("is incomplete")
         return self._tokens[self._at]
 
     def _next(self) -> tuple[str, str]:
@@ -443,7 +459,7 @@ class _Tokens:
 
 
 def decoded(text: str) -> str:
-    """A string of the file, between its quotes, as it is meant: doubled quotes single, directives carried out."""
+    """The text of a string of the file: doubled quotes made single, directives decoded [ISO10303-21]."""
     text = text.replace("''", "'")
     if "\\" not in text:
         return text.replace("\n", "").replace("\r", "")
@@ -464,7 +480,7 @@ def decoded(text: str) -> str:
 
 
 def is_exchange_file(text: str) -> bool:
-    """Whether a text begins as a STEP Part 21 file does, comments and blanks before it left aside."""
+    """Whether a text begins like a STEP Part 21 file, after comments and blanks [ISO10303-21]."""
     start = _SKIP.match(text.lstrip("\ufeff")[:100_000])
     rest = text.lstrip("\ufeff")[start.end() if start else 0:][:40]
     return re.match(r"ISO-10303-21\s*;", rest) is not None

@@ -1,8 +1,8 @@
-"""What a STEP-NC file makes the tool do, whatever form it is in: moves of the tip with axis, feed, speed and cutter.
+"""Tool motion of a STEP-NC file of either form: moves of the tip with axis, feed, speed and cutter.
 
-The readers of both forms tell a ``Course`` what they come upon, in order; ``moves`` gives it as plain values and
-``program`` as a program for the proof. STEP-NC says where the tool stands on the part and not how the rotary axes of a
-machine get it there: for the limits of a machine they are put where they turn least from move to move.
+The readers of both forms report paths, tools and stops to a ``MotionRecorder`` in order. ``moves`` gives the motion as
+plain values and ``program`` as a program for the proof. STEP-NC gives the tool axis on the part and not the angles of
+rotary axes; for the limits of a machine the axes take the angles that turn least from move to move.
 """
 
 from __future__ import annotations
@@ -18,29 +18,29 @@ from geometry.errors import ProgramError, VerificationError
 from geometry.mesh import F64, I32
 from verify.kinematics import Kinematics
 from verify.program.move_kinds import FEED, RAPID
-from verify.program.move_log import MOST_MOVES
-from verify.program.program import Poses, Program, Remark, Stop
-from verify.program.turn_subdivision import MOST_TURN
+from verify.program.move_log import MAX_MOVES
+from verify.program.program import Poses, Program, Remark, StopPoint
+from verify.program.turn_subdivision import MAX_TURN
 
-SAME_PLACE, SAME_AXIS = 2e-4, 2e-6  # mm and of unit vectors, from where a path begins to where the last one ended
-LEAST_FEED, MOST_FEED = 1e-3, 1e7  # mm/min: a word of F has three decimals at most on the controls programs are for
-MOST_SPEED = 1e7  # 1/min
-MOST_DWELL = 1e7  # s
-HALF_TURN = math.pi - 1e-4  # rad: a move that turns the tool as far does not say which way
+SAME_PLACE, SAME_AXIS = 2e-4, 2e-6  # mm and of unit vectors, between the start of a path and the end of the last one
+MIN_FEED, MAX_FEED = 1e-3, 1e7  # mm/min: F words of the supported controls have three decimals at most
+MAX_SPEED = 1e7  # 1/min
+MAX_DWELL = 1e7  # s
+HALF_TURN = math.pi - 1e-4  # rad: such a turn of the tool axis has no definite direction
 EVERY = 7  # X, Y and Z of ``Program.unknown``
 TURNED = 8
 UP = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
-class Cutter:
-    """A tool as a file describes it; None where it does not say.
+class CutterRecord:
+    """A tool as a file describes it; None where the file gives no value.
 
-    number        : of the magazine place, from the id where it opens with one
-    name          : the id of the file
+    number        : T number, from the start of the id
+    name          : the id in the file
     kind          : 'ball', 'bull' or 'flat'
     diameter, corner_radius, flute_length, assembly_length : mm
-    instance      : number of the instance it is
+    instance      : number of its instance
     """
 
     number: int | None
@@ -60,9 +60,9 @@ class CutterMoves:
     start, end : (m, 3) float64, mm; start_axis, end_axis : (m, 3) float64, unit, tip to spindle
     rapid      : (m,) bool; feed : (m,) float64, mm/min, nan for rapids; speed : (m,) float64, 1/min, clockwise positive
     coolant    : (m,) bool
-    cutter     : (m,) int32, place in ``cutters``
-    line       : (m,) int32, 1-based line of the file the end stands in
-    arrival    : (m,) bool, the way there is left to the control: start is end
+    cutter     : (m,) int32, index, place in ``cutters``
+    line       : (m,) int32, index, 1-based line of the end in the file
+    arrival    : (m,) bool, the control chooses the path to this place: start equals end
     cutters    : the tools of the file
     """
 
@@ -77,33 +77,33 @@ class CutterMoves:
     cutter: I32
     line: I32
     arrival: NDArray[np.bool_]
-    cutters: tuple[Cutter, ...]
+    cutters: tuple[CutterRecord, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class _Chunk:
-    """Moves of one path: tips, axes where they are not Z, what holds for all of them, and lines.
+    """Moves of one path: tips, axes where they are not Z, common values, and lines.
 
-    said : rapid, feed, speed, cutter, arrival, coolant
+    shared : rapid, feed, speed, cutter, arrival, coolant
     """
 
     start: F64
     end: F64
     axes: tuple[F64, F64] | None
-    said: tuple[float, ...]
+    shared: tuple[float, ...]
     line: I32
 
 
-class Course:
-    """What was come upon so far.
+class MotionRecorder:
+    """Record of the motion so far, in mm, in the setup frame.
 
-    name : of the file; lines : how many it has
+    name : of the file; lines : number of its lines
     coolant : whether it is on from here on
     """
 
     def __init__(self, name: str, lines: int) -> None:
         self.name, self._lines = name, lines
-        self.cutters: list[Cutter] = []
+        self.cutters: list[CutterRecord] = []
         self._chunks: list[_Chunk] = []
         self._count = 0
         self._here: F64 | None = None  # (6,) tip and axis
@@ -116,8 +116,8 @@ class Course:
         self.notes: list[str] = []
         self.remarks: list[Remark] = []
 
-    def take(self, cutter: Cutter, line: int) -> int:
-        """The place of a tool among the cutters; where it is not the one in the spindle it is changed."""
+    def take(self, cutter: CutterRecord, line: int) -> int:
+        """Change to a tool where it is not in the spindle; returns its place among the cutters."""
         place = next((k for k, c in enumerate(self.cutters) if c.instance == cutter.instance), None)
         if place is None:
             place = len(self.cutters)
@@ -127,19 +127,25 @@ class Course:
         self._tool = place
         return place
 
-    def stop(self, what: str, line: int) -> None:
-        """The program stops; afterwards the tool comes from elsewhere."""
-        self._change(what, line)
+    def stop(self, event: str, line: int) -> None:
+        """Record a stop of the program; afterwards the place of the tool is unknown."""
+        self._change(event, line)
 
     def over(self, point: F64, normal: F64, line: int) -> None:
-        """The next path is got to over a plane; point (3,) mm and unit normal (3,) say which, setup frame."""
+        """Approach the next path over a plane.
+
+        point  : (3,) float64, mm, setup frame
+        normal : (3,) float64, unit
+        """
         self._over = point, normal, line
 
     def follow(self, tips: F64, axes: F64 | None, *, rapid: bool, feed: float, speed: float, lines: F64) -> None:
-        """Go along a path with the tool in the spindle.
+        """Follow a path with the tool in the spindle.
 
-        tips  : (n, 3) float64, mm, setup frame; axes : (n, 3) float64, unit, or None where they are Z
-        feed  : mm/min, speed : 1/min, clockwise positive; lines : (n,) float64, numbers of lines of the file
+        tips  : (n, 3) float64, mm, setup frame
+        axes  : (n, 3) float64, unit, setup frame, or None where they are Z
+        feed  : mm/min; speed : 1/min, clockwise positive
+        lines : (n,) float64, index, 1-based lines of the file
         """
         stood = np.tile(UP, (len(tips), 1)) if axes is None else axes
         there = np.hstack([tips, stood])
@@ -159,16 +165,16 @@ class Course:
         if any(c.axes is not None for c in chunks):
             first, last = (np.concatenate([np.tile(UP, (len(c.start), 1)) if c.axes is None else c.axes[k]
                                            for c in chunks]) for k in (0, 1))
-        said = np.repeat(np.array([c.said for c in chunks]).reshape(-1, 6), count, axis=0)
+        shared = np.repeat(np.array([c.shared for c in chunks]).reshape(-1, 6), count, axis=0)
         line = np.concatenate([np.zeros(0, np.int32), *(c.line for c in chunks)])
-        return CutterMoves(start, end, first, last, said[:, 0] > 0, said[:, 1].copy(), said[:, 2].copy(),
-                           said[:, 5] > 0, said[:, 3].astype(np.int32), line, said[:, 4] > 0, tuple(self.cutters))
+        return CutterMoves(start, end, first, last, shared[:, 0] > 0, shared[:, 1].copy(), shared[:, 2].copy(),
+                           shared[:, 5] > 0, shared[:, 3].astype(np.int32), line, shared[:, 4] > 0, tuple(self.cutters))
 
     def program(self, numbers: Sequence[int], machine: Kinematics | None) -> Program:
         """The moves as a program.
 
         numbers : T number of each cutter
-        machine : its rotary axes; None on one without any, where a tool that leans is remarked
+        machine : rotary axes of the machine, or None; then a tilted tool gets a remark
         """
         m, remarks, notes = self.moves(), list(self.remarks), list(self.notes)
         table = np.array([*numbers, 0], np.int32)
@@ -179,18 +185,18 @@ class Course:
             turns = np.zeros((len(tool), 2, 2))
             if machine is None:
                 remarks.append(Remark(int(m.line[np.flatnonzero(leaning)[0]]),
-                                      "the tool leans, and the machine has no rotary axes"))
+                                      "the tool is tilted, and the machine has no rotary axes"))
             else:
                 both = np.stack([m.start_axis, m.end_axis], axis=1).reshape(-1, 3)
                 turns = least_turns(machine, both).reshape(-1, 2, 2)
-                notes.append("STEP-NC leaves it to the control where rotary axes stand; limits of the machine were "
-                             "held against the way that turns them least from move to move")
+                notes.append("STEP-NC does not give the angles of rotary axes; limits of the machine are checked for "
+                             "the angles that turn least from move to move")
             poses = Poses(m.start_axis, m.end_axis, turns[:, 0], turns[:, 1])
         standing = np.flatnonzero(~m.rapid & ~(m.speed > 0))
         if len(standing):
             k = int(standing[0])
             remarks.append(Remark(int(m.line[k]), f"a feed move while the spindle of T{tool[k]} does not turn "
-                                                  "clockwise, as right-hand cutters do"))
+                                                  "clockwise; right-hand cutters need that"))
         unknown = [(int(k), EVERY + (TURNED if leaning[k] else 0)) for k in np.flatnonzero(m.arrival)]
         length = np.linalg.norm(m.end - m.start, axis=1)
         minutes = np.where(m.rapid, np.nan, length / np.where(m.rapid, 1.0, m.feed))
@@ -199,30 +205,30 @@ class Course:
             mine = np.flatnonzero(tool == number)
             k = int(mine[np.argmax(m.speed[mine])])
             speeds[number] = float(m.speed[k]), int(m.line[k])
-        stops = tuple(Stop(line, what, int(table[place]), _three(at[:3]), _three(at[3:]))
-                      for line, what, place, at in (*self._stops, *self._last()))
+        stops = tuple(StopPoint(line, event, int(table[place]), _three(at[:3]), _three(at[3:]))
+                      for line, event, place, at in (*self._stops, *self._last()))
         return Program(
             name=self.name, start=m.start, end=m.end, kind=np.where(m.rapid, RAPID, FEED).astype(np.int8), feed=m.feed,
             tool=tool, line=m.line, dwell=self.dwell, speeds=speeds, lines=self._lines, remarks=tuple(remarks),
             unknown=np.array(unknown, np.int64).reshape(-1, 2), stops=stops, assumed=(), blend=0.0, minutes=minutes,
             poses=poses, notes=tuple(notes), speed=np.maximum(m.speed, 0.0), coolant=m.coolant,
-            changes=sum(what == "tool change" for _, what, _, _ in self._stops))
+            changes=sum(event == "tool change" for _, event, _, _ in self._stops))
 
     def _last(self) -> list[tuple[int, str, int, F64]]:
         if self._here is None or self._tool is None:
             return []
         return [(self._line, "end of the program", self._tool, self._here)]
 
-    def _change(self, what: str, line: int) -> None:
-        """The tool is put away: over the plane, where one was said, or from where it stands."""
+    def _change(self, event: str, line: int) -> None:
+        """Remove the tool: over the plane where one is given, or from its present place."""
         if self._over is not None and self._here is not None:
             self._lift(self._over)
         if self._here is not None and self._tool is not None:
-            self._stops.append((line, what, self._tool, self._here))
+            self._stops.append((line, event, self._tool, self._here))
         self._here = None
 
     def _lift(self, over: tuple[F64, F64, int]) -> None:
-        """Up to the plane."""
+        """Retract to the plane."""
         point, normal, line = over
         here = self._here
         if here is None or (rise := float((point - here[:3]) @ normal)) <= 0.0:
@@ -237,7 +243,7 @@ class Course:
         self._add(here[None], there[None], row, np.array([float(line)]), arrival)
 
     def _arrive(self, there: F64, speed: float, line: float) -> None:
-        """Come to the first place of a path from wherever the tool is."""
+        """Approach the start of a path from the present place of the tool."""
         over, here = self._over, self._here
         if here is not None and np.abs(there[:3] - here[:3]).max() <= SAME_PLACE \
                 and np.abs(there[3:] - here[3:]).max() <= SAME_AXIS:
@@ -257,28 +263,28 @@ class Course:
         self._over = None
 
     def _add(self, start: F64, end: F64, row: tuple[bool, float, float, float], lines: F64, arrival: bool) -> None:
-        """Write moves (n, 6); one that turns the tool far is cut into pieces."""
+        """Write moves (n, 6); large turns are split into pieces."""
         angle = np.arccos(np.clip((start[:, 3:] * end[:, 3:]).sum(axis=1), -1.0, 1.0))
         if (over := np.flatnonzero(angle > HALF_TURN)).size:
             at = int(lines[over[0]])
-            raise ProgramError(f"{self.name}, line {at}: one move turns the tool axis by half a turn, which says "
-                               "no way round", subjects=(f"line {at}",),
-                               remedy="give the path points with axes between")
-        pieces = np.maximum(np.ceil(angle / MOST_TURN), 1.0).astype(np.int64)
+            raise ProgramError(f"{self.name}, line {at}: one move turns the tool axis by half a turn; its direction is "
+                               "not defined", subjects=(f"line {at}",),
+                               remedy="add points with axes between to the path")
+        pieces = np.maximum(np.ceil(angle / MAX_TURN), 1.0).astype(np.int64)
         if (pieces > 1).any():
             which = np.repeat(np.arange(len(start)), pieces)
             step = np.arange(len(which)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
             start, end = (_between(start[which], end[which], (step + k) / pieces[which]) for k in (0, 1))
             lines = lines[which]
         self._count += len(start)
-        if self._count > MOST_MOVES:
-            raise VerificationError(f"{self.name} makes too many moves, {MOST_MOVES} are allowed",
-                                    code="program_too_long", measured=self._count, limit=MOST_MOVES,
+        if self._count > MAX_MOVES:
+            raise VerificationError(f"{self.name} makes too many moves ({MAX_MOVES} allowed)",
+                                    code="program_too_long", measured=self._count, limit=MAX_MOVES,
                                     remedy="split the job")
         upright = (start[:, 3:] == UP).all() and (end[:, 3:] == UP).all()
         axes = None if upright else (start[:, 3:].copy(), end[:, 3:].copy())
-        said = (*(float(v) for v in row), float(arrival), float(self.coolant))
-        self._chunks.append(_Chunk(start[:, :3].copy(), end[:, :3].copy(), axes, said, lines.astype(np.int32)))
+        shared = (*(float(v) for v in row), float(arrival), float(self.coolant))
+        self._chunks.append(_Chunk(start[:, :3].copy(), end[:, :3].copy(), axes, shared, lines.astype(np.int32)))
 
 
 def _between(start: F64, end: F64, share: F64) -> F64:
@@ -293,7 +299,7 @@ def _three(values: F64) -> tuple[float, float, float]:
 
 
 def least_turns(machine: Kinematics, axes: F64) -> F64:
-    """Where the rotary axes stand along a way, turning least from place to place, from 0.
+    """Angles of the rotary axes along a path that turn least from place to place, from 0 on.
 
     axes : (n, 3) float64, unit, tip to spindle, setup frame
 

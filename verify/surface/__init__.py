@@ -1,4 +1,4 @@
-"""What a program leaves on the surface of the part: residual, gouges, scores by zone and face.
+"""Rest material and gouges on the surface of the part: residuals, gouge depths, scores by zone and face.
 
-Collisions stand in ``material``.
+Collisions are in ``material``.
 """

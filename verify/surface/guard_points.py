@@ -1,4 +1,7 @@
-"""Points of the part that are watched besides the scored samples, and true depths of gouges."""
+"""Points of the part that are checked in addition to the scored samples, and true depths of gouges.
+
+Points are float64, mm, in the setup frame.
+"""
 
 from __future__ import annotations
 
@@ -16,50 +19,52 @@ from verify.kernels.depth import deepest
 from verify.progress import Report, silent
 
 GUARD_SPACING = 0.18
-GUARD_MOST = 1_000_000
+MAX_GUARD_SAMPLES = 1_000_000
 EDGE_SPACING = 0.1
 INSET = 1e-3  # mm, of the ends of edges
 SHARP = math.radians(20.0)
 DEPTH_BATCH = 2048  # rays between two reports
 CLOSER_REACH, CLOSER_STEP = 0.15, 0.02
-MOST_SEEDS, MOST_DEEP, DEEP_A_MOVE = 4500, 1500, 4
-SURE = 5.0  # gouge tolerances: what is deeper is found without a closer look
-CLOSER_SHARE = 0.4  # of the gouge tolerance: samples cut deeper are looked round
+MAX_SEEDS, MAX_DEEP, DEEP_A_MOVE = 4500, 1500, 4
+SURE = 5.0  # gouge tolerances: deeper gouges are found without closer points
+CLOSER_SHARE = 0.4  # of the gouge tolerance: samples cut deeper get closer points round them
 ASIDE = np.array([0.3571, 0.2833, 0.8901]) / np.linalg.norm([0.3571, 0.2833, 0.8901])  # no edge or face lies along it
 FACETS_OFF = 2e-3
-"""mm, what facets may lie under samples that are on the exact surface."""
+"""mm, largest distance of facets below samples on the exact surface."""
 
 
 def guard_spacing(mesh: TriangleMesh) -> float:
-    """mm between the lattice lines of ``guard_samples``: 0.18, wider on parts that would need over a million samples.
+    """Distance between lattice lines of ``guard_samples``, mm: 0.18, wider on parts that need over a million samples.
 
-    A ball of radius R that gouges deeper than (0.87 spacing)² / 2R + 0.4 of the tolerance is seen by one of them.
+    A ball of radius R that gouges deeper than (0.87 spacing)² / 2R + 0.4 of the tolerance cuts one of them.
     """
-    return max(GUARD_SPACING, (float(mesh.areas.sum()) / GUARD_MOST) ** 0.5)
+    return max(GUARD_SPACING, (float(mesh.areas.sum()) / MAX_GUARD_SAMPLES) ** 0.5)
 
 
 def guard_samples(mesh: TriangleMesh) -> SurfaceSamples:
-    """Samples of the whole part, so even that no place of a flat is farther than 0.87 ``guard_spacing`` from one."""
+    """Even samples of the whole part: no place of a flat is farther than 0.87 ``guard_spacing`` from one."""
     return lattice_samples(mesh, guard_spacing(mesh))
 
 
 def guard_notes(mesh: TriangleMesh, left_out: int = 0) -> list[str]:
-    """That the part is too large for samples as close as usual, and that seeds were left out, where it is so."""
+    """Notes that the part is too large for the usual sample distance, or that seeds were left out."""
     out, spacing = [], guard_spacing(mesh)
     if spacing > GUARD_SPACING:
-        out.append(f"the part is large: gouges outside zones were looked for {spacing:.2f} mm apart, not "
+        out.append(f"the part is large: the samples for gouges outside zones are {spacing:.2f} mm apart, not "
                    f"{GUARD_SPACING} mm")
     if left_out:
-        out.append(f"so much is cut too deep that {left_out} places of it were not looked at closely; gouges there may "
-                   "be a little deeper than told")
+        out.append(f"the gouges are so many that {left_out} places were not checked closely; gouges there may be a "
+                   "little deeper than reported")
     return out
 
 
 def convex_edges(mesh: TriangleMesh, spacing: float = EDGE_SPACING) -> tuple[F64, F64, I32]:
-    """Points along the sharp convex edges of a mesh, and its tips, for what slips between surface samples.
+    """Points along the sharp convex edges of a mesh, and its tips, for gouges between surface samples.
 
-    Returns points (n, 3) float64 mm, unit bisectors of the two normals (n, 3), and a face number (n,) int32.
-    Sharp means more than 20 degrees between the normals.
+    spacing : mm between points
+
+    Returns points, (n, 3) float64, mm, frame of the mesh; bisectors of the two normals, (n, 3) float64, unit; and face
+    numbers, (n,) int32, index. Sharp means more than 20 degrees between the normals.
     """
     _, same = np.unique(np.round(mesh.vertices, 7), axis=0, return_inverse=True)
     corners = same.reshape(-1)[mesh.faces]
@@ -82,7 +87,7 @@ def convex_edges(mesh: TriangleMesh, spacing: float = EDGE_SPACING) -> tuple[F64
     count = np.maximum(np.ceil(np.linalg.norm(q - p, axis=1) / spacing).astype(int), 1) + 1
     row = np.repeat(np.arange(len(p)), count)
     f = (np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)) / (count[row] - 1)
-    # not on the end itself: the ray of a standing edge would run in the face on top, where cuts end
+    # not on the end itself: the ray of a vertical edge would run in the top face, where cuts end
     f = np.clip(f, *(np.array([[1.0], [-1.0]]) * INSET / np.maximum(np.linalg.norm(q - p, axis=1)[row], 4.0 * INSET)
                      + np.array([[0.0], [1.0]])))
     at, up, face = _tips(mesh, same.reshape(-1))
@@ -91,7 +96,7 @@ def convex_edges(mesh: TriangleMesh, spacing: float = EDGE_SPACING) -> tuple[F64
 
 
 def _tips(mesh: TriangleMesh, same: NDArray[np.int64]) -> tuple[F64, F64, I32]:
-    """Vertices at which the part comes to a point, as ``convex_edges`` has points: a cone's has no sharp edges.
+    """Vertices at which the part comes to a point, in the form of ``convex_edges``: a cone tip has no sharp edges.
 
     same : (v,) int64, number of the place of each vertex
     """
@@ -116,13 +121,14 @@ def _tips(mesh: TriangleMesh, same: NDArray[np.int64]) -> tuple[F64, F64, I32]:
 
 
 def closer_seeds(points: F64, residual: F64, mover: I32, sure: float) -> tuple[F64, int]:
-    """Samples round which the surface is looked at closely: the lowest of every 0.15 mm cell, and not too many of them.
+    """Samples round which the surface gets closer points: the lowest of every 0.15 mm cell, up to a limit.
 
-    points   : (n, 3) float64, mm, samples with little or nothing left; residual (n,) float64, mm, what is left
-    mover    : (n,) int32, the move that cut each
-    sure     : mm; of what is cut deeper, and found anyway, the four deepest of each move will do
+    points   : (n, 3) float64, mm, setup frame, samples with little or no rest material
+    residual : (n,) float64, mm, rest material on their normals
+    mover    : (n,) int32, index, the move that cut each
+    sure     : mm; gouges deeper than this are found anyway, so the four deepest of each move suffice
 
-    Returns (k, 3) float64, mm, and how many are left out: of those less deep the 4500 deepest stay, of the others 1500.
+    Returns (k, 3) float64, mm, and the number left out: the 4500 deepest of the shallow ones and 1500 others are kept.
     """
     order = np.argsort(residual, kind="stable")
     _, first = np.unique(np.floor(points[order] / CLOSER_REACH).astype(np.int64), axis=0, return_index=True)
@@ -133,16 +139,17 @@ def closer_seeds(points: F64, residual: F64, mover: I32, sure: float) -> tuple[F
     nth = np.empty(len(deep), np.int64)
     nth[by_move] = np.arange(len(deep)) - np.repeat(begin, count)
     deep = deep[nth < DEEP_A_MOVE]
-    out = np.concatenate([deep[:MOST_DEEP], shallow[:MOST_SEEDS]])
-    return points[out], max(len(deep) - MOST_DEEP, 0) + max(len(shallow) - MOST_SEEDS, 0)
+    out = np.concatenate([deep[:MAX_DEEP], shallow[:MAX_SEEDS]])
+    return points[out], max(len(deep) - MAX_DEEP, 0) + max(len(shallow) - MAX_SEEDS, 0)
 
 
 def closer_points(tree: TriangleTree, seeds: F64) -> tuple[F64, F64, NDArray[np.int64]]:
     """Places of the surface round seeds, 0.02 mm apart, for gouges that are deepest between samples.
 
-    seeds : (k, 3) float64, mm; 0.15 mm to all sides of each is looked
+    seeds : (k, 3) float64, mm, setup frame; the places cover 0.15 mm to all sides of each
 
-    Returns places (m, 3) float64 mm on the mesh, unit normals (m, 3) of their triangles, and those, (m,) int64.
+    Returns places on the mesh, (m, 3) float64, mm; normals of their triangles, (m, 3) float64, unit; and the
+    triangles, (m,) int64, index.
     """
     if len(seeds) == 0:
         return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int64)
@@ -160,19 +167,19 @@ def closer_points(tree: TriangleTree, seeds: F64) -> tuple[F64, F64, NDArray[np.
 
 
 def gouge_depths(tree: TriangleTree, points: F64, normals: F64, along: F64, report: Report = silent) -> F64:
-    """How far the removed stretch of each inward ray gets from the surface.
+    """Depth of gouges: the largest distance from the surface along the removed stretch of each inward ray.
 
-    points, normals : (n, 3) float64, mm and outward unit
+    points, normals : (n, 3) float64, mm and unit, setup frame, normals outwards
     along           : (n,) float64, mm removed along the inward normal, > 0
-    report          : called with the share done, 0 to 1; what it raises ends the work
+    report          : called with the share done, 0 to 1; an exception from it ends the work
 
     Returns (n,) float64, mm: the largest distance to the mesh on the stretch, up to where the ray leaves the part.
 
     Notes
     -----
-    A cut grazing the top of a wall swallows whole rays of samples just below the top edge; the depth of a
-    gouge is how deep it goes under the surface. Exact as ``verify.kernels.depth.deepest`` is. A ray that leaves the
-    part within 1e-4 mm counts 0.
+    A cut that grazes the top of a wall removes whole rays of samples just below the top edge; the depth of a gouge is
+    its depth below the surface. It is as exact as ``verify.kernels.depth.deepest``. A ray that leaves the part within
+    1e-4 mm counts 0.
     """
     out = np.zeros(len(points))
     for i in range(0, len(points), DEPTH_BATCH):
@@ -183,9 +190,9 @@ def gouge_depths(tree: TriangleTree, points: F64, normals: F64, along: F64, repo
 
 
 def _inside(tree: TriangleTree, points: F64) -> NDArray[np.bool_]:
-    """(n,) bool: whether points (n, 3), mm, are in the part, by what rays both ways on no axis meet first.
+    """(n,) bool: whether points (n, 3), mm, are in the part, by the first hits of two opposite oblique rays.
 
-    One of them that leaves the part tells: through a hole of the mesh, or into another solid, the other may not.
+    One ray that leaves the part suffices: the other may pass a hole of the mesh, or enter another solid.
     """
     out = np.zeros(len(points), np.bool_)
     for way in (ASIDE, -ASIDE):
@@ -196,14 +203,14 @@ def _inside(tree: TriangleTree, points: F64) -> NDArray[np.bool_]:
 
 def _depths(tree: TriangleTree, points: F64, normals: F64, along: F64) -> F64:
     through, hit = first_hits(tree, points, -normals, t_min=1e-4)
-    # a sample of the exact surface may stand over its facet: that is no place where the ray leaves the part
+    # a sample of the exact surface may lie above its facet: there the ray does not leave the part
     over = (hit >= 0) & (through < FACETS_OFF) & (np.einsum("ij,ij->i", tree.mesh.normals[hit], normals) > 0)
     if over.any():
         low = through[over]
         again, hit[over] = first_hits(tree, points[over] - low[:, None] * normals[over], -normals[over], t_min=1e-4)
         through[over] = low + again
-    # on a razor edge the ray is out of the part again before t_min: what it meets then, if anything, faces it, but for
-    # the edge opposite, where both rims of a hollow are of one height; then the middle is not in the part
+    # at a razor edge the ray has left the part before t_min: the next facet faces it, except at the opposite edge of a
+    # hollow whose rims have one height; then the middle is not in the part
     leaves = np.einsum("ij,ij->i", tree.mesh.normals[hit], normals) < 0
     ends = np.flatnonzero((hit >= 0) & leaves)
     leaves[ends] = _inside(tree, points[ends] - 0.5 * through[ends, None] * normals[ends])

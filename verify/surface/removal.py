@@ -1,10 +1,11 @@
 """Material left on the outward normal of every surface sample after all feed moves.
 
-The residual of a sample is the least distance along its normal at which any move's swept cutting part
-begins, counted only if that part comes from outside (its interval on the ray ends at or beyond the
-surface: a tool behind a thin wall does not count). Negative is a gouge. Closed forms for ball and flat
-ends, Newton to 1e-9 mm for a torus corner; nothing is rasterised, so the error does not depend on a grid. A tool that
-leans is the same in its own frame; one that turns is so on short pieces of the move (``verify.kernels.pose``).
+The method is that of vectors that moves shorten [Chappel1983], here without facets. The residual of a sample is the
+smallest distance along its normal at which the swept cutting part of any move begins. It counts only if that part comes
+from outside: its interval on the ray ends at or beyond the surface, so a tool behind a thin wall does not count. A
+negative residual is a gouge. Ball and flat ends have closed forms, a torus corner Newton to 1e-9 mm; there is no grid,
+so the error does not depend on one. A tilted tool is treated in its own frame, a turning one on short pieces of the
+move (``verify.kernels.pose``).
 """
 
 from __future__ import annotations
@@ -22,12 +23,10 @@ from verify.material.tiles import CellGrid, run_tiles
 from verify.moves import BOW, Moves, Progress, cutter_table
 from verify.tool_axes import ToolAxes
 
-"""mm, how far a turning tool may be from where the pieces of its moves take it to be."""
-
 
 def residual_on_normals(points: F64, normals: F64, initial: F64, moves: Moves, tools: Sequence[ToolBody],
                         *, threads: int = 2, progress: Progress | None = None, bow: float = BOW) -> tuple[F64, I32]:
-    """Remaining material along each normal after all feed moves.
+    """Remaining material along each normal after all feed moves [Chappel1983].
 
     points, normals : (n, 3) float64, mm and unit, setup frame, normals out of the material
     initial         : (n,) float64, mm of stock on each normal before the first move
@@ -37,7 +36,7 @@ def residual_on_normals(points: F64, normals: F64, initial: F64, moves: Moves, t
 
     Returns
     -------
-    (n,) float64 residual in mm, negative where the part is gouged, and (n,) int32 the move that left it
+    (n,) float64, mm, the residual, negative where the part is gouged, and (n,) int32, index, the move that left it
     (the first of equals; -1 where no move lowered the stock).
 
     Raises
@@ -58,7 +57,7 @@ def residual_on_normals(points: F64, normals: F64, initial: F64, moves: Moves, t
         return _turned(points, normals, residual, moves, moves.axes, tools, threads, progress, bow)
     grid = CellGrid.build(points)
     pts, nrm = np.ascontiguousarray(points[grid.order]), np.ascontiguousarray(normals[grid.order])
-    work, who = residual[grid.order], np.full(n, -1, np.int32)
+    work, mover_of = residual[grid.order], np.full(n, -1, np.int32)
     counts = np.diff(grid.first)
     left = np.zeros(len(counts))
     full = np.flatnonzero(counts)
@@ -67,29 +66,29 @@ def residual_on_normals(points: F64, normals: F64, initial: F64, moves: Moves, t
     start, end = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end)
 
     def job(tile: tuple[int, int, int, int]) -> Callable[[], object]:
-        return lambda: cut_tile(*tile, grid.origin, grid.size, grid.shape, grid.first, pts, nrm, work, who, left,
+        return lambda: cut_tile(*tile, grid.origin, grid.size, grid.shape, grid.first, pts, nrm, work, mover_of, left,
                                 start, end, moves.feed, moves.tool, cutters)
 
     run_tiles([job(t) for t in grid.tiles()], threads, progress)
-    residual[grid.order], mover[grid.order] = work, who
+    residual[grid.order], mover[grid.order] = work, mover_of
     return residual, mover
 
 
 def _turned(points: F64, normals: F64, residual: F64, moves: Moves, axes: ToolAxes, tools: Sequence[ToolBody],
             threads: int, progress: Progress | None, bow: float) -> tuple[F64, I32]:
-    """``residual_on_normals`` for tools that lean or turn."""
+    """``residual_on_normals`` for tools that tilt or turn."""
     tree = PointTree.build(points)
     pts, nrm = np.ascontiguousarray(points[tree.order]), np.ascontiguousarray(normals[tree.order])
-    work, who = residual[tree.order], np.full(len(points), -1, np.int32)
+    work, mover_of = residual[tree.order], np.full(len(points), -1, np.int32)
     cutters = cutter_table(tools)
     reach = np.hypot(cutters[:, 0], cutters[:, 2])
     start, end = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end)
 
     def job(chunk: int) -> Callable[[], object]:
-        return lambda: cut_chunk(chunk, *tree.balls, pts, nrm, work, who, start, end, axes.axis, axes.about,
+        return lambda: cut_chunk(chunk, *tree.balls, pts, nrm, work, mover_of, start, end, axes.axis, axes.about,
                                  axes.angle, moves.feed, moves.tool, cutters, reach, bow)
 
     run_tiles([job(c) for c in range(tree.chunks)], threads, progress)
     mover = np.empty(len(points), np.int32)
-    residual[tree.order], mover[tree.order] = work, who
+    residual[tree.order], mover[tree.order] = work, mover_of
     return residual, mover

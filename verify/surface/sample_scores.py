@@ -1,4 +1,4 @@
-"""What samples are proved, and the figures of that by zone and by face."""
+"""Proved samples, and their figures by zone and by face."""
 
 from __future__ import annotations
 
@@ -16,14 +16,19 @@ BOOL = NDArray[np.bool_]
 
 
 def proved_samples(residual: F64, setup: ProofSetup) -> BOOL:
-    """(n,) bool: which of (n,) residuals, mm, lie within the budget of the setup."""
+    """Samples within the budget of the setup.
+
+    residual : (n,) float64, mm, rest material on the normal of each sample
+
+    Returns (n,) bool.
+    """
     left = residual - setup.stock_allowance
     return np.asarray((left >= -setup.gouge_tolerance - RAY_ERROR) & (left <= setup.scallop_height + RAY_ERROR))
 
 
 def zone_proofs(scored: ScoredSamples, residual: F64, proved: BOOL, setup: ProofSetup,
                 zone_ids: Sequence[str]) -> dict[str, ZoneProof]:
-    """The figures of every zone over the samples it answers for.
+    """The figures of every zone over the samples it claims.
 
     residual : (n,) float64, mm left on the samples; proved : (n,) bool
     """
@@ -46,13 +51,13 @@ def face_proofs(samples: SurfaceSamples, residual: F64, reached: BOOL, proved: B
 
     samples  : SurfaceSamples, n of them
     residual : (n,) float64, mm left on the normal, not above the reach of the proof
-    reached  : (n,) bool, whether any feed move took something off the normal of the sample
+    reached  : (n,) bool, whether any feed move removed material from the normal of the sample
     proved   : (n,) bool
 
     Notes
     -----
-    Uncut is what no feed move reached and stands higher than the budget allows: a face that the blank leaves as it
-    should be is not cut and not uncut.
+    A sample is uncut where no feed move reaches it and more stands than the budget allows. A face on which the blank
+    has its final shape is neither cut nor uncut.
     """
     uncut = ~reached & (residual - setup.stock_allowance > setup.scallop_height + RAY_ERROR)
     order = np.argsort(samples.face, kind="stable")
@@ -69,7 +74,7 @@ def face_proofs(samples: SurfaceSamples, residual: F64, reached: BOOL, proved: B
 
 
 def _left(residual: F64, allowance: float) -> tuple[float, float, float]:
-    """Median, 99th percentile and most of what stands over the allowance, mm; what is cut deeper counts 0."""
+    """Median, 99th percentile and maximum of rest material over the allowance, mm; deeper cuts count 0."""
     left = np.maximum(residual - allowance, 0.0)
     p50, p99 = np.percentile(left, [50, 99])
     return float(p50), float(p99), float(left.max())

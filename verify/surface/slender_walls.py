@@ -1,9 +1,9 @@
-"""Where a part is a sheet, and how far from what holds it: places of thin walls, by rays through the finished part.
+"""Slender walls of the finished part: places of thin sheets and their distance from a support, found by rays.
 
-A place is *thin* where the ray inwards along its normal leaves by a face that looks the other way. From the middle of
-the sheet there it is followed down, up and to both sides: rays both ways across say how thick it is, and it is held
-where it becomes twice as thick as it was on the way, as at a foot, a bend, a rib or a connection. Where it comes to an
-end it is not. Nothing of walls, zones or connections is asked: only the triangles.
+A place is *thin* where the inward ray along its normal leaves by a face that looks the other way. The search follows
+the sheet from its middle down, up and to both sides; rays across it give its thickness. The sheet is supported where it
+becomes twice as thick as it was on the way, as at a foot, a bend, a rib or a connection, and not where it ends. Only
+the triangles are used, not walls, zones or connections.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from geometry.mesh_queries.rays import first_hits
 from geometry.sampling import SurfaceSamples
 
 FACING = -0.5
-"""Cosine between the normals of the two faces of a sheet, at most: they look more than 120 degrees apart."""
+"""Largest cosine between the normals of the two faces of a sheet: they are more than 120 degrees apart."""
 HELD = 2.0
-"""Times as thick as it was on the way there: what holds a sheet. Stiffness goes with the cube, so that is 8 times."""
+"""Ratio of thickness at which a sheet counts as supported. Bending stiffness grows with its cube: 8 times."""
 STEP = 0.5
-"""Of the thickness: way between two looks across a sheet."""
-MOST_ASKED = 120_000  # samples that rays are sent from
-MOST_PLACES = 8000  # of all thin walls, one a cell
-A_CELL = 4.0  # samples on the square of a cell, at least: so one in fifty has none
+"""Of the thickness: distance between two measurements across a sheet."""
+MAX_SAMPLES = 120_000  # samples from which rays start
+MAX_PLACES = 8000  # of all thin walls, one per cell
+A_CELL = 4.0  # mean number of samples in the square of a cell: one cell in fifty is empty
 SKIN_SHARE = 1e-7  # of the size of the part: rays do not meet the triangle they start on
 BOOL = NDArray[np.bool_]
 INT = NDArray[np.int64]
@@ -38,16 +38,16 @@ INT = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class ThinWalls:
-    """Places of sheets that are somewhere free for more than a ratio of their thickness, n of them.
+    """The n places of sheets that are somewhere free for more than a ratio of their thickness.
 
-    row       : (n,) int64, which sample each is
+    row       : (n,) int64, index, sample of each place
     points, normals : (n, 3) float64, mm and unit, of one side
-    across, beyond  : (n, 3) float64, mm and unit, where the ray inwards leaves the sheet, and the normal there
+    across, beyond  : (n, 3) float64, mm and unit, exit of the inward ray and the normal there
     thickness : (n,) float64, mm between the two
-    free      : (n,) bool, nothing of the finished part holds the sheet within ``limit``
-    limit     : (n,) float64, mm, the ratio times the mean thickness of the sheet on the way down from there
-    wall      : (n,) int64, places of one sheet share a number
-    spacing   : mm, no more than one place is in a cell of this
+    free      : (n,) bool, the finished part does not support the sheet within ``limit``
+    limit     : (n,) float64, mm, the ratio times the mean thickness of the sheet below the place
+    wall      : (n,) int64, index, places of one sheet share a number
+    spacing   : mm, size of the cells that hold at most one place
     """
 
     row: INT
@@ -76,31 +76,31 @@ def thin_walls(tree: TriangleTree, samples: SurfaceSamples, ratio: float) -> Thi
 
     tree    : TriangleTree of the part; samples : on it, outward normals; frame of both with Z up
 
-    Returns ThinWalls, of each such sheet all places that were looked at, those held near by among them: they say where
-    stock stands. Empty where no sheet is so slender.
+    Returns ThinWalls: all examined places of each such sheet. Places near a support are among them, since they tell
+    where stock stands. Empty where no sheet is so slender.
 
     Notes
     -----
-    Thickness is exact to the mesh. How far something is that holds a sheet is right to ``STEP`` of the thickness; along
-    a curved one the way counts in chords of that step.
+    Thickness is exact on the mesh. The distance to a support is accurate to ``STEP`` of the thickness; along a curved
+    sheet it is the sum of chords of that step.
     """
     size = tree.mesh.bounds[1] - tree.mesh.bounds[0]
     skin = SKIN_SHARE * float(np.linalg.norm(size))
-    stride = max(1, -(-len(samples) // MOST_ASKED))
-    asked = np.arange(0, len(samples), stride)
-    asked = asked[np.abs(samples.normals[asked, 2]) < math.cos(math.radians(30.0))]
-    far, hit = first_hits(tree, samples.points[asked], -samples.normals[asked], t_min=skin)
+    stride = max(1, -(-len(samples) // MAX_SAMPLES))
+    tried = np.arange(0, len(samples), stride)
+    tried = tried[np.abs(samples.normals[tried, 2]) < math.cos(math.radians(30.0))]
+    far, hit = first_hits(tree, samples.points[tried], -samples.normals[tried], t_min=skin)
     beyond = tree.mesh.normals[np.maximum(hit, 0)]
-    sheet = (hit >= 0) & ((beyond * samples.normals[asked]).sum(axis=1) < FACING)
-    row, far, beyond = asked[sheet], far[sheet], beyond[sheet]
+    sheet = (hit >= 0) & ((beyond * samples.normals[tried]).sum(axis=1) < FACING)
+    row, far, beyond = tried[sheet], far[sheet], beyond[sheet]
     high = _high(tree, samples.points[row], samples.normals[row], far, ratio)
     if not high.any():
         return _none()
-    like = far < HELD * float(far[high].max())  # places nearer to the foot say where stock stands
+    like = far < HELD * float(far[high].max())  # places nearer to the foot tell where stock stands
     row, far, beyond = row[like], far[like], beyond[like]
     points = samples.points[row]
     cell = max(float(np.median(far)) * STEP, math.sqrt(A_CELL * stride * float(samples.area[row].mean())))
-    while len(one := _one_a_cell(points, cell)) > MOST_PLACES:
+    while len(one := _one_a_cell(points, cell)) > MAX_PLACES:
         cell *= 1.25
     row, far, beyond, points = row[one], far[one], beyond[one], points[one]
     normals = samples.normals[row]
@@ -114,7 +114,7 @@ def thin_walls(tree: TriangleTree, samples: SurfaceSamples, ratio: float) -> Thi
 
 
 def _high(tree: TriangleTree, points: F64, normals: F64, length: F64, times: float) -> BOOL:
-    """(n,) bool: places from which ``times`` a length, mm, down along the sheet ends above the lowest of the part."""
+    """(n,) bool: places from which ``times`` a length, mm, down along the sheet ends above the bottom of the part."""
     lean = np.sqrt(1.0 - normals[:, 2] ** 2)
     return np.asarray(times * length * lean < points[:, 2] - tree.mesh.bounds[0, 2])
 
@@ -131,13 +131,13 @@ def _one_a_cell(points: F64, cell: float) -> INT:
 
 
 def _sheets(middle: F64, normals: F64, reach: F64) -> INT:
-    """(n,) number of the sheet each of (n, 3) middles is of: near ones whose normals, to the sign, are alike."""
+    """(n,) number of the sheet of each of (n, 3) middles: near places with similar normals share it."""
     tree = cKDTree(middle)
     pairs = tree.query_pairs(float(reach.max()), output_type="ndarray") if len(middle) else np.zeros((0, 2), np.int64)
     a, b = pairs[:, 0], pairs[:, 1]
     apart = middle[b] - middle[a]
     size = np.maximum(np.linalg.norm(apart, axis=1), 1e-12)
-    # across a gap between two walls the way from one to the other lies along the normals
+    # across a gap between two walls the line from one to the other lies along the normals
     alike = np.abs((normals[a] * normals[b]).sum(axis=1)) > 0.5
     along = np.abs((apart * normals[a]).sum(axis=1)) < 0.7 * size + 1e-3
     near = size <= np.minimum(reach[a], reach[b])
@@ -148,7 +148,7 @@ def _sheets(middle: F64, normals: F64, reach: F64) -> INT:
 
 def _followed(tree: TriangleTree, points: F64, normals: F64, thickness: F64, ratio: float,
               skin: float) -> tuple[BOOL, F64]:
-    """Whether nothing holds the sheet at each place within its limit, and that limit, mm."""
+    """Whether the sheet has no support within the limit of each place, and that limit, mm."""
     down = np.array([0.0, 0.0, -1.0]) + normals[:, 2:] * normals
     down /= np.linalg.norm(down, axis=1)[:, None]
     aside = np.cross(normals, down)
@@ -163,7 +163,7 @@ def _followed(tree: TriangleTree, points: F64, normals: F64, thickness: F64, rat
 
 def _way(tree: TriangleTree, points: F64, normals: F64, thickness: F64, along: F64, ratio: float,
          skin: float) -> tuple[BOOL, F64]:
-    """Follow sheets one way: whether each is held within ``ratio`` times its mean thickness, and that length, mm."""
+    """Follow sheets one way: whether each has support within ``ratio`` times its mean thickness; that length, mm."""
     n = len(points)
     held, limit = np.zeros(n, np.bool_), ratio * thickness
     live = np.arange(n)

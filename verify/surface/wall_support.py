@@ -1,10 +1,10 @@
-"""Whether thin walls keep their support: both sides go down in turn, and stock stands beside them not far below.
+"""Support of thin walls: both sides are cut down in turn, and stock stands beside them not far below.
 
-Notation: p and q are opposite places of a thin wall (``verify.surface.slender_walls``), K the ratio of height to thickness that a
-wall may be free for. ``done(p)`` is when no more than twice the scallop is left at p over the allowance, ``gone(p)``
-when so much of the stock before it is gone that it no longer holds the wall. **The rule**: when both p and q are done,
-there is a place of the same wall, no farther from p than its limit, K times the mean thickness below p, at which stock
-still stands on both sides; or something of the finished part holds the wall within that limit.
+Notation: p and q are opposite places of a thin wall (``verify.surface.slender_walls``), K is the allowed ratio of free
+height to thickness. ``done(p)`` is the time at which at most twice the scallop is left at p over the allowance.
+``gone(p)`` is the time at which the stock in front of p stops supporting the wall. **The rule**: when both p and q are
+done, stock still stands on both sides at a place of the same wall within the limit of p, K times the mean thickness
+below p; or the finished part supports the wall within that limit.
 """
 
 from __future__ import annotations
@@ -29,48 +29,48 @@ from verify.surface.sample_scores import RAY_ERROR
 from verify.surface.slender_walls import ThinWalls, thin_walls
 
 PARTS = 256
-"""Parts of the program that times are told in: what happens in one of them counts as at once, and as in order."""
-REST = 2.0  # scallops that may be left at a place that is done: later skims of that little do not bend a wall
-HOLDS = 0.5  # of what the blank has before a place, at most, that has to stand for it to hold the wall
-ROOM = 2.0  # of the distance of places: the highest that stands may lie so much below where stock begins to stand
+"""Resolution of times: all events in one of these parts of the program count as simultaneous and allowed."""
+REST = 2.0  # scallops that may be left at a place that is done: later cuts of so little do not bend a wall
+HOLDS = 0.5  # share of the stock of the blank in front of a place that must stand to support the wall
+ROOM = 2.0  # of the distance of places: the highest supported place may lie this much below the top of the stock
 BLOCK = 256
 INT = NDArray[np.int64]
 NEVER = np.iinfo(np.int64).max
 
 
 @dataclass(frozen=True, eq=False)
-class Times:
-    """When places were done and what held them was gone, n places.
+class CutTimes:
+    """Times of n places: when each is done, and when its stock is gone.
 
-    gone : (n,) int64, part of the program in which the stock before it stopped to hold, -1 before the first cut
-    done : (n,) int64, the same for the end of the cut, NEVER where nobody cut it
-    mover: (n,) int64, the move after which it was done, -1 where none
+    gone  : (n,) int64, index, part of the program in which the stock stops supporting the wall, -1 before the first cut
+    done  : (n,) int64, index, part in which the cut ends, NEVER where no move cuts it
+    mover : (n,) int64, index, the move after which it is done, -1 where none
     """
 
     gone: INT
     done: INT
     mover: INT
 
-    def part(self, rows: slice) -> Times:
-        """Of some of the places."""
-        return Times(self.gone[rows], self.done[rows], self.mover[rows])
+    def part(self, rows: slice) -> CutTimes:
+        """The times of some of the places."""
+        return CutTimes(self.gone[rows], self.done[rows], self.mover[rows])
 
 
 def supported(tree: TriangleTree, scored: ScoredSamples, setup: ProofSetup, moves: Moves, tools: Sequence[ToolBody],
               source: Source, zone_ids: Sequence[str], threads: int = 2, report: Report = silent
               ) -> tuple[Support, list[Finding]]:
-    """How far thin walls were free when they were cut, and where that is more than they may be.
+    """Free height of thin walls when they are cut, and findings where it is above the limit.
 
     tree   : TriangleTree of the part; Z of its frame is up
-    scored : the places are taken from these
-    report : called with the share done, 0 to 1; what it raises ends the work
+    scored : the samples that supply the places
+    report : called with the share done, 0 to 1; an exception from it ends the work
 
-    Returns Support, and a finding for each wall and program, where the setup asks for it.
+    Returns Support, and a finding for each wall and program where ``setup.walls_in_turn`` is on.
 
     Notes
     -----
-    A violation that is over within one of ``PARTS`` parts of the moves beside thin walls is not seen, and one by less
-    than twice ``ThinWalls.spacing`` is none: so no order that keeps the rule is accused.
+    A violation within one of ``PARTS`` parts of the moves beside thin walls is not seen, and one of less than twice
+    ``ThinWalls.spacing`` does not count: an order that keeps the rule never gets a finding.
     """
     walls = thin_walls(tree, scored.samples, setup.free_ratio)
     if not len(walls) or not moves.feed.any():
@@ -90,11 +90,11 @@ def supported(tree: TriangleTree, scored: ScoredSamples, setup: ProofSetup, move
 
 
 def _times(points: F64, normals: F64, thickness: F64, bounds: F64, setup: ProofSetup, moves: Moves,
-           tools: Sequence[ToolBody], threads: int, report: Report) -> Times:
-    """When places (n, 3), mm, of walls ``thickness`` (n,) mm thick were cut."""
+           tools: Sequence[ToolBody], threads: int, report: Report) -> CutTimes:
+    """Times of places (n, 3), mm, of walls ``thickness`` (n,) mm thick."""
     left = np.minimum(stock_on_normals(points, normals, bounds, setup, float(thickness.max())), thickness)
     rest = REST * setup.scallop_height + RAY_ERROR
-    enough, told = setup.stock_allowance + rest, left.copy()
+    enough, reported = setup.stock_allowance + rest, left.copy()
     holds = np.minimum(thickness, HOLDS * stock_on_normals(points, normals, bounds, setup, np.inf))
     gone = np.where((left >= holds) & (holds > enough), NEVER, -1)
     done, mover = np.where(left <= enough, -1, NEVER), np.full(len(points), -1, np.int64)
@@ -103,24 +103,24 @@ def _times(points: F64, normals: F64, thickness: F64, bounds: F64, setup: ProofS
     for k, rows in enumerate(np.array_split(near, parts)):
         chosen = np.zeros(len(moves), np.bool_)
         chosen[rows] = True
-        asked = np.flatnonzero(_met(moves, rows, tools, points, thickness))
-        if len(asked) and len(rows):
-            after, by = residual_on_normals(points[asked], normals[asked], left[asked], moves.only(chosen), tools,
+        tried = np.flatnonzero(_met(moves, rows, tools, points, thickness))
+        if len(tried) and len(rows):
+            after, by = residual_on_normals(points[tried], normals[tried], left[tried], moves.only(chosen), tools,
                                             threads=threads)
             cut = by >= 0
-            fell = asked[(gone[asked] == NEVER) & cut & (after < holds[asked] - RAY_ERROR)]
+            fell = tried[(gone[tried] == NEVER) & cut & (after < holds[tried] - RAY_ERROR)]
             gone[fell] = k
-            # one that is never cut that far was done with the last cut that took more off it than is let pass elsewhere
-            ends = cut & (done[asked] != -1) & (told[asked] > enough)
-            ends &= (after <= enough) | (told[asked] - after > rest)
-            done[asked[ends]], mover[asked[ends]], told[asked[ends]] = k, rows[by[ends]], after[ends]
-            left[asked] = after
+            # a place that is never cut that far is done with the last cut that removed more than the rest allowed
+            ends = cut & (done[tried] != -1) & (reported[tried] > enough)
+            ends &= (after <= enough) | (reported[tried] - after > rest)
+            done[tried[ends]], mover[tried[ends]], reported[tried[ends]] = k, rows[by[ends]], after[ends]
+            left[tried] = after
         report((k + 1) / parts)
-    return Times(gone, done, mover)
+    return CutTimes(gone, done, mover)
 
 
 def _boxes(moves: Moves, rows: INT, tools: Sequence[ToolBody], room: float) -> tuple[F64, F64]:
-    """Boxes (k, 3) and (k, 3), mm, no cutting part of some moves comes nearer than ``room`` to anything outside of."""
+    """Boxes, corners (k, 3) and (k, 3), mm, that hold the cutting part of moves and ``room`` round it."""
     reach = np.array([np.hypot(t.radius, t.flute_length) if moves.axes is not None else t.radius for t in tools])
     wide = reach[moves.tool[rows]][:, None] + room
     low, high = (f(moves.start[rows], moves.end[rows]) for f in (np.minimum, np.maximum))
@@ -131,7 +131,7 @@ def _boxes(moves: Moves, rows: INT, tools: Sequence[ToolBody], room: float) -> t
 
 
 def _beside(moves: Moves, tools: Sequence[ToolBody], points: F64, room: F64) -> NDArray[np.bool_]:
-    """(m,) bool: moves whose box meets that of all places."""
+    """(m,) bool: moves whose box meets the box of all places."""
     low, high = _boxes(moves, np.arange(len(moves)), tools, float(room.max()))
     return np.asarray(((low <= points.max(axis=0)) & (high >= points.min(axis=0))).all(axis=1))
 
@@ -144,8 +144,8 @@ def _met(moves: Moves, rows: INT, tools: Sequence[ToolBody], points: F64, room: 
     return np.asarray(((points >= low.min(axis=0)) & (points <= high.max(axis=0))).all(axis=1))
 
 
-def _free_ways(walls: ThinWalls, one: Times, other: Times) -> tuple[F64, NDArray[np.bool_]]:
-    """(n,) mm how far each place is from what held its wall when both its sides were done, and (n,) which count."""
+def _free_ways(walls: ThinWalls, one: CutTimes, other: CutTimes) -> tuple[F64, NDArray[np.bool_]]:
+    """(n,) mm, distance of each place from the support of its wall when both sides are done, and (n,) which count."""
     middle = 0.5 * (walls.points + walls.across)
     stands = np.minimum(one.gone, other.gone)
     done = np.maximum(one.done, other.done)
@@ -153,20 +153,20 @@ def _free_ways(walls: ThinWalls, one: Times, other: Times) -> tuple[F64, NDArray
     free = np.zeros(len(walls))
     for number in np.unique(walls.wall[judged]).tolist():
         own = np.flatnonzero(walls.wall == number)
-        asked = own[judged[own]]
-        # what is held in the finished part is so within its own limit
+        tried = own[judged[own]]
+        # a place that the finished part supports has its support within its own limit
         held = np.where(walls.free[own], np.inf, walls.limit[own])
-        for rows in np.array_split(asked, -(-len(asked) // BLOCK)):
+        for rows in np.array_split(tried, -(-len(tried) // BLOCK)):
             way = cdist(middle[rows], middle[own])
             by_stock = np.where(stands[own] >= done[rows][:, None], way, np.inf).min(axis=1)
             free[rows] = np.minimum(by_stock, (way + held).min(axis=1))
-    # a sheet that nothing holds anywhere, as one that hangs in the stock
+    # a sheet without any support, such as one that hangs in the stock
     return np.where(np.isfinite(free), free, 2.0 * walls.limit), judged
 
 
-def _findings(walls: ThinWalls, free: F64, over: INT, times: Sequence[Times], setup: ProofSetup,
+def _findings(walls: ThinWalls, free: F64, over: INT, times: Sequence[CutTimes], setup: ProofSetup,
               scored: ScoredSamples, source: Source, zone_ids: Sequence[str]) -> list[Finding]:
-    """A finding for each wall and program, where its places (k,) ``over`` the limit are worst."""
+    """A finding for each wall and program, at the worst of its places (k,) ``over`` the limit."""
     last = np.where(times[0].done >= times[1].done, times[0].mover, times[1].mover)
     last = np.where(last >= 0, last, np.maximum(times[0].mover, times[1].mover))
     out = []
@@ -180,9 +180,9 @@ def _findings(walls: ThinWalls, free: F64, over: INT, times: Sequence[Times], se
         x, y, z = (round(float(v), 6) for v in walls.points[k])
         lines = source.line[last[mine]]
         span = f", lines {int(lines.min())} to {int(lines.max())}" if lines.min() < lines.max() else ""
-        text = (f"T{source.tool[m]} finishes a wall {walls.thickness[k]:.2f} mm thick where it is free for "
-                f"{free[k]:.1f} mm: no nearer stands stock on both its sides ({setup.free_ratio:g} times its thickness "
-                f"are allowed){span}; cut both its sides down in turn, by no more than that, or hold it")
+        text = (f"T{source.tool[m]} finishes a wall {walls.thickness[k]:.2f} mm thick at a free height of "
+                f"{free[k]:.1f} mm; {setup.free_ratio:g} times its thickness are allowed{span}: cut both sides down in "
+                "turn by no more than that, or support the wall")
         out.append(Finding(FindingKind.SUPPORT, source.names[source.program[m]], int(source.line[m]),
                            zone_ids[zone - 1] if zone else None, f"F{scored.samples.face[row]}", (x, y, z),
                            float(free[k]), float(walls.limit[k]), text, len(mine)))

@@ -1,8 +1,8 @@
-"""Programs of other controls, block by block in the words the one reader knows.
+"""Translates programs of other controls, block by block, into the words of the one reader.
 
-``verify.gcode.reader`` runs one modal machine, whose words are those of LinuxCNC. A control with other words has a file here
-that spells each of its blocks in them, and refuses by name what it does not know or what would be read in two ways:
-nothing is dropped but what has no effect on a move. Lines keep their numbers.
+``verify.gcode.reader`` runs one modal machine with the words of LinuxCNC. A control with other words has a file here
+that translates its blocks. It refuses by name a word that it does not know or that could be read in two ways, and drops
+only words without effect on a move. Lines keep their numbers.
 """
 
 from __future__ import annotations
@@ -10,26 +10,27 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 
 from verify.gcode.block_words import BlockError
-from verify.gcode.dialects.base import Control
-from verify.gcode.dialects.fanuc import Fanuc
-from verify.gcode.dialects.haas import Haas
-from verify.gcode.dialects.heidenhain import Heidenhain, is_conversational
-from verify.gcode.dialects.siemens import Siemens, is_siemens
+from verify.gcode.dialects.base import DialectReader
+from verify.gcode.dialects.fanuc import FanucReader
+from verify.gcode.dialects.haas import HaasReader
+from verify.gcode.dialects.heidenhain import HeidenhainReader, is_conversational
+from verify.gcode.dialects.siemens import SiemensReader, is_siemens
 from verify.program.move_log import MAX_ERRORS, Log
 
 LINUXCNC = "linuxcnc"
-CONTROLS: dict[str, type[Control]] = {"fanuc": Fanuc, "haas": Haas, "siemens": Siemens, "heidenhain": Heidenhain}
-"""By name; ``LINUXCNC`` needs none."""
+CONTROLS: dict[str, type[DialectReader]] = {
+    "fanuc": FanucReader, "haas": HaasReader, "siemens": SiemensReader, "heidenhain": HeidenhainReader}
+"""Readers by dialect; ``LINUXCNC`` needs none."""
 
 DIALECTS = (LINUXCNC, *CONTROLS)
-"""All that can be read."""
+"""All dialects that can be read."""
 
 ENDINGS = {"ngc": (LINUXCNC,), "mpf": ("siemens",), "h": ("heidenhain",), "nc": ("fanuc", "haas")}
-"""Of file names, without the point and in small letters, and whose programs they may be."""
+"""Extensions of file names, without the point and in lower case, and the dialects that use them."""
 
 
-def spelt(lines: Sequence[str], dialect: str, log: Log) -> Iterator[tuple[int, str]]:
-    """Blocks with the numbers of their lines, from 1; what cannot be read becomes an error of the log."""
+def translated_blocks(lines: Sequence[str], dialect: str, log: Log) -> Iterator[tuple[int, str]]:
+    """Blocks with the numbers of their lines, from 1; a line that cannot be read becomes an error of the log."""
     control = CONTROLS[dialect]()
     for number, raw in enumerate(lines, 1):
         try:
@@ -51,10 +52,10 @@ def spelt(lines: Sequence[str], dialect: str, log: Log) -> Iterator[tuple[int, s
 
 
 def dialect_of(text: str, ending: str = "", wanted: Collection[str] = ()) -> str:
-    """Whose program a text is, where nobody says: by its own marks, its file name, or the controls of the machine.
+    """Dialect of a text: by its own marks, its file name, or the controls of the machine.
 
-    ending : of the file name, without the point, '' where there is none
-    wanted : controls of the machine, likeliest first
+    ending : extension of the file name, without the point, '' where there is none
+    wanted : controls of the machine, the likeliest first
 
     >>> dialect_of("0 BEGIN PGM PART MM")
     'heidenhain'
@@ -68,10 +69,10 @@ def dialect_of(text: str, ending: str = "", wanted: Collection[str] = ()) -> str
     if is_siemens(text):
         return "siemens"
     may = ENDINGS.get(ending.lower().removeprefix("."), DIALECTS)
-    # a text without its marks is no Siemens or Heidenhain program, unless its name says so
+    # a text without their marks is not a Siemens or Heidenhain program, unless its name says so
     plain = [d for d in may if len(may) == 1 or d not in ("siemens", "heidenhain")]
     named = [d for d in wanted if d in plain]
     return named[0] if named else plain[0] if len(may) == 1 else LINUXCNC
 
 
-__all__ = ["CONTROLS", "DIALECTS", "ENDINGS", "LINUXCNC", "dialect_of", "spelt"]
+__all__ = ["CONTROLS", "DIALECTS", "ENDINGS", "LINUXCNC", "dialect_of", "translated_blocks"]

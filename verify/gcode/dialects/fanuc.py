@@ -1,8 +1,8 @@
 """Fanuc: nearly the words of the reader itself.
 
-Differences: further zeros are G54.1 P, fast contouring is G05.1 Q, G04 counts ms, ';' ends a block, and a place without
-a decimal point is 10 mm or 0.010 mm, which a parameter says. Macros (#, [ ]) are refused: GOTO, IF and WHILE of Fanuc
-are not those of LinuxCNC.
+Differences: further work offsets are G54.1 P, fast contouring is G05.1 Q, G04 counts ms, ';' ends a block. X10 without
+a decimal point is 10 mm or 0.010 mm, depending on a parameter. Macros (#, [ ]) are refused: GOTO, IF and WHILE of Fanuc
+differ from those of LinuxCNC.
 """
 
 from __future__ import annotations
@@ -10,20 +10,20 @@ from __future__ import annotations
 import re
 
 from verify.gcode.block_words import bare
-from verify.gcode.dialects.base import NUMBER, BlockError, Control, zero_word
+from verify.gcode.dialects.base import NUMBER, BlockError, DialectReader, zero_word
 
 _PLAIN = re.compile(r"(?:N[0-9]+ ?)?(?:G0?[01] ?)?(?:[XYZABC][+-]?(?:[0-9]*\.[0-9]*|0) ?)*(?:F[0-9]+\.[0-9]* ?)?\r?")
 _WORD = re.compile(rf"([A-Z])({NUMBER})")
 _FOREIGN: dict[str, frozenset[float]] = {
     "M": frozenset({70, 71, 72, 73, 428, 429}), "G": frozenset({59.1, 59.2, 59.3, 92.2, 92.3})}
-ROUNDING = "how far the control rounds corners is said by parameters of the machine: it is not in the error bound"
+ROUNDING = "parameters of the machine set how far the control rounds corners: the error bound does not include it"
 _PLACES = "XYZABCIJKR"
 
 
-class Fanuc(Control):
-    """Fanuc 0i, 30i and their kin."""
+class FanucReader(DialectReader):
+    """Fanuc 0i, 30i and relatives."""
 
-    title = "Fanuc"
+    title = "FanucReader"
     further = 54.1
     bounds_path = False
     home_from, gives_up_length = 0, True
@@ -33,7 +33,13 @@ class Fanuc(Control):
         self.unbounded = True
 
     def blocks(self, raw: str) -> list[str]:
-        """A plain straight move as it is; everything else word by word."""
+        """A plain straight move unchanged; every other line word by word.
+
+        Raises
+        ------
+        BlockError
+            The line cannot be read, or could be read in two ways.
+        """
         if _PLAIN.fullmatch(raw):
             return [raw]
         text = self._bare(raw)
@@ -55,10 +61,10 @@ class Fanuc(Control):
         return [f"/{block}" if text.startswith("/") else block, *self._after(codes)]
 
     def _bare(self, raw: str) -> str:
-        """Without comments and blanks."""
+        """The line without comments and blanks."""
         before, _, after = re.sub(r"\([^()]*\)", " ", raw).partition(";")
         if after.strip():
-            raise BlockError(f"'{after.strip()[:40]}' after a ; which ends a block: give it a line of its own")
+            raise BlockError(f"'{after.strip()[:40]}' follows a ; which ends the block: give it its own line")
         text = "".join(bare(before).upper().split())
         if "#" in text or "[" in text:
             raise BlockError(f"a macro of {self.title} ('{text[:40]}')",
@@ -68,19 +74,18 @@ class Fanuc(Control):
     def _check(self, letter: str, digits: str) -> None:
         number = float(digits)
         if number in _FOREIGN.get(letter, frozenset()):
-            raise BlockError(f"{letter}{digits} is a word of LinuxCNC and means something else, or nothing, on "
-                             f"{self.title}")
+            raise BlockError(f"{letter}{digits} is a word of LinuxCNC with another meaning, or none, on {self.title}")
         if letter in _PLACES and "." not in digits and number != 0:
-            raise BlockError(f"{letter}{digits} without a decimal point is {digits} or {number / 1000:g}, as a "
-                             "parameter of the machine has it", "write the decimal point: X10. is 10 mm everywhere")
+            raise BlockError(f"{letter}{digits} without a decimal point is {digits} or {number / 1000:g}, depending on "
+                             "a parameter of the machine", "write the decimal point: X10. is 10 mm everywhere")
 
     def _several(self, ms: str) -> None:
         """A block has several M words, named by ``ms``."""
-        self.remarks.append(f"{ms} in one block: whether both are carried out, or the last alone, a parameter says "
-                            "(3404#7); give each a block of its own")
+        self.remarks.append(f"{ms} in one block: parameter 3404#7 decides whether the control runs both or only the "
+                            "last; give each its own block")
 
     def _word(self, letter: str, digits: str, codes: list[float], values: dict[str, str]) -> list[str]:
-        """One word in those of the reader; none where another one of the block has taken it in."""
+        """One word in the words of the reader; none where another word of the block includes it."""
         if letter == "G":
             return self._code(float(digits), values)
         if letter in "PX" and 4 in codes:
@@ -108,5 +113,5 @@ class Fanuc(Control):
         return [f"G{code:g}"]
 
     def _after(self, codes: list[float]) -> list[str]:
-        """Blocks that one with these G words has in its train."""
+        """Blocks that follow a block with these G words."""
         return []

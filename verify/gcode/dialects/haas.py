@@ -1,30 +1,30 @@
-"""Haas: Fanuc's words but for G234 (the tip is kept), G154 P (further zeros), G187 E (rounding), and P of G04.
+"""Haas: the words of Fanuc, except G234 (tool centre point), G154 P (work offsets), G187 E (rounding), and P of G04.
 
-A whole P of G04 counts ms, one with a decimal point s. F without a decimal point is refused like a place. G28 gives the
-length of the tool up.
+A whole P of G04 counts ms, one with a decimal point s. F without a decimal point is refused like a coordinate. G28
+cancels the length offset.
 """
 
 from __future__ import annotations
 
 from verify.gcode.dialects.base import BlockError
-from verify.gcode.dialects.fanuc import Fanuc
+from verify.gcode.dialects.fanuc import FanucReader
 
 
-class Haas(Fanuc):
+class HaasReader(FanucReader):
     """Haas mills, Next Generation Control."""
 
-    title = "Haas"
+    title = "HaasReader"
     further = 154.0
     bounds_path = True
 
     def _check(self, letter: str, digits: str) -> None:
         super()._check(letter, digits)
         if letter == "F" and "." not in digits and float(digits) != 0:
-            raise BlockError(f"F{digits} without a decimal point is counted in thousandths or not, as a setting has it",
+            raise BlockError(f"F{digits} without a decimal point counts thousandths or not, depending on a setting",
                              f"write F{digits}.")
 
     def _several(self, ms: str) -> None:
-        raise BlockError(f"{ms} in one block: Haas takes one M word in a block", "give each a block of its own")
+        raise BlockError(f"{ms} in one block: Haas takes one M word in a block", "give each its own block")
 
     def _in_seconds(self, digits: str) -> bool:
         return "." in digits
@@ -34,8 +34,8 @@ class Haas(Fanuc):
             return ["G43.4"]
         if code == 187:
             if "E" not in values:
-                self.notes.append("G187 without E: a setting of the machine says how far the control rounds corners; "
-                                  "it is not in the error bound")
+                self.notes.append("G187 without E: a setting of the machine decides how far the control rounds "
+                                  "corners; the error bound does not include it")
                 self.bound(False)
                 return []
             self.bound(True)

@@ -1,10 +1,10 @@
-"""Siemens 840D: names besides letters, = before a value, ';' before a comment, cycles with arguments.
+"""Siemens 840D: names as well as letters, = before a value, ';' before a comment, cycles with arguments.
 
-D1 is the only cutting edge whose length is known; a tool that is put in has it at once (machine data 20270). What a
-program computes (R parameters, DEF, IF, GOTO, subprograms) is refused by name, and so are frames of the program.
-TRAORI and TRAFOOF may switch the zero off (G500): a move after one of them, unless past all frames (SUPA, G53), is
-refused until a zero is stated again. Of swivelled planes CYCLE800 is read with direction 0 while TRAORI is on, which
-moves no axis: X, Y, Z count in the setup frame turned about its X and then about the new Y and the new Z (mode 57).
+Only the length of the first cutting edge, D1, is known; a new tool has it at once (machine data 20270). The reader
+refuses by name computed values (R parameters, DEF, IF, GOTO, subprograms) and programmed frames. TRAORI and TRAFOOF may
+switch the work offset off (G500): a move after one of them is refused until the program states a work offset again,
+unless it suppresses all frames (SUPA, G53). Of swivelled planes the reader knows CYCLE800 with direction 0 while TRAORI
+is on, which moves no axis: X, Y, Z count in the setup frame turned about its X, then the new Y and new Z (mode 57).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import math
 import re
 
 from geometry.mesh import F64
-from verify.gcode.dialects.base import NUMBER, ZEROS, BlockError, Control, zero_word
+from verify.gcode.dialects.base import NUMBER, ZEROS, BlockError, DialectReader, zero_word
 from verify.gcode.dialects.tilted_planes import placed, turn
 
 _NUM = r"[+-]?(?:[0-9]{1,8}(?:\.[0-9]*)?|\.[0-9]+)"
@@ -25,26 +25,26 @@ _TOKEN = re.compile(rf"""\s*(?:(?P<call>[A-Z_][A-Z_0-9]*)\s*\((?P<args>[^()]*)\)
 _PLACE = re.compile(rf"([XYZ])({_NUM}|NAN)")
 _LABEL = re.compile(r"(?:N[0-9]+\s+)?[A-Z_]{2}[A-Z_0-9]*:")
 SMALL = 0.01
-"""deg a tool axis may leave its way by without a word about it: 0.01 mm at 57 mm above the tip."""
+"""deg, deviation of a tool axis that needs no note: 0.01 mm at 57 mm above the tip."""
 _MARKS = re.compile(r"^\s*(?:N[0-9]+\s+)?[^;(\n]*\b(?:TRAORI|TRAFOOF|CYCLE8[0-9]{2}\s*\(|SUPA|G710|G700|G641|G642|G645"
                     r"|COMPCAD|COMPOF|FFWON|ORIAXES|ORIMKS|ORIWKS)\b|^%_N_|^;\$PATH", re.MULTILINE)
 _SAME = frozenset({0, 1, 2, 3, 17, 18, 19, 40, 53, 54, 55, 56, 57, 90, 91, 93, 94, 95})
 _UNITS = {700: 20, 710: 21, 71: 21}
 _LOSING = frozenset({"G20", "G21", "M6"})
-"""Words of the reader after which places count otherwise, or are not known."""
+"""Words of the reader that change the meaning of coordinates or make the place unknown."""
 _PLANELESS = frozenset({"G2", "G3", "G53", "G91", "G93", "M6", "M428", "M429", *ZEROS})
-"""Those that are not taken in a plane of CYCLE800."""
+"""Words that are refused in a plane of CYCLE800."""
 _IDLE = frozenset({"ORIMKS", "ORIAXES", "FFWON", "FFWOF", "SOFT", "BRISK", "COMPOF", "DIAMOF", "CFTCP"})
 _UNBOUNDED = frozenset({64, 642, 643, 644, 645})
 _M = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30})
 
 
 def is_siemens(text: str) -> bool:
-    """Whether a text has words that Siemens alone has."""
+    """Whether a text has words that only Siemens has."""
     return bool(_MARKS.search(text.upper()))
 
 
-class Siemens(Control):
+class SiemensReader(DialectReader):
     """840D sl, 828D and ONE."""
 
     home_from, gives_up_length = 1, True
@@ -54,14 +54,20 @@ class Siemens(Control):
         self.unbounded = True
         self.tool = self.selected = 0
         self.loose = ""
-        self.lost = ""  # the word after which no zero has been stated
+        self.lost = ""  # the word after which the program has not stated a work offset
         self.tcp = self.relative = False
         self.plane: F64 | None = None  # columns are its axes in the setup frame
-        self.at = [math.nan] * 3  # setup frame, where a plane is on
-        self.trail: list[str] = []  # blocks with places since one was
+        self.at = [math.nan] * 3  # setup frame, while a plane is on
+        self.trail: list[str] = []  # blocks with coordinates since the last plane
 
     def blocks(self, raw: str) -> list[str]:
-        """A plain straight move as it is; everything else word by word."""
+        """A plain straight move unchanged; every other line word by word.
+
+        Raises
+        ------
+        BlockError
+            The line cannot be read, or could be read in two ways.
+        """
         if not self.lost and _PLAIN.fullmatch(raw):
             if self.plane is not None:
                 return [self._in_plane(raw.split())]
@@ -102,8 +108,8 @@ class Siemens(Control):
         if any(54 <= n <= 57 or 505 <= n <= 599 for n in codes):
             self.lost = ""
         if self.lost and "G53" not in out and any(w[0] in "XYZABC" for w in out):
-            raise BlockError(f"a move after {self.lost} without a zero: the control may count from none (G500)",
-                             "state the zero (G54 to G57, G505 on) before anything moves")
+            raise BlockError(f"a move after {self.lost} without a work offset: it may be off (G500)",
+                             "state the work offset (G54 to G57, G505 and up) before the move")
         out += self._path(codes, values)
         self._follow(out)
         if self.plane is not None and any(w[0] in "XYZ" for w in out):
@@ -111,15 +117,15 @@ class Siemens(Control):
         if 4 in codes:
             out = [f"G4 P{w[1:]}" for w in out if w[0] == "F"]
             if not out:
-                raise BlockError("G4 without F, the seconds")
+                raise BlockError("G4 without F (seconds)")
         return [" ".join(out), *after] if out or after else []
 
     def _follow(self, out: list[str]) -> None:
-        """Keep where the tool is, and what a plane rests on."""
+        """Record the place of the tool and the blocks that a plane depends on."""
         if self.plane is not None:
-            told = [w for w in out if w in _PLANELESS or w[0] in "IJK"]
-            if told:
-                raise BlockError(f"{told[0]} in a plane of CYCLE800", "end it with CYCLE800() before")
+            barred = [w for w in out if w in _PLANELESS or w[0] in "IJK"]
+            if barred:
+                raise BlockError(f"{barred[0]} in a plane of CYCLE800", "end the plane with CYCLE800() before")
             return
         if self.relative or not _LOSING.isdisjoint(out):
             self.trail.append("XNAN YNAN ZNAN")
@@ -129,7 +135,7 @@ class Siemens(Control):
             self.trail.append(" ".join(f"{w[0]}NAN" if "G53" in out else w for w in out if w[0] in "XYZ"))
 
     def _in_plane(self, words: list[str]) -> str:
-        """The same block with X, Y, Z in the setup frame."""
+        """The block with X, Y, Z in the setup frame."""
         named = {w[0]: w[1:] for w in words if w[0] in "XYZ"}
         if not named or self.plane is None:
             return " ".join(words)
@@ -140,30 +146,30 @@ class Siemens(Control):
         return " ".join([*head, *places, *(w for w in rest if w[0] not in "NG")])
 
     def _swivel(self, parts: list[str]) -> None:
-        """CYCLE800, which turns the coordinates or turns them back."""
+        """CYCLE800: turn the coordinates, or turn them back."""
         if parts == [""]:
             if self.plane is not None:
                 self.trail = [" ".join(k + f"{v:.12f}" for k, v in zip("XYZ", self.at, strict=True))]
             self.plane = None
             return
-        said = f"CYCLE800({','.join(parts)})"[:60]
+        call = f"CYCLE800({','.join(parts)})"[:60]
         numbers = [parts[0], *parts[2:15]]
         if not 15 <= len(parts) <= 16 or not all(re.fullmatch(NUMBER, p) for p in numbers) or parts[15:] not in (
                 [], [""], ["0"]):
-            raise BlockError(f"{said}: read with its 15 arguments as plain numbers, the second a name")
+            raise BlockError(f"{call} needs its 15 arguments as plain numbers, the second a name")
         given = [float(n) for n in numbers]
         if given[12] != 0.0 or not self.tcp:
-            raise BlockError(f"{said}: read with direction 0, which moves no axis, and while TRAORI keeps the tip")
+            raise BlockError(f"{call} needs direction 0, which moves no axis, and TRAORI on")
         if given[:3] not in ([0.0, 0.0, 57.0], [0.0, 200000.0, 57.0]) or any(given[3:6]) or any(given[9:12]):
-            raise BlockError(f"{said}: read as a new plane, without a way up (0), axis by axis about X, Y, Z (57) and "
-                             "from the zero to the zero")
+            raise BlockError(f"{call} needs a new plane without retract (0), axis by axis about X, Y, Z (57), without "
+                             "shifts")
         if self.relative or self.plane is not None:
-            raise BlockError(f"{said} in incremental coordinates, or in a plane of another")
+            raise BlockError(f"{call} in incremental coordinates, or within the plane of another CYCLE800")
         a, b, c = (math.radians(v) for v in given[6:9])
         self.at, self.plane = self._here(), turn(0, a) @ turn(1, b) @ turn(2, c)
 
     def _here(self) -> list[float]:
-        """Where the tool stands by the blocks so far, nan where they do not say."""
+        """Place of the tool after the blocks so far, nan where they do not state it."""
         found: dict[str, float] = {}
         for block in reversed(self.trail):
             for letter, value in _PLACE.findall(block):
@@ -173,10 +179,10 @@ class Siemens(Control):
         return [found.get(k, math.nan) for k in "XYZ"]
 
     def _path(self, codes: list[int], values: dict[str, float]) -> list[str]:
-        """Words for how far corners are rounded."""
+        """Words that bound the rounding of corners."""
         if 641 in codes:
             if "ADIS" not in values:
-                raise BlockError("G641 without ADIS in its block: how far corners are rounded is not known")
+                raise BlockError("G641 without ADIS in its block: the rounding of corners is unknown")
             self.bound(True)
             return [f"G64 P{max(values['ADIS'], values.get('ADISPOS', 0.0)):.6f}"]
         if "ADIS" in values or "ADISPOS" in values:
@@ -199,7 +205,7 @@ class Siemens(Control):
             out.append(f"T{n}")
         elif letter == "D":
             if n > 1:
-                raise BlockError(f"D{n}: the length of the first cutting edge (D1) alone is known")
+                raise BlockError(f"D{n}: only the length of the first cutting edge (D1) is known")
             out.append(f"G43 H{self.tool}" if n else "G49")
         elif letter == "M":
             if n not in _M:
@@ -213,7 +219,7 @@ class Siemens(Control):
         if n in _SAME:
             return [f"G{n}"]
         if n == 70:
-            raise BlockError("G70 counts places in inches and F in what the machine is set up for",
+            raise BlockError("G70 counts coordinates in inches, and F in the basic unit of the machine",
                              "write G700, which counts F in inches too")
         if n in _UNITS:
             return [f"G{_UNITS[n]}"]
@@ -225,19 +231,19 @@ class Siemens(Control):
         if n == 4 or n == 641 or n in _UNBOUNDED:
             return []
         if n == 500:
-            raise BlockError("G500 switches the work offset off: where zero lies then is not known")
+            raise BlockError("G500 switches the work offset off: program zero is then unknown")
         raise BlockError(f"unknown word G{n}")
 
     def _value(self, name: str, text: str, values: dict[str, float], out: list[str]) -> None:
         if name == "T":
             digits = text.strip('"').removeprefix("T")
             if not digits.isdigit():
-                raise BlockError(f"T={text}: a tool by its number, such as T=\"1\", is all that can be found")
+                raise BlockError(f"T={text}: name the tool by its number, such as T=\"1\"")
             self.selected = int(digits)
             out.append(f"T{self.selected}")
             return
         if not re.fullmatch(NUMBER, text):
-            raise BlockError(f"{name}={text} is no plain number")
+            raise BlockError(f"{name}={text} is not a plain number")
         number = float(text)
         if name in ("X", "Y", "Z", "A", "B", "C", "I", "J", "K", "F", "S"):
             out.append(f"{name}{text}")
@@ -263,13 +269,13 @@ class Siemens(Control):
         return [known]
 
     def _oriented(self, parts: list[str]) -> None:
-        """What to note, once a tool axis moves, where CYCLE832 lets it leave its way by no small angle, or unsaid."""
-        said = len(parts) > 2 and re.fullmatch("1[0-9]", parts[1]) and re.fullmatch(NUMBER, parts[2])
+        """Keep a note for the first turning tool axis where CYCLE832 allows it more than a small deviation."""
+        stated = len(parts) > 2 and re.fullmatch("1[0-9]", parts[1]) and re.fullmatch(NUMBER, parts[2])
         self.loose = ""
-        if said and float(parts[2]) <= SMALL:
+        if stated and float(parts[2]) <= SMALL:
             return
-        how = f"by {parts[2]} deg" if said else "by what setting data say"
-        self.loose = f"CYCLE832 lets the tool axis leave its way {how} where it moves: it is not in the error bound"
+        amount = f"of {parts[2]} deg" if stated else "that setting data decide"
+        self.loose = f"CYCLE832 allows the tool axis a deviation {amount}: the error bound does not include it"
 
     def _call(self, name: str, arguments: str) -> list[str]:
         parts = [p.strip() for p in arguments.split(",")]
@@ -282,13 +288,13 @@ class Siemens(Control):
             return []
         if name == "CYCLE832":
             if parts == [""] or parts[1:2] in (["0"], ["_OFF"]):
-                self.notes.append("CYCLE832 is off: machine data say how far the control rounds corners, and it is not "
-                                  "in the error bound")
+                self.notes.append("CYCLE832 is off: machine data decide how far the control rounds corners; the error "
+                                  "bound does not include it")
                 self.bound(False)
                 return []
             if not re.fullmatch(NUMBER, parts[0]):
-                raise BlockError(f"CYCLE832({arguments}): its tolerance is no plain number")
+                raise BlockError(f"CYCLE832({arguments}): its tolerance is not a plain number")
             self._oriented(parts)
             self.bound(True)
             return [f"G64 P{float(parts[0]):.6f}"]
-        raise BlockError(f"{name[:40]}( ): a cycle or function the reader does not know")
+        raise BlockError(f"{name[:40]}( ): unknown cycle or function")

@@ -18,7 +18,7 @@ from tests.arc_plans import HALF, SHAPES, cutting, round_clamped, round_plan
 from tests.broken_stepnc import broken
 from verify.comparison.stepnc_agreement import check_agreement
 from verify.gcode.reader import read_program
-from verify.stepnc.part21 import Part21
+from verify.stepnc.part21 import Part21File
 from verify.stepnc.reader import ap238, iso14649, read_moves, read_stepnc
 
 FORMS = {"aim": write_stepnc_aim, "first edition": lambda p: write_stepnc_aim(replace(p, ap238=Ap238.INTEGRATED_CNC)),
@@ -63,8 +63,8 @@ def one_ring():
 
 @both
 @pytest.mark.parametrize(("what", "instead", "message"), [
-    (r"(CIRCLE\('',#\d+),[0-9.]+", r"\1,4.9", "a point of the circle expected"),
-    (r"(TRIMMED_CURVE\('',#\d+),\(#\d+\)", r"\1,(PARAMETER_VALUE(0.))", "parameters alone are not read"),
+    (r"(CIRCLE\('',#\d+),[0-9.]+", r"\1,4.9", "a point on the circle expected"),
+    (r"(TRIMMED_CURVE\('',#\d+),\(#\d+\)", r"\1,(PARAMETER_VALUE(0.))", "parameters are not read"),
     (r"(TRIMMED_CURVE\(.*),\.CARTESIAN\.", r"\1,.PARAMETER.", "master_representation"),
     (r"(TRIMMED_CURVE\('',)#\d+", r"\g<1>#1", "basis_curve"),
 ])
@@ -79,7 +79,7 @@ def test_an_arc_that_is_none_is_refused_by_its_number(write, what, instead, mess
 def test_a_gap_between_segments_is_refused():
     text = write_stepnc_aim(one_ring())
     first, second = re.findall(r"#\d+=COMPOSITE_CURVE_SEGMENT\(\.CONTINUOUS\.,\.T\.,(#\d+)\);", text)[:2]
-    with pytest.raises(ProgramError, match="from the end of the one before"):
+    with pytest.raises(ProgramError, match="from the end of the segment before"):
         read_stepnc(text.replace(f".T.,{second})", f".T.,{first})"))
 
 
@@ -111,8 +111,8 @@ def test_every_attribute_of_an_arc_broken_is_refused_by_name(write, form, names)
     text = write(one_ring())
     good = read_moves(text)
     new = {"TRIMMED_CURVE", "CIRCLE", "COMPOSITE_CURVE", "COMPOSITE_CURVE_SEGMENT"}
-    others = frozenset(" ".join(n for n, _ in Part21(text, "job").records(k))
-                       for of in Part21(text, "job").entities().values() for k in of) - new | {"CARTESIAN_POINT"}
+    others = frozenset(" ".join(n for n, _ in Part21File(text, "job").records(k))
+                       for of in Part21File(text, "job").entities().values() for k in of) - new | {"CARTESIAN_POINT"}
     refused = 0
     for b in broken(text, form.TABLE, names=names, most=1, without=others):
         assert b.entity in new

@@ -25,7 +25,7 @@ def test_angles_beyond_the_limits_of_an_axis():
     limits = np.radians([[-30.0, 110.0], [-360.0, 360.0]])
     findings, _ = found("G0 A45\nA-30.5\nA-31\nC400\n", rotary_limits=limits)
     assert [(f.line, round(f.depth, 9), round(f.limit, 9)) for f in findings] == [(12, 1, -30), (13, 40, 360)]
-    assert "A-31 is beyond the -30 to 110 deg" in findings[0].message and "C400" in findings[1].message
+    assert "A-31 is outside the range of A, -30 to 110 deg" in findings[0].message and "C400" in findings[1].message
     assert found("G0 A110 C-360\nA-30 C360\n", rotary_limits=limits)[0] == []
 
 

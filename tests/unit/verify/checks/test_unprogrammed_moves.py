@@ -28,7 +28,7 @@ def test_a_table_that_tilts_is_come_to_along_the_tool():
     """The tool lies along +Y. Its tip 25 mm up, 5 over the part, but where the part is: from where X and Z of the part
     are not stated it came past the side of the part, if not through it."""
     (line, message), = found("table-table-AC", "G0 A90 C0", "M428", "G0 X0 Y-15 Z25")
-    assert line == 9 and "36.000 mm along the tool lower than above everything" in message
+    assert line == 9 and "36.000 mm too low along the tool axis" in message
     assert found("table-table-AC", "G0 A90 C0", "M428", "G0 X0 Y21.1 Z25") == []
     assert found("table-table-AC", "G0 A90 C0", "M428", "G0 X0 Y21.1 Z5", "G1 Y20.5 F100") == []  # beside it, and in
     assert [line for line, _ in found("table-table-AC", "G0 A90 C0", "M428", "G0 X0 Y20.9 Z5")] == [9]

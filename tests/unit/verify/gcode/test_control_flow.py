@@ -134,14 +134,14 @@ def test_a_shift_of_zero_is_known_to_the_bit():
 def test_notes_reach_the_proof():
     p = read("X[10]\nG52 X2\nG92.1\n")
     assert list(notes_on(p, -100.0, ProofSetup())) == [
-        "program, parameters, expressions and O-words were read as LinuxCNC reads them; other controls differ",
+        "program, parameters, expressions and O-words are read as in LinuxCNC; other controls differ",
         "program, line 9: G52 moves program zero to X2.0000 mm"]
 
 
 def test_offset_table_of_the_setup():
     p = read("X10\nG10 L20 P1 X3\nX3\nG92 X1\nG10 L20 P0 X5\nX6\nG92.1\n")
     np.testing.assert_allclose(p.end[1:, 0], [10, 10, 11])
-    assert [(r.line, "run again" in r.message) for r in p.remarks] == [(9, True), (12, True)]
+    assert [(r.line, "next run" in r.message) for r in p.remarks] == [(9, True), (12, True)]
 
 
 def test_cycles_in_other_planes_and_series():
@@ -163,7 +163,7 @@ def test_a_series_under_a_shifted_zero_keeps_its_number():
 
 def test_a_way_back_that_is_not_stated_is_told():
     assert read("G81 X1 Z-3 R1\nG80\n").notes == (
-        "drilling cycles with neither G98 nor G99 stated were read as with G98 (back to where they began)",)
+        "neither G98 nor G99 is stated: drilling cycles are read with G98 (return to start height)",)
     assert read("G98 G81 X1 Z-3 R1\nG80\n").notes == () == read("G81 X1 Z-3 R10\nG80\n").notes
 
 
@@ -191,7 +191,7 @@ def test_the_stage_before_changes_nothing_of_plain_blocks():
 
 
 def test_a_loop_without_end(monkeypatch):
-    monkeypatch.setattr(control_flow, "MOST_BLOCKS", 1000)
+    monkeypatch.setattr(control_flow, "MAX_BLOCKS", 1000)
     with pytest.raises(VerificationError) as caught:
         read("o1 while [1]\no1 endwhile\n")
     error = caught.value
@@ -213,7 +213,7 @@ def test_structure_pairs_what_belongs_together():
 
 def test_any_pieces_give_a_program_or_an_error_with_a_line(monkeypatch):
     """A reading of random pieces ends in finite moves or names a line; nothing else escapes."""
-    monkeypatch.setattr(control_flow, "MOST_BLOCKS", 2000)
+    monkeypatch.setattr(control_flow, "MAX_BLOCKS", 2000)
     r = random.Random(5)
     pieces = ("# [ ] #1 #2 #<a> #<_x> 1 2 -3 0.5 + - * / ** MOD EQ AND = = o1 o2 o<f> sub endsub if else endif while "
               "do endwhile repeat endrepeat call return break continue [1] [0] [#1] X Y1 G1 G0 F50 ATAN SIN[ LN "

@@ -141,17 +141,17 @@ def test_remarks_name_what_should_not_run(body, word):
     # machine coordinates: only home is above everything, and only from home may X and Y go to the machine's places
     ("G53 G0 Z-200\n", 7, ("G53 Z-200",)), ("G53 G0 X0 Y0 Z0\n", 7, ("Z10", "home first")),
     ("G53 G0 X5\n", 7, ("home first",)), ("G28\n", 7, ("home first",)),
-    ("G53 G0 Z0\nG53 G0 X0 Y0\nG0 Z5\nX1 Y1\n", 9, ("state X and Y",)), ("G91 G53 G0 Z0\nG90\n", 7, ("G91",)),
+    ("G53 G0 Z0\nG53 G0 X0 Y0\nG0 Z5\nX1 Y1\n", 9, ("program X and Y",)), ("G91 G53 G0 Z0\nG90\n", 7, ("G91",)),
     ("G53 G0 Z0\nG1 X5 F100\n", 8, ("not stated",)),
     # unit
-    ("G20\nG0 Z1\n", 7, ("G20", "middle")),
+    ("G20\nG0 Z1\n", 7, ("G20", "within")),
     # words no code takes
     ("D1 L5 Q17\n", 7, ("D1, L5, Q17",)), ("G1 X1 K5 F100\n", 7, ("K5",)), ("X1 I5\n", 7, ("I5",)),
     ("G1 X1 R9 P9 F100\n", 7, ("R9, P9",)), ("G0 X1\nX2 H1\n", 8, ("H1",)), ("G2 X10 R5 I5 F100\n", 7, ("I5",)),
     ("G0 R5\n", 7, ("R5",)), ("G2 I5 F100\nR5 P2\n", 8, ("R5, P2",)), ("G28 R1\n", 7, ("R1",)),
     ("G81 X1 Y1 Z-1 R1 Q2 F100\nG80\n", 7, ("Q2",)),
     # incremental coordinates forgotten
-    ("G1 X1 F100\nG91\n" + "X1\n" * 50, 8, ("G91", "never turns back")),
+    ("G1 X1 F100\nG91\n" + "X1\n" * 50, 8, ("G91", "never switches back")),
     ("G0 Z20\nT2 M6\nG43 H2 M3\nG91 G0 Z-5\nG90 Z20\n", 10, ("Z-5", "line 10", "not stated")),
 ])
 def test_what_a_machine_might_do_otherwise_is_named_on_its_line(body, line, words):

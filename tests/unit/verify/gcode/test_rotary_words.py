@@ -9,7 +9,7 @@ from geometry.errors import CamError, ProgramError
 from verify.gcode.reader import FEED, RAPID, read_program
 from verify.kinematics import Kinematics
 from verify.program.arc_chords import CHORD
-from verify.program.turn_subdivision import MOST_TURN, TURN, axis_pieces
+from verify.program.turn_subdivision import MAX_TURN, TURN, axis_pieces
 
 PIVOTS = {"table-table-AC": ((3.0, -2.0, -40.0), (1.5, 4.0, -7.0)),
           "head-table-BC": ((0.0, 0.0, 60.0), (12.0, -5.0, 3.0)), "head-head-BC": ((0.0, 0.0, 60.0),)}
@@ -67,12 +67,12 @@ def test_pieces_stay_as_near_as_promised_to_what_the_control_does(kind, tcp, sta
     np.testing.assert_allclose(np.abs(np.diff(np.concatenate([p.poses.start_turn[rows], p.poses.end_turn[rows[-1:]]]),
                                               axis=0)).max(), np.radians(np.abs(b - a)[3:].max()) / len(rows))
     np.testing.assert_allclose(p.start[rows[1:]], p.end[rows[:-1]], atol=1e-12)
-    assert np.radians(np.abs(b - a)[3:]).max() / len(rows) <= MOST_TURN
+    assert np.radians(np.abs(b - a)[3:]).max() / len(rows) <= MAX_TURN
 
 
 def test_pieces_are_no_more_than_needed():
     """A pure tilt is a great circle, a turn at the pole moves no axis, a circle at 45 degrees meets the bound."""
-    assert axis_pieces((0, 0), (1.5, 0)) == math.ceil(1.5 / MOST_TURN) == axis_pieces((0, 0), (0, 1.5))
+    assert axis_pieces((0, 0), (1.5, 0)) == math.ceil(1.5 / MAX_TURN) == axis_pieces((0, 0), (0, 1.5))
     n = axis_pieces((math.pi / 4, 0), (math.pi / 4, math.tau))
     machine = Kinematics("table-table-AC")
     f = np.linspace(0, 1, 41)[:, None]
@@ -153,19 +153,19 @@ def test_axes_that_never_leave_zero_change_nothing():
 
 
 @pytest.mark.parametrize("body, message, remedy", [
-    ("G1 B5 F100\n", "unknown word B5 (a rotary axis; the machine turns A and C)", "correct"),
+    ("G1 B5 F100\n", "unknown word B5 (the rotary axes of the machine are A and C)", "correct"),
     ("G43.5 H1\n", "unknown word G43.5", "correct"),
     ("G68.2 X0\n", "unknown word G68.2 (a tilted plane)", "correct"),
-    ("M430\n", "unknown word M430 (kinematics of the shop's own)", "correct"),
+    ("M430\n", "unknown word M430 (user-defined kinematics)", "correct"),
     ("G92 A0\n", "G92 A (a shifted rotary zero)", "correct"),
-    ("M70\nG43.4 H1\nM72\n", "M72 back over a G43.4", "correct"),
+    ("M70\nG43.4 H1\nM72\n", "M72 would switch tool centre point control (G43.4)", "correct"),
     ("G43 G43.4 H1\n", "G43 and G43.4 in one block", "correct"),
     ("M428 M429\n", "M428 and M429 in one block", "correct"),
-    ("G81 X1 Y1 Z-1 R1 A5 F100\n", "a drilling cycle whose block turns an axis", "correct"),
+    ("G81 X1 Y1 Z-1 R1 A5 F100\n", "a drilling cycle turns a rotary axis in its block", "correct"),
     ("G4 P1 A5\n", "coordinates in a block with G4", "correct"), ("G80\nA5\n", "without a motion word", "correct"),
     ("G0 A30\n", "without tool centre point control at A30 C0", "machine.pivots_mm"),
     ("M428\nA30\nM429\nX0 Y0 Z0\n", "without tool centre point control at A30 C0", "machine.pivots_mm"),
-    ("G93 G1 A5\n", "needs F on every line", "correct"), ("G1 A5\n", "without a feed", "correct")])
+    ("G93 G1 A5\n", "needs F in every block", "correct"), ("G1 A5\n", "without a feed", "correct")])
 def test_what_cannot_be_read_is_named(body, message, remedy):
     with pytest.raises(ProgramError) as caught:
         read(body, pivots=False)
@@ -207,7 +207,7 @@ def test_what_is_taken_for_granted():
     assert (p.tool == 3).all() and p.remarks == ()
     p = read_program("T1 M6\nG43 H1\nG0 A0\n" + text, kinematics=machine, spindle_tool=3, tools={1, 3})
     assert p.assumed[5:] == ("C0",) and (p.tool == 1).all()
-    with pytest.raises(ProgramError, match="T9, named as the tool in the spindle"):
+    with pytest.raises(ProgramError, match="the tool in the spindle, T9, is not"):
         read_program(text, spindle_tool=9, tools={1})
 
 

@@ -22,7 +22,7 @@ from verify.gcode.reader import read_program
 from verify.kinematics import KINDS, Kinematics
 from verify.model import NcProgram
 from verify.prove import prove
-from verify.stepnc.part21 import Part21, Ref, Typed, Word, decoded, is_exchange_file
+from verify.stepnc.part21 import EnumItem, Part21File, Ref, Typed, decoded, is_exchange_file
 from verify.stepnc.reader import is_stepnc, read_moves, read_stepnc
 
 FORMS = {"aim": write_stepnc_aim, "arm": write_stepnc_arm}
@@ -92,7 +92,7 @@ def test_that_there_is_no_coolant_comes_back(write):
 def test_a_fresh_cutter_stops_the_program_at_the_clearance_plane(write):
     job = full()
     read = read_stepnc(write(job), tools=job.tools)
-    stop = next(s for s in read.stops if s.what == "program stop")
+    stop = next(s for s in read.stops if s.event == "program stop")
     assert stop.tip[2] == job.clearance_plane and stop.tool == 1
     assert "Fresh cutter in T1" in write(job)
 
@@ -160,9 +160,9 @@ def test_values_of_all_kinds_and_complex_instances():
             "#12,(#1,()),LENGTH_MEASURE(4.),\"0AF\") /* ; */ ;#2=(B(1.)\nC('x') /* y */ D());\n"
             "#3=CARTESIAN_POINT('',(1.,2.,3.)); #4=CARTESIAN_POINT('\\X2\\00E9\\X0\\',(1.,2.,3.));\n"
             "#5=CARTESIAN_POINT('',(1.,\n2.,/* two */3.));\n")
-    file = Part21(head + body + "ENDSEC;\nEND-ISO-10303-21;\n", "odd")
+    file = Part21File(head + body + "ENDSEC;\nEND-ISO-10303-21;\n", "odd")
     ((name, values),) = file.records(1)
-    assert name == "A" and values[:6] == [1.5, -0.002, 3, "it's; /* no comment */", Word("T"), None]
+    assert name == "A" and values[:6] == [1.5, -0.002, 3, "it's; /* no comment */", EnumItem("T"), None]
     assert repr(values[6]) == "*" and values[7:] == [Ref(12), [Ref(1), []], Typed("LENGTH_MEASURE", 4.0),
                                                      Typed("BINARY", "0AF")]
     assert file.records(2) == [("B", [1.0]), ("C", ["x"]), ("D", [])] and file.names(2) == ("B", "C", "D")
@@ -183,7 +183,7 @@ def test_statements_read_at_once_say_what_they_say_word_by_word():
 
     def file(bodies):
         text = "".join(f"#{k + 1}={body};" for k, body in enumerate(bodies))
-        return Part21(head + text + "ENDSEC;END-ISO-10303-21;", "file")
+        return Part21File(head + text + "ENDSEC;END-ISO-10303-21;", "file")
 
     at_once, by_word = file(bodies), file([body + " " for body in bodies])  # a blank before the semicolon
     for k in range(1, len(bodies) + 1):
@@ -252,8 +252,8 @@ def test_a_tool_is_known_by_its_number_or_its_size():
     text_ = write_stepnc_arm(tiny())
     nameless = text_.replace("MILLING_CUTTING_TOOL('T1: ball", "MILLING_CUTTING_TOOL('BALL_3MM: ball")
     read = read_stepnc(nameless, tools=[BALL, OTHER])
-    assert set(read.tool.tolist()) == {1} and any("by its size" in n for n in read.notes)
-    with pytest.raises(ProgramError, match="none of the setup's"):
+    assert set(read.tool.tolist()) == {1} and any("its size matches" in n for n in read.notes)
+    with pytest.raises(ProgramError, match="matches no tool of the setup"):
         read_stepnc(nameless, tools=[OTHER])
     other = read_stepnc(text_, tools=[replace(BALL, diameter=4.0, corner_radius=2.0)])
     assert any("diameter 3 mm in the file and 4 mm" in r.message for r in other.remarks)

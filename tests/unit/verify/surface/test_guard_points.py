@@ -11,7 +11,7 @@ from geometry.mesh_queries.rays import first_hits
 from tests.hand_parts import box_mesh, dome, slope_field
 from verify.surface.guard_points import (
     DEEP_A_MOVE,
-    MOST_SEEDS,
+    MAX_SEEDS,
     closer_points,
     closer_seeds,
     gouge_depths,
@@ -88,7 +88,7 @@ def test_a_large_gouge_leaves_room_for_small_ones():
     lowest = [points[mover == m][residual[mover == m].argmin()] for m in range(20)]
     assert cKDTree(seeds).query(np.array(lowest))[0].max() == 0.0
     seeds, left_out = closer_seeds(points, residual / 30.0, mover, 0.05)
-    assert len(seeds) == MOST_SEEDS and left_out > 1000
+    assert len(seeds) == MAX_SEEDS and left_out > 1000
 
 
 def test_the_depth_of_a_stretch_is_the_largest_distance_on_it():

@@ -14,7 +14,7 @@ from tests.synthetic_plan import clamped, plan
 from verify.comparison.program_equivalence import difference
 from verify.gcode.dialects import CONTROLS
 from verify.gcode.dialects import __name__ as home
-from verify.gcode.dialects.base import BlockError, Control
+from verify.gcode.dialects.base import BlockError, DialectReader
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
 
@@ -43,7 +43,7 @@ class Sixth(Dialect):
         return ["TIP OFF"]
 
 
-class SixthReader(Control):
+class SixthReader(DialectReader):
     """The same words backwards."""
 
     WORDS = {"FIN": ["M30"], "TIP ON": ["M428"], "TIP OFF": ["M429"]}
