@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from geometry.errors import CamError, OutputError, SetupError
 from geometry.tool_body import HolderSegment, ToolBody
-from output.inverse_kinematics import RotaryMachine, said_limits
+from output.inverse_kinematics import RotaryMachine, program_limits
 from schemas.machine import Machine
 from schemas.setup import Placement, Setup
 from schemas.tools import Tool
@@ -217,7 +217,7 @@ def rotary_machine(machine: Machine) -> RotaryMachine | None:
     pivots = None if machine.pivots_mm is None else tuple((x, y, z) for x, y, z in machine.pivots_mm)
     try:
         limits, sense = rotary_limits(machine), _sense(machine)
-        return RotaryMachine(machine.kinematics, pivots, None if limits is None else said_limits(limits, sense),
+        return RotaryMachine(machine.kinematics, pivots, None if limits is None else program_limits(limits, sense),
                              machine.tcp, sense)
     except OutputError as refusal:
         raise SetupError(refusal.message, code=refusal.code, subjects=refusal.subjects,
