@@ -1,4 +1,4 @@
-"""What the command line says: the result on stdout, everything else on stderr, errors as one clear block."""
+"""Output of the command line: the result on stdout, everything else on stderr, errors as one clear block."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def say(text: str) -> None:
 
 
 class Progress:
-    """Progress lines on stderr: every new stage with its time and percentage, and again while the stage lasts.
+    """Progress lines on stderr: each new stage with its time, on a terminal also the percentage."""
 
     every_s : s between two lines of one stage; by default 1 on a terminal, where the line is rewritten, and 5 elsewhere
     """
@@ -75,9 +75,9 @@ def print_json(data: Any) -> None:
 
 
 def verification_summary(report: dict[str, Any], seconds: float) -> str:
-    """A verification in a few lines: state, findings by kind with the first line of each, coverage, files, time.
+    """A verification in a few lines: state, findings by kind with the first of each, coverage, files, time.
 
-    report  : as ``service.pipeline.verify_program`` gives it; seconds : it took
+    report  : from ``service.pipeline.verify_program``; seconds : duration of the verification
     """
     count = sum(report.get("finding_counts", {}).values())
     lines = [f"{report['state']}: {count or 'no'} finding{'' if count == 1 else 's'}"]
@@ -91,7 +91,7 @@ def verification_summary(report: dict[str, Any], seconds: float) -> str:
     if report.get("gouge_max_mm"):
         lines.append(f"  deepest    {report['gouge_max_mm']:g} mm cut into the part")
     if made := report.get("machined"):
-        lines.append(f"  machined   {made['volume_mm3']:g} mm3 stand, nodes {made['step_mm']:g} mm apart")
+        lines.append(f"  machined   {made['volume_mm3']:g} mm3 remain, nodes {made['step_mm']:g} mm apart")
     if files := report.get("files"):
         lines.append(f"  files      {', '.join(f['name'] for f in files)}, report.json")
     lines.append(f"  took       {seconds:.1f} s")
@@ -99,7 +99,7 @@ def verification_summary(report: dict[str, Any], seconds: float) -> str:
 
 
 def error_block(error: CamError) -> str:
-    """An error as a person wants to read it."""
+    """An error as text for people."""
     lines = [f"error: {error.message}", f"  code      {error.code} ({type(error).__name__})"]
     if error.subjects:
         lines.append(f"  concerns  {', '.join(error.subjects)}")
@@ -118,7 +118,7 @@ def error_block(error: CamError) -> str:
 
 
 def report_error(error: CamError, *, as_json: bool) -> int:
-    """Print an error (block on stderr, with ``as_json`` the problem document on stdout); returns the exit code."""
+    """Print an error (block on stderr; with ``as_json`` the problem document on stdout) and return the exit code."""
     if as_json:
         print_json(problem_document(error))
     else:

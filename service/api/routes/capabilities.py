@@ -1,4 +1,4 @@
-"""GET /v1/capabilities: what this service can do and how much of it."""
+"""GET /v1/capabilities: what this service can do, and its limits."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ STEPNC = ("AP238", "ISO 14649")
 @router.get("", operation_id="capabilities", summary="What the service can do",
             responses=responses(UnauthorizedError))
 def capabilities(request: Request, who: Who) -> Capabilities:
-    """Dialects, tools, machines, materials, limits, version, and who you are; any key opens it."""
+    """Dialects, tools, machines, materials, limits, version, and the principal of the key. Any key may read it."""
     settings: Settings = request.app.state.settings
     return Capabilities(
         version=VERSION, code=code_version(), kinds=list(get_args(JobKind)),
@@ -45,6 +45,6 @@ def capabilities(request: Request, who: Who) -> Capabilities:
 
 
 def _choices(model: Any, field: str) -> list[str]:
-    """The words a field takes, as its annotation has them."""
+    """The allowed values of a field, from its annotation."""
     kinds = (model.model_fields[field].annotation, *get_args(model.model_fields[field].annotation))
     return [word for kind in kinds for word in get_args(kind) if isinstance(word, str)]
