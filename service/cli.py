@@ -15,7 +15,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from service.commands import key_commands
-from service.commands.arguments import blank_file, known_dialect, make_folder, mesh_wish, read_program, reported
+from service.commands.arguments import (
+    blank_file,
+    error_reporting,
+    known_dialect,
+    make_folder,
+    read_program,
+    requested_mesh,
+)
 from service.version import VERSION
 
 if TYPE_CHECKING:
@@ -65,10 +72,10 @@ def plan(part: Part, setup: SetupPath,
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
         from service.pipeline import plan as plan_job
 
-        report = plan_job(part, given, out, progress, mesh_wish(mesh_step, mesh_box), blank_path=blank)
+        report = plan_job(part, given, out, progress, requested_mesh(mesh_step, mesh_box), blank_path=blank)
         return report, EXIT_PROVED if report["state"] == "proved" else EXIT_UNPROVED
 
-    with reported(as_json):
+    with error_reporting(as_json):
         make_folder(out)
     _exit(part, setup, run, as_json)
 
@@ -109,7 +116,7 @@ def verify(part: Part, setup: SetupPath,
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
         from service.pipeline import verify_program
 
-        started, wish = time.monotonic(), mesh_wish(mesh_step or None, mesh_box) if out is not None else None
+        started, wish = time.monotonic(), requested_mesh(mesh_step or None, mesh_box) if out is not None else None
         result = verify_program(part, given, read_program(program), progress, access, out, wish, spindle_tool, blank,
                                 known_dialect(dialect), program.suffix)
         progress.close()
@@ -117,7 +124,7 @@ def verify(part: Part, setup: SetupPath,
         return result, EXIT_UNPROVED if result["findings"] else EXIT_PROVED
 
     if out is not None:
-        with reported(as_json):
+        with error_reporting(as_json):
             make_folder(out, verification=True)
     _exit(part, setup, run, as_json)
 
@@ -131,7 +138,7 @@ def serve(host: Annotated[str | None, typer.Option(help="Address; default: 127.0
     from service.api.server import settings_with
 
     given = {"host": host, "port": port, "data_dir": data}
-    with reported(as_json):
+    with error_reporting(as_json):
         from service.api.server import run_server
 
         run_server(settings_with(given))
@@ -145,7 +152,7 @@ def view(folder: Annotated[Path, typer.Argument(
          as_json: AsJson = False) -> None:
     """Show a folder of results in the browser, as the web page of a job, until Ctrl-C. Only this machine can open it.
     """
-    with reported(as_json):
+    with error_reporting(as_json):
         from service.commands.view_command import show_folder
 
         show_folder(folder, port, open_browser=browser)
@@ -162,7 +169,7 @@ def demo(out: Annotated[Path, typer.Option("--out", help="Folder for the files."
     Exit
         With the exit code of the job.
     """
-    with reported(as_json):
+    with error_reporting(as_json):
         from service.commands.demo import run_demo
 
         code = run_demo(out, keep=keep)
@@ -181,7 +188,7 @@ def family(out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folde
            reach: Annotated[bool, typer.Option("--reach", help="Also compute what the setup can reach.")] = False,
            as_json: AsJson = False) -> None:
     """Write random test parts with known features: NAME.step, NAME.truth.json, NAME.setup.json; print the file list."""
-    with reported(as_json):
+    with error_reporting(as_json):
         from service.console import print_json, say
 
         make_folder(out)
@@ -196,7 +203,7 @@ def family(out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folde
 @app.command()
 def warm(as_json: AsJson = False) -> None:
     """Compile the kernels once, so that the first job starts at once. This takes about a minute."""
-    with reported(as_json):
+    with error_reporting(as_json):
         from service.commands.demo import run_warm
         from service.console import say
 
@@ -254,7 +261,7 @@ def write_family_part(recipe: str, seed: int, out: Path, wanted: dict[str, int],
 def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress, Path | None], tuple[Any, int]],
           as_json: bool) -> None:
     """Run a command on part and setup, print its result and exit with its exit code."""
-    with reported(as_json):
+    with error_reporting(as_json):
         from geometry.step_import.text_checks import check_text
         from service.console import Progress, print_json
         from service.from_wire import read_setup

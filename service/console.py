@@ -9,7 +9,7 @@ import time
 from typing import Any
 
 from geometry.errors import CamError
-from service.errors import mapping_of, problem_document
+from service.errors import error_mapping, problem_document
 
 MEASURED_SHOWN = 20
 LIVE_EVERY_S, LINE_EVERY_S = 1.0, 5.0  # between two lines of one stage, on a terminal and elsewhere
@@ -123,4 +123,4 @@ def report_error(error: CamError, *, as_json: bool) -> int:
         print_json(problem_document(error))
     else:
         say(error_block(error))
-    return mapping_of(error).exit_code
+    return error_mapping(error).exit_code

@@ -71,32 +71,32 @@ def _refuse_foreign_pages(request: Request) -> None:
                                  remedy="use the address 127.0.0.1, or create a key: zonemill keys create")
 
 
-def require(who: Identity, *scopes: str) -> None:
-    """Refuse who has none of these scopes.
+def require(caller: Identity, *scopes: str) -> None:
+    """Refuse a caller without any of these scopes.
 
     Raises
     ------
     ForbiddenError
         Code 'scope_missing'.
     """
-    if not who.scopes & set(scopes):
-        raise ForbiddenError(f"the key {who.key_id} has not the scope {' or '.join(scopes)}", code="scope_missing",
-                             subjects=(str(who.key_id),), measured=sorted(who.scopes), limit=list(scopes),
-                             remedy=f"ask for a key with the scope {scopes[0]}")
+    if not caller.scopes & set(scopes):
+        raise ForbiddenError(f"the key {caller.key_id} lacks the scope {' or '.join(scopes)}", code="scope_missing",
+                             subjects=(str(caller.key_id),), measured=sorted(caller.scopes), limit=list(scopes),
+                             remedy=f"use a key with the scope {scopes[0]}")
 
 
 def _needs(*scopes: str) -> Callable[[Identity], Awaitable[str]]:
     """Dependency that requires one of these scopes and returns the name of the principal."""
 
-    async def check(who: Annotated[Identity, Depends(identity)]) -> str:  # does not block, so it needs no thread
+    async def check(caller: Annotated[Identity, Depends(identity)]) -> str:  # does not block, so it needs no thread
         if scopes:
-            require(who, *scopes)
-        return who.principal
+            require(caller, *scopes)
+        return caller.principal
 
     return check
 
 
-Who = Annotated[Identity, Depends(identity)]
+Caller = Annotated[Identity, Depends(identity)]
 Principal = Annotated[str, Depends(_needs(READ))]
 Submitter = Annotated[str, Depends(_needs(SUBMIT))]
 Admin = Annotated[str, Depends(_needs(ADMIN))]

@@ -30,7 +30,7 @@ from service.errors import (
     UnavailableError,
     problem_document,
 )
-from service.from_wire import MOST_TOLD, sentence
+from service.from_wire import MAX_PROBLEMS_LISTED, sentence
 from service.jobs.database import AWAY
 from service.jobs.disk_space import STORAGE_FULL, is_full
 
@@ -105,7 +105,7 @@ def _offered(request: Request) -> list[str]:
 async def _validation(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
     problems = [{"at": ".".join(str(p) for p in e["loc"]), "problem": sentence(e["type"], e["msg"])}
-                for e in error.errors()[:MOST_TOLD]]
+                for e in error.errors()[:MAX_PROBLEMS_LISTED]]
     first = problems[0]
     return problem_response(request, RequestError(f"{first['at']}: {first['problem']}", measured=problems,
                                                   subjects=tuple(p["at"] for p in problems),

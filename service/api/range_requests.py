@@ -12,7 +12,7 @@ from fastapi import Request
 
 from service.errors import RangeError
 
-MOST_RANGES = 16
+MAX_RANGES = 16
 _RANGES = re.compile(r"bytes=\s*(?:\d{1,18}-\d{0,18}|-\d{1,18})(?:\s*,\s*(?:\d{1,18}-\d{0,18}|-\d{1,18}))*\s*",
                      re.ASCII | re.IGNORECASE)
 _ONE = re.compile(r"(\d*)-(\d*)", re.ASCII)
@@ -34,7 +34,7 @@ def check_range(request: Request, size: int, etag: str) -> None:
     condition = request.headers.get("if-range")
     parts = _ONE.findall(text) if _RANGES.fullmatch(text) else []
     backwards = any(a and b and int(b) < int(a) for a, b in parts)
-    if not parts or backwards or len(parts) > MOST_RANGES or (condition is not None and condition != etag):
+    if not parts or backwards or len(parts) > MAX_RANGES or (condition is not None and condition != etag):
         request.scope["headers"] = [(k, v) for k, v in request.scope["headers"] if k not in (b"range", b"if-range")]
         return
     there = [(a, b) for a, b in parts if (int(a) < size if a else int(b) > 0 and size > 0)]

@@ -18,7 +18,7 @@ from geometry.errors import InputError, ProgramError, SetupError
 from geometry.step_import.text_checks import check_text
 from schemas.setup import Setup, canonical_json, setup_sha256
 from service.errors import RequestError
-from service.from_wire import check_plannable, check_spindle_tool, no_stock_file, of_blank, parse_setup
+from service.from_wire import blank_error, check_plannable, check_spindle_tool, no_stock_file, parse_setup
 from service.jobs.artifacts import Artifacts
 from service.jobs.engine import Engine
 from service.jobs.job_store import NewJob
@@ -33,7 +33,7 @@ DEADLINE_S = (1, 604800)  # a week
 
 
 @dataclass(frozen=True)
-class Form:
+class SubmissionForm:
     """The parts of a multipart request, as sent."""
 
     part: UploadFile
@@ -45,7 +45,7 @@ class Form:
     webhook_url: str | None = None
 
 
-async def read_form(request: Request, *, with_program: bool) -> Form:
+async def read_form(request: Request, *, with_program: bool) -> SubmissionForm:
     """Read a multipart form and spool its files to disk, within the body limit of the application.
 
     Raises
@@ -83,7 +83,7 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
             raise RequestError(f"'{name}' must be sent as a file, with a file name", code="not_a_file",
                                subjects=(name,), remedy=f"curl -F {name}=@FILE")
     assert isinstance(part, UploadFile)
-    return Form(part, await _bytes_of(form["setup"]), program if isinstance(program, UploadFile) else None,
+    return SubmissionForm(part, await _bytes_of(form["setup"]), program if isinstance(program, UploadFile) else None,
                 _tool_number(await _bytes_of(form[SPINDLE_TOOL])) if SPINDLE_TOOL in names else 0,
                 stock if isinstance(stock, UploadFile) else None,
                 _deadline(await _bytes_of(form[DEADLINE])) if DEADLINE in names else None,
@@ -133,7 +133,7 @@ async def _bytes_of(field: Any) -> bytes:
     return data
 
 
-def new_job(engine: Engine, kind: str, principal: str, key: str | None, form: Form) -> NewJob:
+def new_job(engine: Engine, kind: str, principal: str, key: str | None, form: SubmissionForm) -> NewJob:
     """Check and store the upload, and describe the job. It runs in a thread, since it reads and writes files.
 
     Raises
@@ -186,7 +186,7 @@ def _store_stock(artifacts: Artifacts, file: BinaryIO) -> str:
     try:
         return store_part(artifacts, file)
     except InputError as error:
-        raise of_blank(error) from None
+        raise blank_error(error) from None
 
 
 def _stock_not_asked(kind: str) -> SetupError:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from service.stages.machined_mesh import MeshWish
 
 
-def mesh_wish(step: float | None, box: str | None) -> MeshWish | None:
+def requested_mesh(step: float | None, box: str | None) -> MeshWish | None:
     """The requested mesh of the machined part; None where ``step`` is None.
 
     Raises
@@ -66,7 +66,7 @@ def blank_file(setup_path: Path, setup: Setup) -> Path | None:
     """
     from geometry.errors import InputError
     from geometry.step_import.text_checks import check_text
-    from service.from_wire import no_stock_file, of_blank
+    from service.from_wire import blank_error, no_stock_file
 
     if setup.stock.kind != "step":
         return None
@@ -76,7 +76,7 @@ def blank_file(setup_path: Path, setup: Setup) -> Path | None:
     try:
         check_text(path)
     except InputError as error:
-        raise of_blank(error) from None
+        raise blank_error(error) from None
     return path
 
 
@@ -119,7 +119,7 @@ def read_program(path: Path) -> str:
 
 
 @contextmanager
-def reported(as_json: bool) -> Iterator[None]:
+def error_reporting(as_json: bool) -> Iterator[None]:
     """Turn errors into a block or a problem document, and exit with the exit code of their class.
 
     Raises

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.commands.arguments import reported
+from service.commands.arguments import error_reporting
 
 if TYPE_CHECKING:
     from service.jobs.api_keys import KeyStore
@@ -27,7 +27,7 @@ def create(principal: Annotated[str, typer.Option(help="Name of the owner; jobs 
            note: Annotated[str, typer.Option(help="Purpose of the key.")] = "", data: Data = None,
            as_json: AsJson = False) -> None:
     """Create a key and print it. It cannot be shown again."""
-    with reported(as_json):
+    with error_reporting(as_json):
         from service.console import print_json, say
         from service.jobs.resources import key_resource
 
@@ -40,7 +40,7 @@ def create(principal: Annotated[str, typer.Option(help="Name of the owner; jobs 
 @app.command("list")
 def list_keys(data: Data = None, as_json: AsJson = False) -> None:
     """Print every key without its secret."""
-    with reported(as_json):
+    with error_reporting(as_json):
         from service.console import print_json
         from service.jobs.resources import key_resource
 
@@ -51,7 +51,7 @@ def list_keys(data: Data = None, as_json: AsJson = False) -> None:
 def revoke(key_id: Annotated[str, typer.Argument(metavar="ID", help="Id from zonemill keys list.")],
            data: Data = None, as_json: AsJson = False) -> None:
     """End a key now; open event streams of its holder end within seconds."""
-    with reported(as_json):
+    with error_reporting(as_json):
         _store(data).revoke(key_id)
 
 
@@ -65,7 +65,7 @@ def webhook_secret(principal: Annotated[str, typer.Option(help="Owner of the web
     SetupError
         no_webhook_secret: ZONEMILL_WEBHOOK_SECRET is not set.
     """
-    with reported(as_json):
+    with error_reporting(as_json):
         from geometry.errors import SetupError
         from service.api.server import settings_with
         from service.jobs.webhooks import secret_of

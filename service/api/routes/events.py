@@ -23,7 +23,7 @@ from sqlalchemy.engine import RowMapping
 from starlette.concurrency import run_in_threadpool
 
 from schemas.jobs import FINAL_STATES
-from service.api.principals import Principal, Who
+from service.api.principals import Caller, Principal
 from service.api.problems import responses
 from service.errors import NotFoundError, RateError, RequestError, UnauthorizedError
 from service.jobs.database import AWAY
@@ -42,7 +42,7 @@ STREAM: dict[int | str, dict[str, Any]] = {
 
 @router.get("/{job_id}/events", operation_id="followJob", summary="Follow a job", response_class=StreamingResponse,
             responses=STREAM | responses(UnauthorizedError, NotFoundError, RequestError, RateError))
-async def follow(request: Request, principal: Principal, who: Who, job_id: str,
+async def follow(request: Request, principal: Principal, caller: Caller, job_id: str,
                  last: Annotated[str | None, Header(alias="Last-Event-ID", max_length=20)] = None) -> Response:
     """Progress of a job until it ends.
 
@@ -61,7 +61,7 @@ async def follow(request: Request, principal: Principal, who: Who, job_id: str,
     if streams[principal] >= most:
         raise RateError(f"{most} of your event streams are open", code="too_many_streams", limit=most,
                         remedy="close some streams, or poll the job instead", retry_after_s=10)
-    stream = _counted(streams, principal, _stream(request, row, seen, who.key_id))
+    stream = _counted(streams, principal, _stream(request, row, seen, caller.key_id))
     return StreamingResponse(stream, media_type="text/event-stream",
                              headers={"Cache-Control": "no-cache", "X-Accel-Buffering": "no"})
 

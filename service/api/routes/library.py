@@ -15,7 +15,7 @@ from schemas.jobs import MachineEntry, MachineList, MaterialEntry, MaterialList,
 from schemas.machine import Machine
 from schemas.materials import MATERIALS, Material
 from schemas.tools import Tool
-from service.api.principals import Principal, Who, require
+from service.api.principals import Caller, Principal, require
 from service.api.problems import responses
 from service.errors import NotFoundError, RequestError, TooLargeError, UnauthorizedError
 from service.jobs.api_keys import ADMIN, SUBMIT, Identity
@@ -26,7 +26,7 @@ router = APIRouter(prefix="/v1", tags=["libraries"])
 
 Name = Annotated[str, Path(pattern=NAME_PATTERN, description="Name of the entry; a setup refers to it as lib:NAME.")]
 MaterialName = Annotated[str, Path(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,63}$",
-                                   description="Name as in GET /v1/materials; names of built-in materials may have spaces.")]
+                                   description="Name as in GET /v1/materials; built-in names may have spaces.")]
 Version = Annotated[int | None, Query(ge=1, le=10**9, description="Version of the entry; default: the newest.")]
 Shared = Annotated[bool, Query(description="The entry that all principals share, not your own; for admins.")]
 READ = responses(UnauthorizedError)
@@ -44,15 +44,15 @@ def _about(entry: Entry) -> dict[str, Any]:
             "created_at": time_text(entry.created)}
 
 
-def _owner(who: Identity, shared: bool) -> str:
+def _owner(caller: Identity, shared: bool) -> str:
     """Owner of the entries that a request writes; only admins write shared ones."""
-    require(who, ADMIN if shared else SUBMIT)
-    return SHARED if shared else who.principal
+    require(caller, ADMIN if shared else SUBMIT)
+    return SHARED if shared else caller.principal
 
 
-def _put(request: Request, response: Response, who: Identity, shelf: str, name: str, shared: bool,
+def _put(request: Request, response: Response, caller: Identity, shelf: str, name: str, shared: bool,
          value: Tool | Machine | Material) -> dict[str, Any]:
-    entry, new = _library(request).put(_owner(who, shared), shelf, name, value.model_dump(mode="json"))
+    entry, new = _library(request).put(_owner(caller, shared), shelf, name, value.model_dump(mode="json"))
     response.status_code = status.HTTP_201_CREATED if new else status.HTTP_200_OK
     return _about(entry)
 
@@ -82,16 +82,16 @@ def get_tool(request: Request, principal: Principal, name: Name, version: Versio
 
 
 @router.put("/tools/{name}", operation_id="putTool", responses=WRITE)
-def put_tool(request: Request, response: Response, who: Who, name: Name, tool: Tool,
+def put_tool(request: Request, response: Response, caller: Caller, name: Name, tool: Tool,
              shared: Shared = False) -> ToolEntry:
     """Write a tool. A change creates the next version."""
-    return ToolEntry(**_put(request, response, who, "tools", name, shared, tool), entry=tool)
+    return ToolEntry(**_put(request, response, caller, "tools", name, shared, tool), entry=tool)
 
 
 @router.delete("/tools/{name}", operation_id="deleteTool", status_code=204, responses=ONE)
-def delete_tool(request: Request, who: Who, name: Name, shared: Shared = False) -> None:
+def delete_tool(request: Request, caller: Caller, name: Name, shared: Shared = False) -> None:
     """Delete a tool with all its versions. Jobs keep the versions that they used."""
-    _library(request).delete(_owner(who, shared), "tools", name)
+    _library(request).delete(_owner(caller, shared), "tools", name)
 
 
 @router.get("/machines", operation_id="listMachines", responses=READ)
@@ -107,16 +107,16 @@ def get_machine(request: Request, principal: Principal, name: Name, version: Ver
 
 
 @router.put("/machines/{name}", operation_id="putMachine", responses=WRITE)
-def put_machine(request: Request, response: Response, who: Who, name: Name, machine: Machine,
+def put_machine(request: Request, response: Response, caller: Caller, name: Name, machine: Machine,
                 shared: Shared = False) -> MachineEntry:
     """Write a machine. A change creates the next version."""
-    return MachineEntry(**_put(request, response, who, "machines", name, shared, machine), entry=machine)
+    return MachineEntry(**_put(request, response, caller, "machines", name, shared, machine), entry=machine)
 
 
 @router.delete("/machines/{name}", operation_id="deleteMachine", status_code=204, responses=ONE)
-def delete_machine(request: Request, who: Who, name: Name, shared: Shared = False) -> None:
+def delete_machine(request: Request, caller: Caller, name: Name, shared: Shared = False) -> None:
     """Delete a machine with all its versions. Jobs keep the versions that they used."""
-    _library(request).delete(_owner(who, shared), "machines", name)
+    _library(request).delete(_owner(caller, shared), "machines", name)
 
 
 @router.get("/materials", operation_id="listMaterials", responses=READ)
@@ -138,13 +138,13 @@ def get_material(request: Request, principal: Principal, name: MaterialName, ver
 
 
 @router.put("/materials/{name}", operation_id="putMaterial", responses=WRITE)
-def put_material(request: Request, response: Response, who: Who, name: Name, material: Material,
+def put_material(request: Request, response: Response, caller: Caller, name: Name, material: Material,
                  shared: Shared = False) -> MaterialEntry:
     """Write a material. A change creates the next version."""
-    return MaterialEntry(**_put(request, response, who, "materials", name, shared, material), entry=material)
+    return MaterialEntry(**_put(request, response, caller, "materials", name, shared, material), entry=material)
 
 
 @router.delete("/materials/{name}", operation_id="deleteMaterial", status_code=204, responses=ONE)
-def delete_material(request: Request, who: Who, name: Name, shared: Shared = False) -> None:
+def delete_material(request: Request, caller: Caller, name: Name, shared: Shared = False) -> None:
     """Delete a material with all its versions. Jobs keep the versions that they used."""
-    _library(request).delete(_owner(who, shared), "materials", name)
+    _library(request).delete(_owner(caller, shared), "materials", name)

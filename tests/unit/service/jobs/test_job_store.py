@@ -194,9 +194,9 @@ def test_a_claim_that_no_worker_takes_up_costs_no_attempt(store):
 def test_a_lease_that_ran_out_while_nobody_could_renew_it_counts_for_longer(store):
     job = store.create(new())[0]["id"]
     store.claim("first", -1.0, 3)
-    assert store.claim("second", 30, 3, mercy_s=60) is None and store.give_up(1, 30, mercy_s=60) == 0
+    assert store.claim("second", 30, 3, lease_grace_s=60) is None and store.give_up(1, 30, lease_grace_s=60) == 0
     assert store.renew(job, "first", 30) and store.claim("second", 30, 3) is None
-    assert store.renew(job, "first", -61) and store.claim("second", 30, 3, mercy_s=60)["claims"] == 2
+    assert store.renew(job, "first", -61) and store.claim("second", 30, 3, lease_grace_s=60)["claims"] == 2
 
 
 def test_a_lease_that_ends_far_ahead_was_given_before_the_clock_was_set_back(store, monkeypatch):
@@ -205,7 +205,7 @@ def test_a_lease_that_ends_far_ahead_was_given_before_the_clock_was_set_back(sto
     monkeypatch.setattr(time, "time", lambda: true() + 3600)
     assert store.claim("dead", 30, 3)["id"] == job
     monkeypatch.setattr(time, "time", true)
-    assert store.claim("other", 30, 3, mercy_s=1e9) is None  # who lives can renew meanwhile
+    assert store.claim("other", 30, 3, lease_grace_s=1e9) is None  # who lives can renew meanwhile
     assert store.running(30) == 0 and store.running(30, 1e9) == 1
     assert store.claim("other", 30, 3)["claims"] == 2
 
