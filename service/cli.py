@@ -230,7 +230,7 @@ def write_family_part(recipe: str, seed: int, out: Path, wanted: dict[str, int],
     ------
     InputError
         unknown_recipe: there is no such recipe; not_of_this_recipe: it has fixed numbers; impossible_layout: no random
-        part satisfied the rules of the family.
+        part satisfied the rules of the family; generator_not_installed: cadquery is not installed.
     """
     import inspect
 

@@ -22,7 +22,7 @@ def say(text: str) -> None:
 
 
 class Progress:
-    """Progress lines on stderr: each new stage with its time, on a terminal also the percentage."""
+    """Progress lines on stderr: every new stage with its time and percentage, and again while the stage lasts.
 
     every_s : s between two lines of one stage; by default 1 on a terminal, where the line is rewritten, and 5 elsewhere
     """
