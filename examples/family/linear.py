@@ -77,7 +77,7 @@ def narrow(rng: Generator) -> Layout:
 
 
 def leaning_pair(rng: Generator) -> Layout:
-    """Two walls that lean the same way, so that one side of each is undercut from above."""
+    """Two walls that lean the same way, so that one side of each is an undercut from above."""
     x = np.linspace(-22.0, 22.0, 8)
     wave = _smooth(rng, x, 1.5)
     lean = float(np.tan(np.radians(rng.uniform(8, 11))))
@@ -109,7 +109,7 @@ def three_walls(rng: Generator) -> Layout:
 
 
 def wavy(rng: Generator) -> Layout:
-    """Two long wavy walls with connections at several heights; takes fillets well."""
+    """Two long wavy walls with connections at several heights, suitable for fillets."""
     x = np.linspace(-30.0, 30.0, 11)
     wave = 2.2 * np.sin(2 * np.pi * x / float(rng.uniform(32, 40)))
     z = 5.0

@@ -1,4 +1,5 @@
-"""The scored recipe: 2 to 12 free walls of all profile types, side by side or round a hub, 0 to 16 connections."""
+"""The scored recipe: 2 to 12 free walls of all profile types, side by side or around a hub, with 0 to 16 connections.
+"""
 
 from __future__ import annotations
 
@@ -21,15 +22,15 @@ CHORD: dict[str | None, tuple[float, float]] = {
     None: (24, 50), "C1": (24, 50), "C4": (24, 50), "C2": (32, 55), "C3": (45, 65), "C9": (44, 62), "C7": (50, 68),
     "C8": (50, 68), "C10": (60, 78),
 }
-"""Length, mm, that a profile is drawn at, so that its bends stay well wider than the wall is thick."""
+"""Length of a profile, mm, so that its bends are much wider than the thickness of the wall."""
 
 
 @dataclass(frozen=True, eq=False)
 class Unit:
-    """Walls that take one lane of a plate, or one lane's share of it.
+    """Walls that take one lane of a plate, or the share of one lane.
 
-    walls : FreeWall, in plan round the origin
-    meets : pairs of places in ``walls`` that are meant to meet
+    walls : FreeWall, in plan around the origin
+    meets : pairs of places in ``walls`` that meet on purpose
     """
 
     walls: tuple[FreeWall, ...]
@@ -39,7 +40,7 @@ class Unit:
 
 @dataclass(frozen=True)
 class Style:
-    """What all walls of a part share: floor height and wall height, mm."""
+    """Properties that all walls of a part share: floor height and wall height, mm."""
 
     z: float
     height: float
@@ -49,13 +50,17 @@ def mixed(
     rng: Generator, walls: int | None = None, connections: int | None = None, gap: tuple[float, float] = (0.3, 12.0),
     arrangement: str | None = None,
 ) -> Layout:
-    """A random part with everything the family has.
+    """A random part with all features of the family.
 
     walls       : 2 to 12; drawn when None
-    connections : 0 to 16; drawn when None (fewer where no room is left)
+    connections : 0 to 16; drawn when None (fewer where there is no room)
     gap         : mm, range of the least distance between lanes
     arrangement : 'linear' or 'radial'; drawn when None
-    Raises LayoutError where the draw breaks a rule of the family.
+
+    Raises
+    ------
+    LayoutError
+        The draw breaks a rule of the family.
     """
     count = walls if walls is not None else int(rng.integers(2, 13))
     wanted = connections if connections is not None else int(rng.integers(0, 17))
@@ -90,7 +95,7 @@ def mixed_radial(rng: Generator, walls: int | None = None, connections: int | No
 
 
 def _shows(hub: HubDisc | None, wall: FreeWall) -> bool:
-    """Whether both sides show their type where sections are taken, outside a hub."""
+    """Whether both sides show their type at the heights of the sections, outside a hub."""
     for side, label in zip((LEFT, RIGHT), wall.profile.labels, strict=True):
         for v in (0.35, 0.5, 0.65):
             curve = wall.side_curve(side, v)

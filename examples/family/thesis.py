@@ -1,9 +1,8 @@
-"""The three test surfaces of Jain (2016), tables 4.2 to 4.4: 5 by 5 control points over 50 mm by 50 mm, order 4.
+"""The three test surfaces of [Jain2016], tables 4.2 to 4.4: 5 by 5 control points over 50 mm by 50 mm, order 4.
 
-Row 0 of the tables for the concave and the convex surface is printed with slips (x = 37 for 37.5, and points that
-belong elsewhere). The surfaces are symmetric, which says what was meant; mended, their facets have the areas the thesis
-prints. The freeform table has two rows that look misprinted as well, 0 and 3, but nothing says what they should be: it
-is used as printed.
+Row 0 of the tables for the concave and the convex surface has misprints (x = 37 for 37.5, and misplaced points). The
+surfaces are symmetric, which shows the right values; corrected, their facets have the areas in the thesis. The table of
+the freeform surface has two rows that look misprinted, 0 and 3. The right values are unknown, so it is used as printed.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ STEP = 12.5
 
 
 class Kind(StrEnum):
-    """Which of the surfaces."""
+    """The surfaces."""
 
     CONCAVE = "concave"
     CONVEX = "convex"
@@ -38,16 +37,20 @@ _PRINTED = {(0, 2): (37.5, 0.0, 17.5), (0, 3): (37.0, 0.0, 25.0), (3, 0): (0.0, 
 
 
 def surface(kind: Kind | str) -> NurbsSurface:
-    """One of the surfaces, its material below it.
+    """One of the surfaces of [Jain2016], with its material below it.
 
     kind : Kind or its value
+
     Returns NurbsSurface, mm; u runs along y and v along x, both from 0 to 2.
     """
     return NurbsSurface.from_control_points(control_points(Kind(kind)), 4, side=-1)
 
 
 def control_points(kind: Kind) -> F64:
-    """The control points P_ij, (5, 5, 3) float64, mm, as the module says."""
+    """The control points P_ij of [Jain2016], corrected as the module docstring says.
+
+    Returns (5, 5, 3) float64, mm, part frame.
+    """
     y, x = np.meshgrid(STEP * np.arange(5), STEP * np.arange(5), indexing="ij")
     points = np.stack([x, y, _HEIGHTS[kind]], axis=-1)
     if kind is Kind.FREEFORM:

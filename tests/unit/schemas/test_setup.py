@@ -109,7 +109,7 @@ def test_a_tool_that_leaves_lengths_out_is_straight():
     (setup(placement={"z_axis": [0, 0, 0]}), "zero length"), (setup(placement={"x_axis": [0, 1, 1]}), "right angles"),
     (setup(operations={"roughing": False, "finishing": False}), "nothing to do"),
     (setup(operations={"roughing": False, "semi_finishing": True}), "needs operations.roughing"),
-    (setup(operations={"lean": {"tilt_deg": 15}}), "give machine.kind '5-axis'"),
+    (setup(operations={"lean": {"tilt_deg": 15}}), "set machine.kind '5-axis'"),
     (setup(operations={"lean": {"tilt_deg": 15}}, machine={**FIVE, "simultaneous": False}), "5-axis"),
     (setup(operations={"lean": {"tilt_deg": 61}}, machine=FIVE), "60"),
     (setup(operations={"faces": ["F1"], "exclude_faces": ["F1"]}), "F1"),
