@@ -316,9 +316,9 @@ def _bisector(p: F64, moves: I64, which: I64, begins: I64, middle: F64, unit: F6
         return y, (v * v).sum(axis=1) - half2[of]
 
     def between(y: F64, q: F64, of: I64, begin: I64) -> tuple[F64, F64]:
-        told = np.abs(y) > 1e-12
-        twice = np.where(told, 2.0 * y, 1.0)
-        a, b = (np.where(told, (q + sign * slack[of]) / twice, sign * np.inf) for sign in (-1.0, 1.0))
+        steep = np.abs(y) > 1e-12
+        twice = np.where(steep, 2.0 * y, 1.0)
+        a, b = (np.where(steep, (q + sign * slack[of]) / twice, sign * np.inf) for sign in (-1.0, 1.0))
         return np.maximum.reduceat(np.minimum(a, b), begin), np.minimum.reduceat(np.maximum(a, b), begin)
 
     y, q = coordinates(p, which)

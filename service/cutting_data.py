@@ -115,11 +115,11 @@ def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float 
     wide = effective_diameter(tool.diameter_mm, tool.corner_radius_mm, deep)
     cut_back: list[tuple[str, float, float]] = []
 
-    def given(field: str, asked: float, *limits: float | None) -> float:
+    def given(field: str, value: float, *limits: float | None) -> float:
         limit = min([x for x in limits if x is not None], default=math.inf)
-        if asked > limit:
-            cut_back.append((field, asked, limit))
-        return min(asked, limit)
+        if value > limit:
+            cut_back.append((field, value, limit))
+        return min(value, limit)
 
     if tool.spindle_rpm is not None:
         limited_by, rpm = "setup", given("spindle_rpm", tool.spindle_rpm, tool.max_rpm, machine.max_rpm)

@@ -32,8 +32,8 @@ class ServiceError(CamError):
 
     default_code = "bad_request"
 
-    def __init__(self, message: str, *, retry_after_s: int | None = None, **told: Any) -> None:
-        super().__init__(message, **told)
+    def __init__(self, message: str, *, retry_after_s: int | None = None, **details: Any) -> None:
+        super().__init__(message, **details)
         self.retry_after_s = retry_after_s
 
 

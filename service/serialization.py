@@ -112,27 +112,27 @@ def _value(tree: Any, known: Known, room: np.ndarray) -> Any:
         return tuple(_value(t, known, room) for t in tree)
     if not isinstance(tree, dict):
         return tree
-    ((mark, said),) = tree.items()
+    ((mark, packed),) = tree.items()
     if mark == "a":
-        kind, shape, place, turned = said
+        kind, shape, place, turned = packed
         dtype = np.dtype(kind)
         size = dtype.itemsize * int(np.prod(shape, dtype=np.int64))
         if place + size > len(room):
             raise ValueError("an array extends beyond the end")
         return room[place:place + size].view(dtype).reshape(shape, order="F" if turned else "C")
     if mark == "k":
-        return known.objects[said[0]][said[1]]
+        return known.objects[packed[0]][packed[1]]
     if mark == "n":
-        return np.dtype(said[0]).type(said[1])
+        return np.dtype(packed[0]).type(packed[1])
     if mark == "e":
-        return ENUMS[said[0]](said[1])
+        return ENUMS[packed[0]](packed[1])
     if mark == "c":
-        made = CLASSES[said[0]]
-        return made(*(_value(t, known, room) for t in said[1:]))
+        made = CLASSES[packed[0]]
+        return made(*(_value(t, known, room) for t in packed[1:]))
     if mark == "l":
-        return [_value(t, known, room) for t in said]
+        return [_value(t, known, room) for t in packed]
     if mark == "m":
-        return {_value(k, known, room): _value(v, known, room) for k, v in said}
+        return {_value(k, known, room): _value(v, known, room) for k, v in packed}
     raise ValueError(f"a mark {mark!r} is unknown")
 
 

@@ -51,8 +51,8 @@ def _plain(node: Any) -> None:
         if "number" in (node.get("type"), *_listed(node.get("type"))):
             node.setdefault("format", "double")
         if node.get("default") and ("$ref" in node.get("items", ()) or any("$ref" in k for k in node.get("anyOf", ()))):
-            told = json.dumps(node.pop("default"))
-            node["description"] = f"{node.get('description', '').rstrip('. ')}. Default: {told}".removeprefix(". ")
+            default = json.dumps(node.pop("default"))
+            node["description"] = f"{node.get('description', '').rstrip('. ')}. Default: {default}".removeprefix(". ")
         for value in list(node.values()):
             _plain(value)
     elif isinstance(node, list):

@@ -138,10 +138,10 @@ class KeyStore:
         now = time.time()
         if row["revoked"] is not None:
             raise UnauthorizedError(f"the key {key_id} was revoked", code="key_revoked", subjects=(key_id,),
-                                    remedy="ask whoever runs the service for a new key")
+                                    remedy="ask the operator of the service for a new key")
         if row["expires"] is not None and row["expires"] <= now:
             raise UnauthorizedError(f"the key {key_id} has expired", code="key_expired", subjects=(key_id,),
-                                    remedy="ask whoever runs the service for a new key")
+                                    remedy="ask the operator of the service for a new key")
         self._seen(row, now)
         return Identity(row["principal"], frozenset(row["scopes"].split(",")), key_id)
 

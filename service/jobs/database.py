@@ -118,9 +118,9 @@ def connect(url: str) -> Engine:
 @lru_cache(maxsize=16)
 def _connect(url: str) -> Engine:
     if not url.startswith("sqlite"):
-        asked = sa.make_url(url)
-        given = POSTGRES if asked.drivername == "postgresql+psycopg" else {}
-        options = {k: v for k, v in given.items() if k not in asked.query}
+        target = sa.make_url(url)
+        given = POSTGRES if target.drivername == "postgresql+psycopg" else {}
+        options = {k: v for k, v in given.items() if k not in target.query}
         return sa.create_engine(url, pool_pre_ping=True, pool_size=10, max_overflow=20, hide_parameters=True,
                                 connect_args=options)
     engine = sa.create_engine(url, hide_parameters=True, connect_args={"timeout": 30, "check_same_thread": False})

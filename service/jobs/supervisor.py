@@ -213,9 +213,9 @@ def _outcome(code: int, final: dict[str, Any], log: Path) -> str:
         return str(final["state"])
     if "error" in final:
         raise error_from_dict(final["error"])
-    with log.open("rb") as said:  # the log may have gigabytes
-        said.seek(max(0, log.stat().st_size - 2000))
-        tail = said.read().decode("utf-8", "replace").strip()
+    with log.open("rb") as output:  # the log may have gigabytes
+        output.seek(max(0, log.stat().st_size - 2000))
+        tail = output.read().decode("utf-8", "replace").strip()
     if "MemoryError" in tail or "bad_alloc" in tail:
         raise ResourceError("the job ran out of memory", code="job_memory",
                             remedy="simplify the part, or use more memory and raise ZONEMILL_JOB_MEMORY_LIMIT_MB")
