@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from examples.family.layout import Layout
+from examples.family.layout import PartLayout
 
 HOLDER = [
     {"diameter_mm": 14.0, "diameter_top_mm": 20.0, "length_mm": 12.0},
@@ -30,7 +30,7 @@ def tool(
     }
 
 
-def suggest_setup(layout: Layout, truth: dict[str, Any]) -> dict[str, Any]:
+def suggest_setup(layout: PartLayout, truth: dict[str, Any]) -> dict[str, Any]:
     """A setup for a part: a flat end mill and a ball for the open areas, then two smaller balls chosen by the gaps.
 
     layout, truth : of the part; the smallest tool fits the second narrowest channel, not always the narrowest

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 from shapely.geometry import Polygon
 
-from examples.family.profiles import Profile
+from examples.family.profiles import DrawnProfile
 from examples.family.splines import F64, interpolate, interpolate_closed, to_edge
 from examples.family.walls import BURIED, LEFT, RIGHT, WallSpec
 
@@ -25,14 +25,14 @@ NODES = {None: 5, "C1": 17, "C4": 17, "C2": 25, "C3": 33, "C7": 41, "C8": 41, "C
 class FreeWall(WallSpec):
     """A wall whose centre line is a drawn profile.
 
-    profile : Profile in plan, mm; its curve is the middle of an open wall and the inner side of a closed one
+    profile : DrawnProfile in plan, mm; its curve is the middle of an open wall and the inner side of a closed one
     strips  : number of faces of each side along the wall; a closed side of one face has a seam
     merged  : whether both sides and both ends are one face (ends rounded)
 
     Thickness, lean and height are those of WallSpec; lean differs between start and end where the wall is twisted.
     """
 
-    profile: Profile = None  # type: ignore[assignment]
+    profile: DrawnProfile = None  # type: ignore[assignment]
     strips: int = 1
     merged: bool = False
 

@@ -133,7 +133,7 @@ class WindowSpec:
         corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
         return Polygon([middle + 0.5 * self.width * a * t + reach * b * n for a, b in corners])
 
-    def fits(self, layout: Layout, gaps: list[Gap]) -> bool:
+    def fits(self, layout: PartLayout, gaps: list[Gap]) -> bool:
         """Whether the opening passes the wall cleanly, without touching other material or the narrowest place of a gap.
         """
         outline = self.footprint()
@@ -166,7 +166,7 @@ class WindowSpec:
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
+class PartLayout:
     """All decisions of a recipe.
 
     name        : of the recipe
@@ -285,7 +285,7 @@ def clear_of(spec: ConnectionSpec, others: list[ConnectionSpec], plan: float = 1
     return True
 
 
-def check(layout: Layout) -> None:
+def check(layout: PartLayout) -> None:
     """Check a layout against the rules of the family.
 
     Raises
@@ -309,7 +309,7 @@ def check(layout: Layout) -> None:
 
 
 def try_connections(
-    rng: Generator, layout: Layout, pairs: list[tuple[int, int]], count: int, kinds: tuple[str, ...]
+    rng: Generator, layout: PartLayout, pairs: list[tuple[int, int]], count: int, kinds: tuple[str, ...]
 ) -> list[ConnectionSpec]:
     """Draw up to ``count`` connections between given pairs of walls.
 
@@ -326,7 +326,7 @@ def try_connections(
     return out
 
 
-def _draw(rng: Generator, layout: Layout, pair: tuple[int, int], kind: str) -> ConnectionSpec | None:
+def _draw(rng: Generator, layout: PartLayout, pair: tuple[int, int], kind: str) -> ConnectionSpec | None:
     first, second = (layout.walls[k] for k in pair)
     floor, top = first.z_floor, min(first.z_top, second.z_top)
     depth = float({"web": rng.uniform(0.8, 1.5)}.get(kind, rng.uniform(1.2, 2.2)))

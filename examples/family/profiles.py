@@ -54,7 +54,7 @@ CLOSED_TYPES = ("C5", "C6", "oval")
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class DrawnProfile:
     """A drawn plan curve of one of the types of [Arivazhagan2020].
 
     type    : 'C1' to 'C10', 'oval' (closed and convex: C1 from outside, C4 from inside), None for straight
@@ -78,10 +78,10 @@ class Profile:
         """The curve, parameter 0 to 1."""
         return spline(self.control, self.closed)
 
-    def at(self, centre: tuple[float, float], turn: float = 0.0) -> Profile:
+    def at(self, centre: tuple[float, float], turn: float = 0.0) -> DrawnProfile:
         """The profile turned by ``turn`` rad about the origin, which then moves to ``centre`` (mm)."""
         c, s = np.cos(turn), np.sin(turn)
-        return Profile(self.type, self.control @ np.array([[c, s], [-s, c]]) + centre, self.closed)
+        return DrawnProfile(self.type, self.control @ np.array([[c, s], [-s, c]]) + centre, self.closed)
 
 
 def spline(control: F64, closed: bool = False) -> BSpline:
@@ -98,7 +98,7 @@ def spline(control: F64, closed: bool = False) -> BSpline:
     return BSpline(np.concatenate([np.zeros(ORDER), inner, np.ones(ORDER)]), control, degree)
 
 
-def draw_open(rng: Generator, kind: str | None, chord: float) -> Profile:
+def draw_open(rng: Generator, kind: str | None, chord: float) -> DrawnProfile:
     """An open profile of a type of [Arivazhagan2020], its chord centred on the origin along x.
 
     kind  : 'C1', 'C2', 'C3', 'C4', 'C7', 'C8', 'C9', 'C10' or None for straight (a bow of 6 degrees at most)
@@ -123,17 +123,17 @@ def draw_open(rng: Generator, kind: str | None, chord: float) -> Profile:
     control = (control + noise) * (1.0, rise)
     if kind == "C8":
         control = control[::-1] * (-1.0, 1.0) + (1.0, 0.0)
-    return Profile(kind, (control - (0.5, 0.0)) * chord)
+    return DrawnProfile(kind, (control - (0.5, 0.0)) * chord)
 
 
-def draw_hairpin(rng: Generator, chord: float) -> Profile:
+def draw_hairpin(rng: Generator, chord: float) -> DrawnProfile:
     """A single up bend of 150 to 175 degrees, legs down, its chord (mm) centred on the origin."""
     half = [(0, 0), (0.0, 0.25), (-0.01, 0.6), (0.06, 1.0), (0.3, 1.28)]
     control = np.array(_mirrored(half)) * (1.0, float(rng.uniform(0.85, 1.2)))
-    return Profile("C1", (control - (0.5, 0.0)) * chord)
+    return DrawnProfile("C1", (control - (0.5, 0.0)) * chord)
 
 
-def draw_closed(rng: Generator, kind: str, radius: float) -> Profile:
+def draw_closed(rng: Generator, kind: str, radius: float) -> DrawnProfile:
     """A closed profile of a type of [Arivazhagan2020] around the origin, counter-clockwise.
 
     kind   : 'C5' five lobes, 'C6' two lobes of different size, 'oval' convex
@@ -148,7 +148,7 @@ def draw_closed(rng: Generator, kind: str, radius: float) -> Profile:
         control = control * (1.0 + 0.008 * rng.uniform(-1, 1, (POINTS, 2)))
     else:
         control = np.column_stack([np.cos(turn), np.sin(turn)]) * (1.0, float(rng.uniform(0.72, 1.0))) * 1.06
-    return Profile(kind, control * radius, closed=True).at((0.0, 0.0), float(rng.uniform(0, 2 * np.pi)))
+    return DrawnProfile(kind, control * radius, closed=True).at((0.0, 0.0), float(rng.uniform(0, 2 * np.pi)))
 
 
 def _mirrored(half: list[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -26,12 +26,12 @@ from examples.family.freewall import FreeWall
 from examples.family.gaps import Gap
 from examples.family.impeller import impeller
 from examples.family.joins import ForkSpec, takes_fillets
-from examples.family.layout import Layout, LayoutError, WindowSpec, check
+from examples.family.layout import LayoutError, PartLayout, WindowSpec, check
 from examples.family.mixed import mixed, mixed_linear, mixed_radial
 from examples.family.walls import WallSpec
 from examples.setups import suggest_setup
 
-RECIPES: dict[str, Callable[..., Layout]] = {
+RECIPES: dict[str, Callable[..., PartLayout]] = {
     "random": linear.random,
     "demo": linear.demo,
     "narrow": linear.narrow,
@@ -70,7 +70,7 @@ class FamilyPart:
     shape: Any
     truth: dict[str, Any]
     setup: dict[str, Any]
-    layout: Layout
+    layout: PartLayout
 
     def write(self, directory: str | Path, *, reach: bool = False) -> tuple[Path, Path, Path]:
         """Write NAME.step, NAME.truth.json and NAME.setup.json; the same part gives the same bytes.
@@ -119,7 +119,7 @@ def make_part(seed: int = 0, recipe: str = "random", *, fillet: float = 0.0, **o
     return FamilyPart(name, shape, truth, suggest_setup(layout, truth), layout)
 
 
-def _built(layout: Layout) -> tuple[Layout, Any]:
+def _built(layout: PartLayout) -> tuple[PartLayout, Any]:
     """The layout and its solid; without fillets at the connections where the kernel cannot make them."""
     if layout.rounded > 0:
         try:
@@ -129,7 +129,7 @@ def _built(layout: Layout) -> tuple[Layout, Any]:
     return layout, build_solid(layout)
 
 
-def draw_layout(seed: int, recipe: str = "random", **overrides: Any) -> Layout:
+def draw_layout(seed: int, recipe: str = "random", **overrides: Any) -> PartLayout:
     """The layout of a part without building it; draws again, up to 60 times, until the rules hold."""
     return _draw(_generator(seed, recipe), seed, recipe, overrides)
 
@@ -140,7 +140,7 @@ def _generator(seed: int, recipe: str) -> np.random.Generator:
     return np.random.default_rng([seed, NUMBERS[recipe]])
 
 
-def _draw(rng: np.random.Generator, seed: int, recipe: str, overrides: dict[str, Any]) -> Layout:
+def _draw(rng: np.random.Generator, seed: int, recipe: str, overrides: dict[str, Any]) -> PartLayout:
     reason: Exception | None = None
     for _ in range(DRAWS):
         try:
@@ -153,7 +153,7 @@ def _draw(rng: np.random.Generator, seed: int, recipe: str, overrides: dict[str,
     raise LayoutError(f"no {recipe} layout for seed {seed}: {reason}")
 
 
-def build_solid(layout: Layout) -> Any:
+def build_solid(layout: PartLayout) -> Any:
     """Unite base, walls and connections into one cadquery Solid.
 
     Raises
@@ -179,7 +179,7 @@ def build_solid(layout: Layout) -> Any:
     return _filleted(solid, layout) if layout.fillet > 0 else solid
 
 
-def _seams(solid: Any, layout: Layout) -> list[int]:
+def _seams(solid: Any, layout: PartLayout) -> list[int]:
     """Indices of the edges of a solid where its first connection with fillets meets its walls."""
     outlines = [(c.footprint().buffer(SEAM), c) for c in layout.connections if takes_fillets(c)][:1]
     out = []
@@ -215,7 +215,7 @@ def _volume(solid: Any) -> float:
     return float(props.Mass())
 
 
-def _filleted(solid: Any, layout: Layout) -> Any:
+def _filleted(solid: Any, layout: PartLayout) -> Any:
     """Fillet every edge where a wall meets the floor."""
     z = layout.walls[0].z_floor
     feet = [e for e in solid.Edges() if all(abs(c - z) < 1e-6 for c in (e.BoundingBox().zmin, e.BoundingBox().zmax))]
@@ -229,7 +229,7 @@ def _on_rim(edge: Any, base: Any) -> bool:
     return min(p.x - box.xmin, box.xmax - p.x, p.y - box.ymin, box.ymax - p.y) < 1e-6
 
 
-def truth_of(layout: Layout, name: str = "") -> dict[str, Any]:
+def truth_of(layout: PartLayout, name: str = "") -> dict[str, Any]:
     """The known features of a layout, as plain data; all lengths mm.
 
     It has walls (index, kind, height, thickness, z range, a point on each side), connections (wall indices, kind, z
@@ -259,7 +259,7 @@ def truth_of(layout: Layout, name: str = "") -> dict[str, Any]:
     }
 
 
-def features_of(layout: Layout, gaps: list[Gap]) -> list[str]:
+def features_of(layout: PartLayout, gaps: list[Gap]) -> list[str]:
     """Features of a part, as sorted words, so that a failure can be attributed to a cause.
 
     layout : with FreeWall walls
@@ -284,12 +284,12 @@ def features_of(layout: Layout, gaps: list[Gap]) -> list[str]:
     return sorted(words)
 
 
-def _primary(layout: Layout, gap: Gap) -> bool:
+def _primary(layout: PartLayout, gap: Gap) -> bool:
     smaller = min(layout.walls[k].length * layout.walls[k].height for k in gap.walls)
     return bool(gap.area >= 2 * 0.25 * smaller)
 
 
-def _side_point(layout: Layout, wall: WallSpec, side: int) -> Any:
+def _side_point(layout: PartLayout, wall: WallSpec, side: int) -> Any:
     """A point of a side, (3,) float64, mm: in the middle, on a free wall where the solid has the side there."""
     tries = [(u, v) for v in (0.5, 0.65, 0.35, 0.8) for u in (0.5, 0.42, 0.58, 0.66, 0.34, 0.74, 0.26, 0.82, 0.18)]
     others = [w for w in layout.walls if w is not wall]
@@ -306,7 +306,7 @@ def _side_point(layout: Layout, wall: WallSpec, side: int) -> Any:
     return wall.side_point(side, np.array([0.5]), np.array([0.5]))[0]
 
 
-def _wall_truth(layout: Layout, index: int, wall: WallSpec) -> dict[str, Any]:
+def _wall_truth(layout: PartLayout, index: int, wall: WallSpec) -> dict[str, Any]:
     shape: dict[str, Any] = {}
     if isinstance(wall, FreeWall):
         p = wall.profile

@@ -40,7 +40,7 @@ from output.stepnc.common import (
     written_feed,
     written_speed,
 )
-from output.stepnc.part21 import Part21, Write, quoted, real, reals, refs
+from output.stepnc.part21 import Part21Writer, Write, quoted, real, reals, refs
 from output.workplan import Ap238, Workplan
 from toolpath.workingsteps import Motion, Trajectory, Workingstep
 
@@ -91,7 +91,7 @@ class _Ap238Writer:
         self.shapes = plan.ap238 is Ap238.CC2
         self.schema = _SCHEMA[plan.ap238]
         words = f"AP238 freeform milling, conformance class {2 if self.shapes else 1}, cutter location paths"
-        self.file = Part21(write, description=header_words(plan, words), name=f"{plan.name}.stpnc",
+        self.file = Part21Writer(write, description=header_words(plan, words), name=f"{plan.name}.stpnc",
                            schema=(self.schema.upper(),), system=f"zonemill {plan.version}")
         self.symbols: dict[str, int] = {}
         self.technologies: dict[tuple[float, float], int] = {}

@@ -15,7 +15,7 @@ from output.clamping_sequence import Leg, each_clamped_step
 from output.header_text import face_words
 from output.inverse_kinematics import RotaryMachine
 from output.program_grid import GRID, I64, GridArc, grid_path, link, pieces, to_grid, without_repeats
-from output.stepnc.part21 import Part21, real
+from output.stepnc.part21 import Part21Writer, real
 from output.workplan import Workplan
 from toolpath.workingsteps import Motion, Trajectory, Workingstep
 
@@ -130,7 +130,7 @@ def path_points(path: Sequence[Curve]) -> I64:
     return np.concatenate(rows)
 
 
-def trimmed_circle(file: Part21, arc: GridArc, start: int, up: int, along: int) -> int:
+def trimmed_circle(file: Part21Writer, arc: GridArc, start: int, up: int, along: int) -> int:
     """Number of an arc between two CARTESIAN_POINTs, ``start`` and the one after it [ISO10303-21].
 
     up, along : numbers of DIRECTIONs Z and X

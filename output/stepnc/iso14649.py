@@ -41,7 +41,7 @@ from output.stepnc.common import (
     written_feed,
     written_speed,
 )
-from output.stepnc.part21 import Part21, Write, quoted, real, reals, refs
+from output.stepnc.part21 import Part21Writer, Write, quoted, real, reals, refs
 from output.workplan import Workplan
 from toolpath.workingsteps import Motion, Workingstep
 
@@ -83,7 +83,7 @@ class _Iso14649Writer:
 
     def __init__(self, plan: Workplan, write: Write) -> None:
         self.plan = plan
-        self.file = Part21(write, description=header_words(plan, "ISO 14649-10/-11, freeform milling, cutter location "
+        self.file = Part21Writer(write, description=header_words(plan, "ISO 14649-10/-11, freeform milling, cutter location "
                                                                  "paths"),
                            name=f"{plan.name}.arm.stpnc", schema=("MACHINING_SCHEMA", "MILLING_SCHEMA"),
                            system=f"zonemill {plan.version}")

@@ -22,7 +22,7 @@ _TEXT_LIMIT = 256  # characters of a string in FILE_DESCRIPTION and FILE_NAME, I
 _RUNS = re.compile(r"['\\]|[^ -~\U00010000-\U0010ffff]+|[\U00010000-\U0010ffff]")
 
 
-class Part21:
+class Part21Writer:
     """A file being written, one instance after the other; every ``add`` returns the number of its instance.
 
     write : receives the text in pieces, in order, so that the whole file is never in memory

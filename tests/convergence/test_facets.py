@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from examples.family.thesis import Kind, surface
+from examples.family.thesis import ThesisSurface, surface
 from geometry.surfaces.faceting import facet_deviation
 
 
-@pytest.mark.parametrize("kind", Kind)
+@pytest.mark.parametrize("kind", ThesisSurface)
 def test_the_deviation_falls_with_the_square_of_the_step(kind):
     steps = 2.0 / np.array([40, 56, 80])
     s = surface(kind)
