@@ -257,8 +257,8 @@ def _linear(rng: Generator, count: int, gap: tuple[float, float], style: Style) 
     boxes = np.array([w.bounds for w in walls])
     low, high = boxes[:, :2].min(axis=0) - 3.5, boxes[:, 2:].max(axis=0) + 3.5
     x0, y0, x1, y1 = (float(round(c, 1)) for c in (*low, *high))
-    return PartLayout("mixed", Plate((x0, y0, x1, y1), style.z), walls, least=0.9 * min(gap[0], 0.5), meets=tuple(meets),
-                  features=("linear", *features))
+    return PartLayout("mixed", Plate((x0, y0, x1, y1), style.z), walls, least=0.9 * min(gap[0], 0.5),
+                      meets=tuple(meets), features=("linear", *features))
 
 
 def _draw_units(rng: Generator, style: Style, count: int) -> list[Unit]:

@@ -83,10 +83,10 @@ class _Iso14649Writer:
 
     def __init__(self, plan: Workplan, write: Write) -> None:
         self.plan = plan
-        self.file = Part21Writer(write, description=header_words(plan, "ISO 14649-10/-11, freeform milling, cutter location "
-                                                                 "paths"),
-                           name=f"{plan.name}.arm.stpnc", schema=("MACHINING_SCHEMA", "MILLING_SCHEMA"),
-                           system=f"zonemill {plan.version}")
+        words = "ISO 14649-10/-11, freeform milling, cutter location paths"
+        self.file = Part21Writer(write, description=header_words(plan, words),
+                                 name=f"{plan.name}.arm.stpnc", schema=("MACHINING_SCHEMA", "MILLING_SCHEMA"),
+                                 system=f"zonemill {plan.version}")
         self.tools: dict[int, int] = {}
         self.technologies: dict[tuple[float, float], int] = {}
         self.groups: dict[str, int] = {}

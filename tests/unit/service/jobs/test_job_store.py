@@ -118,7 +118,7 @@ def test_a_repeat_is_answered_when_the_queue_is_full(store):
             store.check_room("p", key, room)
         with pytest.raises(RateError, match="1 of your jobs"):
             store.create(new(key=key), room)
-    with pytest.raises(RateError, match="1 jobs are waiting"):
+    with pytest.raises(RateError, match="1 jobs are already waiting"):
         store.check_room("q", "k", room)
 
 
@@ -269,7 +269,8 @@ def test_a_key_that_becomes_free_in_between_makes_a_new_job(store, monkeypatch):
 
 def test_folders_that_are_made_for_a_file_are_flushed_too(tmp_path, monkeypatch):
     flushed, sync = [], service.files.sync_folder
-    monkeypatch.setattr(service.jobs.artifacts, "sync_folder", lambda f: (flushed.append(f), sync(f)))
+    for module in (service.files, service.jobs.artifacts):
+        monkeypatch.setattr(module, "sync_folder", lambda f: (flushed.append(f), sync(f)))
     files = Artifacts(tmp_path / "data")
     sha, _ = files.put_blob([b"abc"])
     assert flushed == [files.root, files.root / "blobs", files.root / "blobs" / sha[:2]]
