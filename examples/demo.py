@@ -39,7 +39,7 @@ def write_demo(directory: str | Path) -> tuple[Path, Path]:
 
 
 def write_small(directory: str | Path) -> tuple[Path, Path]:
-    """Write small.step and small.setup.json: a wall and a rounded bar on a plate, which every strategy has a part in.
+    """Write small.step and small.setup.json: a wall and a rounded bar on a plate, on which every strategy is used.
 
     Returns the two paths.
     """

@@ -1,10 +1,10 @@
-"""Suggested setups: tools that reach most of a family part, and knowingly not all of it."""
+"""Suggested setups: tools that reach most of a family part, but deliberately not all of it."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from examples.family.layout import Layout
+from examples.family.layout import PartLayout
 
 HOLDER = [
     {"diameter_mm": 14.0, "diameter_top_mm": 20.0, "length_mm": 12.0},
@@ -15,7 +15,7 @@ HOLDER = [
 def tool(
     number: int, kind: str, diameter: float, reach: float, *, shank: float = 6.0, corner_radius: float = 0.0
 ) -> dict[str, Any]:
-    """One tool of a setup: relieved neck from three diameters of flute up to ``reach`` mm, then shank and holder.
+    """One tool of a setup: flutes of three diameters, a relieved neck up to ``reach`` mm, then shank and holder.
 
     Returns the tool in the form of the setup schema, all lengths mm.
     """
@@ -30,10 +30,11 @@ def tool(
     }
 
 
-def suggest_setup(layout: Layout, truth: dict[str, Any]) -> dict[str, Any]:
-    """A setup for a part: a flat and a ball for the open areas, then two smaller balls by the gaps.
+def suggest_setup(layout: PartLayout, truth: dict[str, Any]) -> dict[str, Any]:
+    """A setup for a part: a flat end mill and a ball for the open areas, then two smaller balls chosen by the gaps.
 
     layout, truth : of the part; the smallest tool fits the second narrowest channel, not always the narrowest
+
     Returns plain data in the form of the setup schema.
     """
     deepest = max(w.height for w in layout.walls)

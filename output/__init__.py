@@ -1,4 +1,5 @@
-"""Programs and STEP-NC files, written from one workplan.
+"""Programs and STEP-NC files, written from a workplan.
 
-Nothing is planned here, and nothing that was written is read back.
+Here live the workplan, the arc fitting, the inverse kinematics and the writers. Readers of programs do not live here:
+``verify`` has its own, so that an error of a writer is not read back as correct.
 """

@@ -1,9 +1,9 @@
-"""Arcs, helices and longer lines instead of the many short ones of a planned path, within a tolerance both ways.
+"""Replaces the many short lines of a planned path by arcs, helices and longer lines within a tolerance.
 
-From each point the farthest one is sought up to which one line, or one arc in the XY plane, stands for the path; the
-one that gets farther is taken, and so on from its end. All passes of a plan are gone along at the same time, so that
-numpy has long arrays to work on. What a stretch is held against, and why the bound holds both ways, says
-docs/theory/arcs.md.
+From each point the search takes the farthest point up to which one line, or one arc in the XY plane, stays within the
+tolerance of the path. The longer of the two is kept, and the search goes on from its end. All passes of a plan are
+searched at once, so that numpy works on long arrays. docs/theory/arcs.md states the distances that are checked and
+proves that the bound holds in both directions.
 """
 
 from __future__ import annotations
@@ -23,36 +23,36 @@ from toolpath.workingsteps import ArcSpan, Trajectory, TrajectoryKind, Workingst
 BOOL = NDArray[np.bool_]
 
 SHARE = 0.5
-"""Of the chordal tolerance of a job: what arcs and longer lines may leave the planned path by. Plans get the rest, half
-of it for the points they leave out: so the chords of a planned circle are half as far from it as an arc may be from
-them, and what the plan has of noise does not part an arc."""
+"""Share of the chordal tolerance that arcs and longer lines may deviate from the planned path. The planner gets the
+rest. It spends half of its share on the points it leaves out, so noise of the plan does not split an arc."""
 
-LEAST_MOVES = 3
-"""An arc stands for no fewer moves: there is one through any three points."""
-LEAST_CHORD = 0.02
-"""mm between the ends of an arc: equal ends are a full circle to a control, and 200 steps of the grid are not equal."""
-LEAST_RADIUS, MOST_RADIUS, MOST_HELIX_RADIUS = 0.05, 1000.0, 100.0
-"""mm. A helix of a Heidenhain ends where an angle of four decimals says: within 0.0001 mm of its place up to 100 mm."""
-MOST_SWEEP = math.radians(170.0)
-"""Below a half turn, where a centre off by little is an arc off by much."""
-MOST_STEP = math.radians(60.0)
-"""Of one planned move as seen from the centre."""
-MOST_SLOPE = 0.1
-"""Of a helix: some controls count F in the plane alone, and go 0.5 % faster on it at most."""
+MIN_ARC_MOVES = 3
+"""Fewest moves that an arc replaces. Any three points lie on a circle, so two moves prove nothing."""
+MIN_ARC_CHORD = 0.02
+"""mm, least distance between the ends of an arc. A control takes equal ends for a full circle."""
+MIN_ARC_RADIUS, MAX_ARC_RADIUS, MAX_HELIX_RADIUS = 0.05, 1000.0, 100.0
+"""mm. A Heidenhain ends a helix at an angle of four decimals, which is exact to 0.0001 mm up to a radius of 100 mm."""
+MAX_SWEEP = math.radians(170.0)
+"""rad, largest sweep of an arc. Near half a turn a small error of the centre becomes a large error of the arc."""
+MAX_MOVE_ANGLE = math.radians(60.0)
+"""rad, largest angle of one planned move, seen from the centre."""
+MAX_HELIX_SLOPE = 0.1
+"""Largest slope of a helix, dimensionless. A control that applies F in the plane only is at most 0.5 % faster then."""
 SAG = 6e-4
-"""mm between an arc and the chords it has as a polyline, in STEP-NC where no circle can stand: helices, tool axes."""
+"""mm between an arc and its chords where STEP-NC needs a polyline: helices, and paths with their own tool axes."""
 ROUNDED = (TrajectoryKind.CUT, TrajectoryKind.APPROACH, TrajectoryKind.LIFT)
-"""What may have arcs: passes, and the arcs that lead on and off them."""
+"""Motions that may have arcs: cutting passes, and the lead-in and lead-out moves."""
 BLOCK = 256
-"""Moves of a pass at the most between two places at which a block ends in any case."""
+"""Largest number of moves that one line or arc replaces."""
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
-    """What stands for a path (n, 3): stretches in order, each from one of its rows to another.
+class FittedStretches:
+    """The lines and arcs that replace a path, in order, each from one row of the path to another.
 
-    first, last : (k,) int64, rows of the path;  is_arc : (k,) bool
-    centre      : (k, 2) float64, mm, whole steps of the grid from the start as rounded; of arcs
+    first, last : (k,) int64, index, rows of the path
+    is_arc      : (k,) bool
+    centre      : (k, 2) float64, mm, XY plane, of arcs: a whole number of grid steps from the rounded start
     """
 
     first: I64
@@ -62,76 +62,82 @@ class Fit:
 
 
 def fitted(plan: Workplan, tolerance: float) -> Workplan:
-    """A plan whose cuts are arcs and longer lines where these stay within a tolerance of them.
+    """The plan with arcs and longer lines where these stay within the tolerance of the planned cuts.
 
     plan      : cuts within its chordal tolerances
-    tolerance : mm, what is added to these, >= 0
+    tolerance : float, mm, >= 0, added to the chordal tolerance of each step
 
-    Returns the plan, the chordal tolerance of its steps so much larger. Cuts and the ways on and off them are touched,
-    not links, and of them those whose tool axis is fixed. Arcs are in steps along Z of the written frame alone. The
-    ends of all trajectories are where they were.
+    Returns the plan. Cutting passes, lead-in and lead-out moves with a fixed tool axis change; links do not. Arcs occur
+    only in steps whose tool axis is Z of the written frame. All trajectories keep their ends.
+
+    Notes
+    -----
+    The search for the longest stretch within a tolerance solves the task of [Douglas1973] from one end, with arcs too.
     """
-    places = [(s, t) for s, step in enumerate(plan.steps) for t, way in enumerate(step.trajectories) if _may(way)]
+    places = [(s, t) for s, step in enumerate(plan.steps)
+              for t, trajectory in enumerate(step.trajectories) if _can_refit(trajectory)]
     if not places or tolerance <= 0.0:
         return plan
-    ways = [plan.steps[s].trajectories[t] for s, t in places]
-    round_ = np.array([_upright(plan, plan.steps[s]) for s, _ in places])
-    new = dict(zip(places, _refitted(ways, round_, tolerance), strict=True))
+    trajectories = [plan.steps[s].trajectories[t] for s, t in places]
+    round_ = np.array([_axis_is_z(plan, plan.steps[s]) for s, _ in places])
+    new = dict(zip(places, _refitted_trajectories(trajectories, round_, tolerance), strict=True))
     steps = tuple(replace(step, chordal_tolerance=step.chordal_tolerance + tolerance,
-                          trajectories=tuple(new.get((s, t), way) for t, way in enumerate(step.trajectories)))
+                          trajectories=tuple(new.get((s, t), path) for t, path in enumerate(step.trajectories)))
                   for s, step in enumerate(plan.steps))
     return replace(plan, steps=steps)
 
 
-def _may(way: Trajectory) -> bool:
-    return way.motion in ROUNDED and way.axes is None and not way.arcs and len(way.points) > 2
+def _can_refit(trajectory: Trajectory) -> bool:
+    plain = trajectory.axes is None and not trajectory.arcs
+    return trajectory.motion in ROUNDED and plain and len(trajectory.points) > 2
 
 
-def _upright(plan: Workplan, step: Workingstep) -> bool:
-    """Whether the tool stands along Z of the frame a step is written in."""
+def _axis_is_z(plan: Workplan, step: Workingstep) -> bool:
+    """Whether the tool stands along Z of the frame in which a step is written."""
     if plan.clamping is None:
         return True
     frame = plan.clamping.frames.get(step.access)
     return frame is not None and bool(np.abs(frame.rotation[2] - [0.0, 0.0, 1.0]).max() < 1e-9)
 
 
-def _refitted(ways: Sequence[Trajectory], round_: BOOL, tolerance: float) -> list[Trajectory]:
-    points = np.concatenate([w.points for w in ways])
-    count = np.array([len(w.points) for w in ways])
+def _refitted_trajectories(trajectories: Sequence[Trajectory], round_: BOOL, tolerance: float) -> list[Trajectory]:
+    points = np.concatenate([w.points for w in trajectories])
+    count = np.array([len(w.points) for w in trajectories])
     begin = np.cumsum([0, *count])
     fit = stretches(points, count, round_, tolerance)
     rows, starts, per = _along(points, fit)
     out = []
     part = np.searchsorted(fit.first, begin)  # a stretch never goes from one pass to the next
-    for k, way in enumerate(ways):
+    for k, trajectory in enumerate(trajectories):
         mine = slice(int(part[k]), int(part[k + 1]))
         a, b = int(starts[mine.start]), int(starts[mine.stop])
-        path = np.vstack([way.points[:1], rows[a:b]])
+        path = np.vstack([trajectory.points[:1], rows[a:b]])
         first = starts[mine] - a
         arcs = tuple(ArcSpan(i, i + n, (x, y), left) for i, n, (x, y), left in zip(
             first[fit.is_arc[mine]].tolist(), per[mine][fit.is_arc[mine]].tolist(),
             fit.centre[mine][fit.is_arc[mine]].tolist(), _left(points, fit, mine).tolist(), strict=True))
-        out.append(replace(way, points=path, arcs=arcs))
+        out.append(replace(trajectory, points=path, arcs=arcs))
     return out
 
 
-def _left(points: F64, fit: Fit, mine: slice) -> BOOL:
-    """Of the arcs among some stretches: whether they turn left."""
+def _left(points: F64, fit: FittedStretches, mine: slice) -> BOOL:
+    """For each arc of some stretches: whether it turns left, seen from above."""
     arc = fit.is_arc[mine]
     a, b = (points[rows[mine][arc], :2] - fit.centre[mine][arc] for rows in (fit.first, fit.last))
     return np.asarray(_cross(a, b) > 0.0)
 
 
-def stretches(points: F64, count: I64, round_: BOOL, tolerance: float) -> Fit:
-    """The stretches that stand for paths.
+def stretches(points: F64, count: I64, round_: BOOL, tolerance: float) -> FittedStretches:
+    """The lines and arcs that replace paths.
 
-    points : (n, 3) float64, mm, of all paths one behind the other;  count : (m,) int64, of each, >= 2
-    round_ : (m,) bool, whether it may have arcs
-    tolerance : mm, of all stretches against what they stand for, both ways
+    points : (n, 3) float64, mm, frame of the step; the points of all paths, one path after the other
+    count  : (m,) int64, number of points of each path, >= 2
+    round_ : (m,) bool, whether the path may have arcs
+    tolerance : float, mm, largest distance between a stretch and its path, in both directions
 
     Notes
     -----
-    Time and room grow with n log b, b the moves of the longest stretch, 256 at most.
+    Time and memory grow with n log b, where b <= 256 is the number of moves of the longest stretch.
     """
     ends = np.cumsum(count)
     blocks = [np.unique(np.append(np.arange(e - n, e - 1, BLOCK), e - 1))
@@ -144,12 +150,12 @@ def stretches(points: F64, count: I64, round_: BOOL, tolerance: float) -> Fit:
     while len(at):
         line = _farthest(at, stop, 1, lambda i, j: _line_fits(points, i, j, tolerance))
         last, is_arc, centre = line.copy(), np.zeros(len(at), np.bool_), np.zeros((len(at), 2))
-        # an arc has to get farther than the line does
-        room = np.flatnonzero(may & (stop - at >= LEAST_MOVES) & (line < stop))
+        # an arc is kept only where it is longer than the line
+        room = np.flatnonzero(may & (stop - at >= MIN_ARC_MOVES) & (line < stop))
         if len(room):
-            seek = _farthest(at[room], stop[room], LEAST_MOVES,
+            seek = _farthest(at[room], stop[room], MIN_ARC_MOVES,
                              lambda i, j: _arc_fits(points, place, i, j, tolerance)[0])
-            better = seek > np.maximum(line[room], at[room] + LEAST_MOVES - 1)
+            better = seek > np.maximum(line[room], at[room] + MIN_ARC_MOVES - 1)
             room, seek = room[better], seek[better]
             last[room], is_arc[room] = seek, True
             if len(room):
@@ -159,15 +165,15 @@ def stretches(points: F64, count: I64, round_: BOOL, tolerance: float) -> Fit:
         at, stop, may = last[on], stop[on], may[on]
     first, last, is_arc, centre = (np.concatenate([f[k] for f in found]) for k in range(4))
     order = np.argsort(first)
-    return Fit(first[order], last[order], is_arc[order], centre[order])
+    return FittedStretches(first[order], last[order], is_arc[order], centre[order])
 
 
 def _farthest(at: I64, stop: I64, least: int, fits: Callable[[I64, I64], BOOL]) -> I64:
-    """How far from each row something fits that is asked about in steps that double, then halve.
+    """The farthest end of a stretch from each row, found with steps that double and then halve.
 
-    at, stop : (k,) int64;  least : moves it begins with
+    at, stop : (k,) int64, first row and last allowed row;  least : number of moves of the first trial
 
-    Returns (k,) int64: rows; ``at + 1`` where not even ``least`` moves fit, which need no asking where that is 1.
+    Returns (k,) int64: the row of the end. It is ``at + 1`` where no trial fits; one move always fits.
     """
     good, bad = at + 1, stop + 1
     step = np.full(len(at), least)
@@ -194,7 +200,7 @@ def _farthest(at: I64, stop: I64, least: int, fits: Callable[[I64, I64], BOOL]) 
 
 
 def _ragged(first: I64, last: I64) -> tuple[I64, I64, I64]:
-    """Rows first to last of each of k stretches: (n,) rows, (n,) which stretch, (k,) where each begins among them."""
+    """Rows first to last of k stretches: (n,) rows, (n,) number of the stretch, (k,) start of each stretch."""
     size = last - first + 1
     begins = np.cumsum(size) - size
     which = np.repeat(np.arange(len(first)), size)
@@ -206,12 +212,12 @@ def _cross(a: F64, b: F64) -> F64:
 
 
 def _line_fits(points: F64, first: I64, last: I64, tolerance: float) -> BOOL:
-    """Whether the points between lie within the tolerance of the line, each further along it than the one before."""
+    """Whether the points of a stretch lie within the tolerance of its line and advance along it without going back."""
     rows, which, begins = _ragged(first, last)
     a = points[first]
-    way = points[last] - a
-    length = np.linalg.norm(way, axis=1)
-    unit = way / np.maximum(length, GRID)[:, None]
+    chord = points[last] - a
+    length = np.linalg.norm(chord, axis=1)
+    unit = chord / np.maximum(length, GRID)[:, None]
     off = points[rows] - a[which]
     along = (off * unit[which]).sum(axis=1)
     aside = np.linalg.norm(off - along[:, None] * unit[which], axis=1)
@@ -221,15 +227,15 @@ def _line_fits(points: F64, first: I64, last: I64, tolerance: float) -> BOOL:
 
 
 def _arc_fits(points: F64, place: F64, first: I64, last: I64, tolerance: float) -> tuple[BOOL, F64]:
-    """Whether one arc, or helix, stands for the moves between rows, and its centre (k, 2), mm.
+    """Whether one arc or helix replaces the moves between two rows, and its centre (k, 2), mm.
 
-    place : (n, 3) float64, whole steps of the grid, of the points
+    place : (n, 3) float64, grid steps, the points on the grid
 
     Notes
     -----
-    The centre lies on the perpendicular bisector of the ends: one number h, for which each point and the middle of
-    each move give an interval. Of what these have in common the place nearest to the best circle through the points is
-    rounded to the grid, and then asked in full.
+    The centre lies on the perpendicular bisector of the two ends, at one signed distance h. Each point and the middle
+    of each move allow an interval of h. The common value nearest to the best circle is rounded to the grid.
+    The rounded arc is then checked in full.
     """
     rows, which, begins = _ragged(first, last)
     inner = np.ones(len(rows) - 1, np.bool_)
@@ -239,7 +245,7 @@ def _arc_fits(points: F64, place: F64, first: I64, last: I64, tolerance: float) 
     a, b = place[first, :2] * GRID, place[last, :2] * GRID
     chord = b - a
     width = np.hypot(chord[:, 0], chord[:, 1])
-    ok = width >= LEAST_CHORD
+    ok = width >= MIN_ARC_CHORD
     unit = chord / np.maximum(width, GRID)[:, None]
     half = 0.5 * width
     middle = 0.5 * (a + b)
@@ -252,9 +258,9 @@ def _arc_fits(points: F64, place: F64, first: I64, last: I64, tolerance: float) 
     centre = (place[first, :2] + offset) * GRID
     ra, rb = np.hypot(*(a - centre).T), np.hypot(*(b - centre).T)
     r, spread = 0.5 * (ra + rb), 0.5 * np.abs(ra - rb)
-    ok &= (r >= LEAST_RADIUS) & (r <= MOST_RADIUS) & (half <= math.sin(0.5 * MOST_SWEEP) * r)
+    ok &= (r >= MIN_ARC_RADIUS) & (r <= MAX_ARC_RADIUS) & (half <= math.sin(0.5 * MAX_SWEEP) * r)
     side = np.where(h > 0.0, 1.0, -1.0)
-    # what a point is off, and the nearest place of each move
+    # deviation of the points, and the nearest place of each move
     v = p - centre[which]
     rho = np.hypot(v[:, 0], v[:, 1])
     u, w = v[moves], v[moves + 1]
@@ -265,11 +271,11 @@ def _arc_fits(points: F64, place: F64, first: I64, last: I64, tolerance: float) 
     foot = ((u * d).sum(axis=1) < 0.0) & ((w * d).sum(axis=1) > 0.0)
     near = np.where(foot, np.abs(turn) / np.maximum(size, 1e-12), r[mine])
     ahead = (d * unit[mine]).sum(axis=1)
-    bad = (angle <= 0.0) | (angle > MOST_STEP) | (ahead <= 0.0)
+    bad = (angle <= 0.0) | (angle > MAX_MOVE_ANGLE) | (ahead <= 0.0)
     ok &= ~np.logical_or.reduceat(bad, starts)
     off = np.maximum(np.maximum.reduceat(np.abs(rho - r[which]), begins),
                      np.maximum.reduceat(np.abs(near - r[mine]), starts)) + spread
-    # Z against the angle gone
+    # Z against the swept angle
     z = points[rows, 2].copy()
     za, zb = place[first, 2] * GRID, place[last, 2] * GRID
     z[begins], z[begins + last - first] = za, zb
@@ -285,21 +291,21 @@ def _arc_fits(points: F64, place: F64, first: I64, last: I64, tolerance: float) 
     high = np.maximum.reduceat(np.abs(z - even), begins) + np.maximum.reduceat(uneven, starts)
     ok &= np.hypot(off, high) <= tolerance
     level = rise == 0.0
-    ok &= level | ((np.abs(rise) <= MOST_SLOPE * r * sweep) & (r <= MOST_HELIX_RADIUS))
+    ok &= level | ((np.abs(rise) <= MAX_HELIX_SLOPE * r * sweep) & (r <= MAX_HELIX_RADIUS))
     return ok, centre
 
 
 def _bisector(p: F64, moves: I64, which: I64, begins: I64, middle: F64, unit: F64, half: F64,
               tolerance: float) -> tuple[F64, BOOL]:
-    """How far left of the middle of the ends the centre lies, mm, and whether all points have such places in common.
+    """Signed distance h of the centre from the middle of the ends, mm, positive to the left; and whether one exists.
 
     p : (n, 2) float64, mm, points of k stretches;  moves : rows of p at which moves begin;  which : (n,) stretch
     begins : (k,) rows of p;  middle, unit : (k, 2) of the chord, half : (k,) of its length, mm
 
     Notes
     -----
-    With x along the chord and y to its left from its middle, c half of it and q = x² + y² - c², a point is at
-    sqrt(r² + q - 2 h y) from the centre, r² = c² + h²: it is off by (q - 2 h y) / 2 r to first order.
+    With x along the chord and y to its left from its middle, c half of it and q = x² + y² - c², a point is
+    sqrt(r² + q - 2 h y) from the centre, where r² = c² + h². Its deviation is (q - 2 h y) / 2 r to first order.
     """
     k = len(begins)
     half2 = half * half
@@ -310,9 +316,9 @@ def _bisector(p: F64, moves: I64, which: I64, begins: I64, middle: F64, unit: F6
         return y, (v * v).sum(axis=1) - half2[of]
 
     def between(y: F64, q: F64, of: I64, begin: I64) -> tuple[F64, F64]:
-        told = np.abs(y) > 1e-12
-        twice = np.where(told, 2.0 * y, 1.0)
-        a, b = (np.where(told, (q + sign * slack[of]) / twice, sign * np.inf) for sign in (-1.0, 1.0))
+        steep = np.abs(y) > 1e-12
+        twice = np.where(steep, 2.0 * y, 1.0)
+        a, b = (np.where(steep, (q + sign * slack[of]) / twice, sign * np.inf) for sign in (-1.0, 1.0))
         return np.maximum.reduceat(np.minimum(a, b), begin), np.minimum.reduceat(np.maximum(a, b), begin)
 
     y, q = coordinates(p, which)
@@ -329,13 +335,13 @@ def _bisector(p: F64, moves: I64, which: I64, begins: I64, middle: F64, unit: F6
     return np.clip(h, low + spare, high - spare), common
 
 
-def _along(points: F64, fit: Fit) -> tuple[F64, I64, I64]:
+def _along(points: F64, fit: FittedStretches) -> tuple[F64, I64, I64]:
     """The polyline of stretches without the starts of paths.
 
-    Of an arc these are the planned points moved onto it, and as many between as its sag asks for; they stay within
-    the tolerance of the plan, for each planned move has its own.
+    An arc contributes its planned points, moved onto it, and points between them where the sag needs them. They stay
+    within the tolerance of the plan because each planned move has its own.
 
-    Returns (n, 3) float64, mm, rows; (k + 1,) int64, where those of each stretch begin; (k,) int64, how many it has.
+    Returns (n, 3) float64, mm, rows; (k + 1,) int64, first row of each stretch; (k,) int64, number of its rows.
     """
     per = np.ones(len(fit.first), np.int64)
     arc = np.flatnonzero(fit.is_arc)
@@ -362,7 +368,7 @@ def _along(points: F64, fit: Fit) -> tuple[F64, I64, I64]:
     gone[moves + 1] = turned
     gone = np.cumsum(gone)
     gone -= gone[begins][which]
-    # angle behind the start of each point put down
+    # angle from the start of the arc to each point
     of = np.repeat(np.arange(len(moves)), pieces)
     share = (np.arange(len(of)) - np.repeat(np.cumsum(pieces) - pieces, pieces) + 1.0) / pieces[of]
     angle = gone[moves][of] + turned[of] * share
@@ -381,4 +387,4 @@ def _along(points: F64, fit: Fit) -> tuple[F64, I64, I64]:
     return out, starts, per
 
 
-__all__ = ["SAG", "SHARE", "Fit", "fitted", "stretches"]
+__all__ = ["SAG", "SHARE", "FittedStretches", "fitted", "stretches"]

@@ -1,4 +1,4 @@
-"""Words that both NC and STEP-NC headers use: tools, faces and plain ASCII."""
+"""Text for the headers of NC and STEP-NC files: tools, faces and plain ASCII."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PLAIN = str.maketrans({
 
 
 def ascii_text(text: str) -> str:
-    """``text`` in one line of printable ASCII: umlauts spelt out, accents dropped, what is left over becomes '?'."""
+    """``text`` as one line of printable ASCII: umlauts spelt out, accents dropped, any other character as '?'."""
     spelt = unicodedata.normalize("NFKD", text.translate(_PLAIN))
     kept = (c for c in spelt if not unicodedata.combining(c))
     line = "".join(" " if c.isspace() else c if " " <= c <= "~" else "?" for c in kept)
@@ -29,7 +29,7 @@ def decimal(value: float, digits: int = 4) -> str:
 
 
 def tool_words(tool: ToolBody) -> str:
-    """Every dimension of a tool that can be checked at the presetter, mm."""
+    """Every dimension of a tool that a presetter can check, mm."""
     d = decimal
     words = [f"{tool.kind} D{d(tool.diameter)}", f"corner R{d(tool.corner_radius)}",
              f"flute length {d(tool.flute_length)}"]
@@ -40,7 +40,7 @@ def tool_words(tool: ToolBody) -> str:
 
 
 def tool_name(tool: ToolBody) -> str:
-    """'T1: ball D3, ...': number, id where it says more, and every dimension."""
+    """'T1: ball D3, ...': number, id where it differs from the number, and every dimension."""
     own = "" if tool.id == f"T{tool.number}" else f" {tool.id}"
     return f"T{tool.number}{own}: {tool_words(tool)}"
 
@@ -51,10 +51,10 @@ def face_words(step: Workingstep) -> str:
 
 
 def height_word(step: Workingstep) -> str:
-    """'Z', or where a step is in the frame of an access what its heights are along: 'height along the axis of I1'."""
+    """'Z', or 'height along the axis of I1' for a step in the frame of an access."""
     return f"height along the axis of {step.access}" if step.access else "Z"
 
 
 def step_title(step: Workingstep) -> str:
-    """The name of a step, opened by its id."""
+    """The name of a step; it begins with the id of the step."""
     return step.name if step.name.split(" ", 1)[0] == step.id else f"{step.id} {step.name}".strip()

@@ -1,21 +1,23 @@
-"""Inverse kinematics of five-axis machines: how the rotary axes stand for a tool axis, and where the joints are then.
+"""Inverse kinematics of five-axis machines: angles of the rotary axes for a tool axis, and the linear joints then.
 
-The frames are those of the setup: it is fixed to the part, and the machine falls on it while both rotary axes stand at
-zero, where the linear joints are the tip with the length offset on. With T the tilt (about X for A, about Y for B) and
-S the turn about Z (C), all right-handed,
+All frames are the setup frame. It is fixed to the part and coincides with the machine frame while both rotary axes
+stand at zero; the linear joints then equal the tip with the length offset on. Axes are named as in [ISO841]. With T the
+tilt (about X for A, about Y for B) and S the turn about Z (C), all right-handed,
 
     table-table   place = q1 + T (q2 + S (p - q2) - q1), tool along Z        axis on the part = S' T' e_z
     head-table    place = q2 + S (p - q2), tool along T e_z                  axis on the part = S' T e_z
     head-head     place = p, tool along S T e_z                              axis on the part = S T e_z
 
-so the tilt of an axis is the angle to Z, in either sense, and its azimuth is the angle C but for sign and a quarter or
-half turn: ``_AZIMUTH``. Where the axis stands along Z, C is free: it is put between the angles before and after.
+So the tilt is the angle of the axis to Z, with either sign. The azimuth of the axis is C, but for its sign and an
+offset of a quarter or half turn: ``_AZIMUTH``. Where the axis stands along Z, C is free; it is set between the angles
+before and after.
 
-A head of length L from swivel to tip has its joints at place - L (e_z - h), h the tool in the machine.
+A head with the length L from swivel to tip has its joints at place - L (e_z - h), where h is the tool axis in the
+machine.
 
-Two places of the rotary axes do for every axis, and each again after whole turns. Along a path those are taken that
-turn least in all, without ever jumping from one to the other but at the pole, where both are one: a jump in the middle
-of a pass would sweep the tool round while its tip stands in the material.
+Each tool axis has two solutions, and each of them again after whole turns. Along a path the solutions with the least
+total turning are taken. They change from one branch to the other only at the pole, where the branches meet: a change in
+the middle of a pass would swing the tool while its tip stands in the material.
 """
 
 from __future__ import annotations
@@ -29,12 +31,12 @@ from numpy.typing import NDArray
 from geometry.errors import OutputError
 from geometry.mesh import F64
 
-POLE = 1e-9  # rad, an axis nearer to Z than this has no azimuth
-THROUGH = 1e-5  # rad, a path that passes Z as near as that goes through it: the tilt may change its sign there
-ROUND = 2.0 * math.pi
-MOST_ROUNDS = 24  # halvings of a block
-SLACK = 1e-9  # rad beyond a limit that is rounding
-SHARES = (0.25, 0.5, 0.75)  # of a block, where it is held against the straight way
+POLE = 1e-9  # rad; an axis nearer to Z has no azimuth
+POLE_PASSAGE = 1e-5  # rad; a path nearer to Z goes through the pole, and the tilt may change its sign there
+FULL_TURN = 2.0 * math.pi
+MAX_HALVINGS = 24  # of a block
+LIMIT_SLACK = 1e-9  # rad beyond a limit, for rounding
+CHECKED_SHARES = (0.25, 0.5, 0.75)  # of a block, where it is compared with the planned path
 _LETTER = {"A": 0, "B": 1}
 _AZIMUTH = {  # azimuth of the axis, rad, where the tilt is positive: first + second * C
     "table-table-AC": (0.5 * math.pi, -1.0),
@@ -50,16 +52,17 @@ class RotaryMachine:
     """A machine with a tilting axis and C.
 
     kind   : 'table-table-AC', 'table-table-BC', 'head-table-BC', 'head-head-BC' or 'head-head-AC'
-    pivots : mm, setup frame at zero, or None: table-table a point on the tilting and one on the turning axis,
-             head-table (0, 0, spindle face up to the swivel) and a point on the turning axis, head-head the first alone
-    limits : (2, 2) float64, rad, least and greatest angle of the tilting and the turning axis as said above, or None
-    tcp    : the control keeps the tip; else programs are of joints, and pivots are needed
-    sense  : 1, or -1 for an axis whose words count the other way; angles here are right-handed in either case
+    pivots : mm, setup frame at zero, or None. Table-table: a point on the tilting and one on the turning axis.
+             Head-table: (0, 0, spindle face up to the swivel) and a point on the turning axis. Head-head: the first
+             alone
+    limits : (2, 2) float64, rad, least and greatest right-handed angle of the tilting and the turning axis, or None
+    tcp    : the control keeps the tip; otherwise programs contain joint positions, and pivots are needed
+    sense  : 1, or -1 for an axis that programs count the other way; angles here are always right-handed
 
     Raises
     ------
     OutputError
-        Code bad_kinematics: an unknown kind; no_pivots: none are given although the control does not keep the tip.
+        bad_kinematics: an unknown kind; no_pivots: there are none although the control does not keep the tip.
     """
 
     kind: str
@@ -73,17 +76,22 @@ class RotaryMachine:
             raise OutputError(f"unknown kinematics {self.kind!r}", code="bad_kinematics", measured=self.kind,
                               limit=sorted(_AZIMUTH), remedy="machine.kinematics is one of " + ", ".join(_AZIMUTH))
         if self.pivots is None and not self.tcp:
-            raise OutputError("a program of joints needs to know where the rotary axes lie", code="no_pivots",
+            raise OutputError("a program of joint positions needs the pivots of the rotary axes", code="no_pivots",
                               subjects=("machine.pivots_mm",),
-                              remedy="give machine.pivots_mm, or say machine.tcp true where the control keeps the tip")
+                              remedy="give machine.pivots_mm, or set machine.tcp true where the control keeps the tip")
 
     @property
     def letters(self) -> str:
-        """The two rotary words, the tilting axis first."""
+        """The two rotary letters, the tilting axis first."""
         return self.kind[-2:]
 
     def words(self, turns: F64) -> F64:
-        """Angles as programs say them, of or for right-handed ones, (..., 2), rad or deg; its own inverse."""
+        """Converts right-handed angles to the angles of programs and back.
+
+        turns : (..., 2) float64, rad or deg, of the tilting and the turning axis
+
+        Returns the same shape and unit; the function is its own inverse.
+        """
         return turns if self.sense == (1, 1) else np.asarray(turns * np.array(self.sense))
 
     @property
@@ -97,14 +105,23 @@ class RotaryMachine:
         return self.kind.startswith("head-head")
 
     def axes(self, turns: F64) -> F64:
-        """Tool axes on the part, (n, 3) unit, where the rotary axes stand at ``turns`` (n, 2) rad."""
+        """Tool axes for angles of the rotary axes.
+
+        turns : (n, 2) float64, rad
+
+        Returns (n, 3) float64, unit, setup frame, tip to spindle.
+
+        Notes
+        -----
+        The products of rotations in the docstring of the module, with the axis names of [ISO841].
+        """
         first, sense = _AZIMUTH[self.kind]
         tilt, azimuth = turns[:, 0], first + sense * turns[:, 1]
         flat = np.sin(tilt)
         return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.cos(tilt)], axis=1)
 
     def turns(self, axes: F64) -> F64:
-        """Both places of the rotary axes for tool axes.
+        """Both solutions of the rotary axes for tool axes.
 
         axes : (n, 3) float64, unit, tip to spindle, setup frame
 
@@ -112,6 +129,11 @@ class RotaryMachine:
         -------
         (n, 2, 2) float64
             Rad; [:, 0] tilts to the positive side and [:, 1] to the negative one, C in (-pi, pi], 0 at the pole.
+
+        Notes
+        -----
+        The inverse of ``axes``, with the axis names of [ISO841]: the tilt is the angle to Z, C follows from the
+        azimuth.
         """
         first, sense = _AZIMUTH[self.kind]
         flat = np.hypot(axes[:, 0], axes[:, 1])
@@ -120,34 +142,56 @@ class RotaryMachine:
         one = sense * (azimuth - first)
         out = np.stack([np.stack([tilt, one], axis=1), np.stack([-tilt, one + math.pi], axis=1)], axis=1)
         out[:, 1, 1] = np.where(flat > POLE, out[:, 1, 1], 0.0)
-        out[..., 1] -= ROUND * np.ceil((out[..., 1] - math.pi) / ROUND)
+        out[..., 1] -= FULL_TURN * np.ceil((out[..., 1] - math.pi) / FULL_TURN)
         return out
 
     def stands(self, axes: F64) -> NDArray[np.bool_]:
-        """(n,) bool: tool axes (n, 3), unit, for which the rotary axes have a place inside their limits."""
+        """Whether the rotary axes can stand inside their limits for tool axes.
+
+        axes : (n, 3) float64, unit, tip to spindle, setup frame
+
+        Returns (n,) bool.
+        """
         both = self.turns(axes)
         if self.limits is None:
             return np.ones(len(axes), np.bool_)
-        low, high = self.limits[:, 0] - SLACK, self.limits[:, 1] + SLACK
-        least = both[..., 1] + ROUND * np.ceil((low[1] - both[..., 1]) / ROUND)
+        low, high = self.limits[:, 0] - LIMIT_SLACK, self.limits[:, 1] + LIMIT_SLACK
+        least = both[..., 1] + FULL_TURN * np.ceil((low[1] - both[..., 1]) / FULL_TURN)
         tilts = (both[..., 0] >= low[0]) & (both[..., 0] <= high[0])
         return np.asarray((tilts & (least <= high[1])).any(axis=1))
 
     def even(self, axis: F64, degrees: float) -> F64:
-        """(k, 3) unit: axes round one (3,) for which both rotary axes stand at whole multiples of some degrees."""
+        """Four tool axes near one, at which both rotary axes stand at whole multiples of an angle.
+
+        axis    : (3,) float64, unit, tip to spindle, setup frame
+        degrees : deg, the angle
+
+        Returns (4, 3) float64, unit, setup frame.
+        """
         step = math.radians(degrees)
         low = np.floor(self.turns(axis[None])[0, 0] / step)
         return self.axes(step * np.array([low, low + [1, 0], low + [0, 1], low + [1, 1]]))
 
     def joints(self, tips: F64, turns: F64, gauge: float) -> F64:
-        """Linear joints, (n, 3) mm, for tips (n, 3) mm at ``turns`` (n, 2) rad.
+        """Positions of the linear joints.
 
-        gauge : mm, spindle face to tip; counts where the head tilts. Raises OutputError (no_pivots) without pivots.
+        tips  : (n, 3) float64, mm, setup frame
+        turns : (n, 2) float64, rad, angles of the rotary axes
+        gauge : mm, spindle face to tip; it counts where the head tilts
+
+        Returns (n, 3) float64, mm, machine coordinates. An OutputError (no_pivots) says that the machine has no pivots.
         """
         return self._places(tips, turns) - self._swing(turns, gauge)
 
     def tips(self, joints: F64, turns: F64, gauge: float) -> F64:
-        """Tips, (n, 3) mm, for linear joints (n, 3) mm; the inverse of ``joints``."""
+        """Positions of the tip; the inverse of ``joints``.
+
+        joints : (n, 3) float64, mm, machine coordinates
+        turns  : (n, 2) float64, rad, angles of the rotary axes
+        gauge  : mm, spindle face to tip
+
+        Returns (n, 3) float64, mm, setup frame.
+        """
         place = joints + self._swing(turns, gauge)
         if self.turns_head:
             return place
@@ -157,21 +201,20 @@ class RotaryMachine:
         return np.asarray(pivots[1] + _applied(_turn_matrix(2, -turns[:, 1]), place - pivots[1]))
 
     def follow(self, axes: F64, start: F64 | None = None) -> F64:
-        """Rotary axes along a path, turning least in all.
+        """Angles of the rotary axes along a path, with the least total turning.
 
-        axes  : (n, 3) float64, unit, along the path; neighbours less than half a turn apart
-        start : (2,) float64, rad, where they stand before the path; None: anywhere, the least angles first
+        axes  : (n, 3) float64, unit, setup frame, along the path; neighbours less than half a turn apart
+        start : (2,) float64, rad, angles before the path; None: any, the smallest angles first
 
         Returns
         -------
         (n, 2) float64
-            Rad, within the limits, no step of C longer than half a turn.
+            Rad, within the limits; no step of C is longer than half a turn.
 
         Raises
         ------
         OutputError
-            Code rotary_limit: the axes do not get along the path inside their limits; the message names the place in
-            the path, the axis and the angle.
+            rotary_limit: the axes cannot follow the path inside their limits. The message gives point, axis and angle.
         """
         out = np.zeros((len(axes), 2))
         free = np.hypot(axes[:, 0], axes[:, 1]) <= POLE
@@ -188,25 +231,30 @@ class RotaryMachine:
 
     def course(self, tips: F64, axes: F64, tolerance: float, swing: float, gauge: float,
                turns: F64 | None = None) -> tuple[F64, F64]:
-        """A path with as many points more as the rotary axes need to follow it.
+        """A path with the further points that the rotary axes need to follow it.
 
-        tips, axes : (n, 3) float64, mm and unit: straight between tips, along great circles between axes
-        tolerance  : mm, what the tip may leave its way by where the program is one of joints
-        swing      : rad, what the axis may leave its great circle by
+        tips, axes : (n, 3) float64, mm and unit, setup frame; straight between tips, great circles between axes
+        tolerance  : mm, largest deviation of the tip where the program contains joint positions
+        swing      : rad, largest deviation of the axis from its great circle
         gauge      : mm, spindle face to tip
-        turns      : (n, 2) float64, rad, where the rotary axes stand at its points; None: as ``follow`` has it
+        turns      : (n, 2) float64, rad, angles of the rotary axes at the points; None: as ``follow`` returns them
 
         Returns
         -------
-        tips, turns : (m, 3) float64, mm, and (m, 2) float64, rad, m >= n, the given points among them
+        tips, turns : (m, 3) float64, mm, and (m, 2) float64, rad, m >= n, with the given points among them
 
         Raises
         ------
         OutputError
             As ``follow``; pole_crossing: the axis passes so near Z that no step is short enough.
+
+        Notes
+        -----
+        The axis between two points is that of the great circle, by the formula sin((1 - t) a) / sin a of
+        [Shoemake1985].
         """
         turns = self.follow(axes) if turns is None else turns
-        for _ in range(MOST_ROUNDS):
+        for _ in range(MAX_HALVINGS):
             off = np.flatnonzero(self._off(tips, axes, turns, tolerance, swing, gauge))
             if not len(off):
                 return tips, turns
@@ -220,23 +268,23 @@ class RotaryMachine:
         raise OutputError(f"the tool axis passes so near Z at ({', '.join(f'{v:.3f}' for v in where)}) that the rotary "
                           "axes cannot follow it", code="pole_crossing", subjects=(_place(where),),
                           measured=float(np.degrees(np.hypot(*axes[off[0], :2]))), limit=float(np.degrees(swing)),
-                          remedy="lean the tool to one side of Z all along the pass")
+                          remedy="tilt the tool to one side of Z along the whole pass")
 
     def _nearest(self, axes: F64, near: F64) -> F64:
-        """(n, 2) rad, the place of the rotary axes for each axis that is nearest to ``near`` (n, 2)."""
+        """(n, 2) rad: for each axis the solution nearest to ``near`` (n, 2)."""
         both = self.turns(axes)
         free = np.hypot(axes[:, 0], axes[:, 1]) <= POLE
         both[free, :, 1] = near[free, None, 1]
-        both[..., 1] += ROUND * np.rint((near[:, None, 1] - both[..., 1]) / ROUND)
+        both[..., 1] += FULL_TURN * np.rint((near[:, None, 1] - both[..., 1]) / FULL_TURN)
         far = np.abs(both - near[:, None]).max(axis=2)
         return np.asarray(both[np.arange(len(axes)), np.argmin(far, axis=1)])
 
     def _off(self, tips: F64, axes: F64, turns: F64, tolerance: float, swing: float,
              gauge: float) -> NDArray[np.bool_]:
-        """(n - 1,) bool: blocks on which axis or tip leave their way by more than is allowed."""
+        """(n - 1,) bool: blocks on which axis or tip deviate by more than allowed."""
         out = np.zeros(len(tips) - 1, np.bool_)
         joints = None if self.tcp else self.joints(tips, turns, gauge)
-        for share in SHARES:
+        for share in CHECKED_SHARES:
             there = (1.0 - share) * turns[:-1] + share * turns[1:]
             got, wanted = self.axes(there), _great(axes[:-1], axes[1:], share)
             out |= np.linalg.norm(got - wanted, axis=1) > swing
@@ -246,10 +294,12 @@ class RotaryMachine:
         return out
 
     def _least_turning(self, both: F64, poled: NDArray[np.bool_], start: F64 | None) -> F64:
-        """(n, 2) rad: of both places (n, 2, 2) and their whole turns the row that turns least in all.
+        """(n, 2) rad: the sequence of solutions that turns least in total.
 
-        poled : (n - 1,) bool, where the way to the next goes through the pole; only there the tilt may change its sign,
-                for elsewhere that would take the axis through Z and back
+        both  : (n, 2, 2), both solutions at each point; whole turns of C may be added
+        poled : (n - 1,) bool, whether the move to the next point goes through the pole. Only there the tilt may change
+                its
+                sign; elsewhere the axis would swing through Z and back
         """
         rows = self._choices(both, 0.0 if start is None else float(start[1]), poled)
         other = np.repeat([False, True], rows.shape[1] // 2)
@@ -258,7 +308,7 @@ class RotaryMachine:
         came = np.zeros(rows.shape[:2], np.int64)
         came_from = np.zeros(2) if start is None else start
         if self.limits is None:
-            rows[0, :, 1] += ROUND * np.rint((came_from[1] - rows[0, :, 1]) / ROUND)
+            rows[0, :, 1] += FULL_TURN * np.rint((came_from[1] - rows[0, :, 1]) / FULL_TURN)
         least[0] = np.abs(rows[0] - came_from).max(axis=1)
         least[0, np.isnan(least[0])] = math.inf
         if not np.isfinite(least[0]).any():
@@ -266,8 +316,8 @@ class RotaryMachine:
         wraps = self.limits is None
         for k in range(1, len(rows)):
             there = np.broadcast_to(rows[k][None], (rows.shape[1], rows.shape[1], 2)).copy()  # from, to
-            if wraps:  # as many whole turns as bring it near
-                there[..., 1] += ROUND * np.rint((rows[k - 1][:, None, 1] - there[..., 1]) / ROUND)
+            if wraps:  # the whole turns that bring it nearest
+                there[..., 1] += FULL_TURN * np.rint((rows[k - 1][:, None, 1] - there[..., 1]) / FULL_TURN)
             step = np.abs(there - rows[k - 1][:, None])
             cost = np.where(step[..., 1] <= math.pi + POLE, step.max(axis=2), math.inf) + least[k - 1][:, None]
             cost[np.isnan(cost) | (changed & ~poled[k - 1])] = math.inf
@@ -284,53 +334,55 @@ class RotaryMachine:
         return out
 
     def _choices(self, both: F64, start: float, poled: NDArray[np.bool_]) -> F64:
-        """(n, m, 2) rad: the places to choose from, nan outside the limits; without limits the two alone.
+        """(n, m, 2) rad: the solutions to choose from, nan outside the limits; without limits just the two.
 
-        Limits far apart hold more whole turns than the path can come to from where C stands at its ``start``: a row of
-        places spans no more than C turns in all, and is moved by whole turns as near to there as limits let it.
+        Wide limits hold more whole turns than the path can reach from the ``start`` of C. One row of solutions
+        therefore spans no more than C turns in total, and lies as near to ``start`` as the limits allow.
         """
         if self.limits is None:
             return both.copy()
         low, high = self.limits[1]
         step = np.diff(both[:, 0, 1])
-        most = float(np.abs(step - ROUND * np.rint(step / ROUND)).sum()) + ROUND * (2 + np.count_nonzero(poled))
+        most = float(np.abs(step - FULL_TURN * np.rint(step / FULL_TURN)).sum())
+        most += FULL_TURN * (2 + np.count_nonzero(poled))
         here = min(max(start, low), high)
         low, high = max(low, here - most), min(high, here + most)
-        turns = np.arange(math.floor((low - math.pi) / ROUND), math.ceil((high + math.pi) / ROUND) + 1)
+        turns = np.arange(math.floor((low - math.pi) / FULL_TURN), math.ceil((high + math.pi) / FULL_TURN) + 1)
         rows = np.repeat(both, len(turns), axis=1)
-        rows[..., 1] += np.tile(ROUND * turns, 2)
+        rows[..., 1] += np.tile(FULL_TURN * turns, 2)
         least, greatest = np.array([self.limits[0], [low, high]]).T
-        beyond = ((rows < least - SLACK) | (rows > greatest + SLACK)).any(axis=2)
+        beyond = ((rows < least - LIMIT_SLACK) | (rows > greatest + LIMIT_SLACK)).any(axis=2)
         rows[beyond] = np.nan
         rows[:, :, 1] = np.clip(rows[:, :, 1], low, high)
         rows[:, :, 0] = np.clip(rows[:, :, 0], *self.limits[0])
         return rows
 
     def _check(self, turns: F64) -> None:
-        """Refuse places outside the limits."""
+        """Refuse angles outside the limits."""
         if self.limits is None:
             return
-        out = (turns < self.limits[:, 0] - SLACK) | (turns > self.limits[:, 1] + SLACK)
+        out = (turns < self.limits[:, 0] - LIMIT_SLACK) | (turns > self.limits[:, 1] + LIMIT_SLACK)
         if out.any():
             k = int(np.flatnonzero(out.any(axis=1))[0])
             self._refuse(np.array([turns[k], turns[k]]), k)
 
     def _refuse(self, both: F64, place: int) -> None:
         both = self.words(both)
-        limits = [[-math.inf, math.inf]] * 2 if self.limits is None else said_limits(self.limits, self.sense)
-        asked = " or ".join(" ".join(f"{letter}{math.degrees(v):.3f}" for letter, v in zip(self.letters, row.tolist(),
-                                                                                           strict=True))
-                            for row in both)
+        limits = [[-math.inf, math.inf]] * 2 if self.limits is None else program_limits(self.limits, self.sense)
+        needed = " or ".join(" ".join(f"{letter}{math.degrees(v):.3f}"
+                                      for letter, v in zip(self.letters, row.tolist(), strict=True))
+                             for row in both)
         allowed = ", ".join(f"{letter} {math.degrees(lo):g} to {math.degrees(hi):g}"
                             for letter, (lo, hi) in zip(self.letters, limits, strict=True))
-        raise OutputError(f"the rotary axes do not get along the path: at its point {place + 1} they would stand at "
-                          f"{asked} deg, allowed is {allowed}", code="rotary_limit", subjects=("machine.rotary_deg",),
+        raise OutputError(f"the rotary axes cannot follow the path: point {place + 1} needs "
+                          f"{needed} deg, the limits are {allowed}", code="rotary_limit",
+                          subjects=("machine.rotary_deg",),
                           measured=np.degrees(both).tolist(), limit=np.degrees(limits).tolist(),
-                          remedy="end the pass before, or give it another tool axis")
+                          remedy="end the pass before this point, or use another tool axis")
 
     def _points(self) -> F64:
         if self.pivots is None:
-            raise OutputError(f"the pivots of {self.kind} are not known", code="no_pivots",
+            raise OutputError(f"the pivots of {self.kind} are missing", code="no_pivots",
                               subjects=("machine.pivots_mm",), remedy="give machine.pivots_mm")
         return np.array(self.pivots)
 
@@ -338,7 +390,7 @@ class RotaryMachine:
         return _turn_matrix(_LETTER[self.letters[0]], turns[:, 0])
 
     def _swing(self, turns: F64, gauge: float) -> F64:
-        """(n, 3) mm: how far the head holds the tip off the joints."""
+        """(n, 3) mm: offset between joints and tip that the tilted head makes."""
         out = np.zeros((len(turns), 3))
         if not self.tilts_head:
             return out
@@ -349,7 +401,7 @@ class RotaryMachine:
         return np.asarray((self._points()[0, 2] + gauge) * (out - tool))
 
     def _places(self, tips: F64, turns: F64) -> F64:
-        """(n, 3) mm: where in the machine the table holds places of the part."""
+        """(n, 3) mm: places of the part in machine coordinates."""
         if self.turns_head:
             return tips
         pivots = self._points()
@@ -357,25 +409,32 @@ class RotaryMachine:
         return out if self.tilts_head else pivots[0] + _applied(self._tilt(turns), out - pivots[0])
 
 
-def said_limits(limits: F64, sense: tuple[int, int]) -> F64:
-    """(2, 2): least and greatest angles (2, 2), rad or deg, for words that count by ``sense``; its own inverse."""
+def program_limits(limits: F64, sense: tuple[int, int]) -> F64:
+    """Converts limits of right-handed angles to limits of program angles and back.
+
+    limits : (2, 2) float64, rad or deg, least and greatest angle of both rotary axes
+    sense  : 1 or -1 for each axis, as in ``RotaryMachine``
+
+    Returns (2, 2) float64, same unit; the function is its own inverse.
+    """
     out = np.array(limits, dtype=np.float64)
-    for row, way in enumerate(sense):
-        if way < 0:
+    for row, sign in enumerate(sense):
+        if sign < 0:
             out[row] = -out[row, ::-1]
     return out
 
 
 def _through_pole(axes: F64, known: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(k - 1,) bool: whether the ways from one of the axes (n, 3) at rows ``known`` (k,) to the next go through Z."""
+    """(k - 1,) bool: whether the great circles between consecutive axes, rows ``known`` (k,) of (n, 3), go through Z.
+    """
     a, b = axes[known[:-1]], axes[known[1:]]
     cross = np.cross(a, b)
     size = np.linalg.norm(cross, axis=1)
     n = cross / np.maximum(size, 1e-300)[:, None]
-    foot = np.array([0.0, 0.0, 1.0]) - n[:, 2:] * n  # of Z on the great circle
+    foot = np.array([0.0, 0.0, 1.0]) - n[:, 2:] * n  # projection of Z onto the great circle
     within = ((np.cross(a, foot) * n).sum(axis=1) >= 0.0) & ((np.cross(foot, b) * n).sum(axis=1) >= 0.0)
-    near = np.hypot(axes[known, 0], axes[known, 1]) <= THROUGH
-    out = (np.diff(known) > 1) | near[:-1] | near[1:] | ((size > POLE) & within & (np.abs(n[:, 2]) <= THROUGH))
+    near = np.hypot(axes[known, 0], axes[known, 1]) <= POLE_PASSAGE
+    out = (np.diff(known) > 1) | near[:-1] | near[1:] | ((size > POLE) & within & (np.abs(n[:, 2]) <= POLE_PASSAGE))
     return np.asarray(out)
 
 
@@ -395,7 +454,7 @@ def _applied(matrices: F64, vectors: F64) -> F64:
 
 
 def _great(a: F64, b: F64, share: float) -> F64:
-    """(n, 3) unit: a share of the way along great circles."""
+    """(n, 3) unit: the axis at a share of the great circle."""
     angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ni,ni->n", a, b))
     small = angle < 1e-6
     size = np.where(small, 1.0, np.sin(np.where(small, 1.0, angle)))
@@ -409,4 +468,4 @@ def _place(point: F64) -> str:
     return "(" + ", ".join(f"{v:.3f}" for v in point) + ")"
 
 
-__all__ = ["RotaryMachine", "said_limits"]
+__all__ = ["RotaryMachine", "program_limits"]

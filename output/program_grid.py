@@ -1,8 +1,8 @@
-"""The grid every writer rounds to: whole ten-thousandths of a millimetre.
+"""The grid to which every writer rounds: whole ten-thousandths of a millimetre.
 
-A path is put on the grid once, as integers; text is made from the integers, so a
-reader gets back exactly the grid point, at most ``GRID / 2`` = 0.00005 mm from the
-planned one on each axis. "Equal" and "moves" mean equality on the grid.
+A path is rounded to the grid once, as integers, and the text is made from the integers. A reader therefore gets exactly
+the grid point, at most ``GRID / 2`` = 0.00005 mm from the planned point on each axis. "Equal" and "moves" mean equality
+on the grid.
 """
 
 from __future__ import annotations
@@ -29,14 +29,20 @@ GRID = 1.0 / PER_MM
 """Grid width, mm."""
 
 REACH = 1.0e6
-"""Largest coordinate that is taken for one, mm."""
+"""Largest coordinate that is accepted, mm."""
 
 
 def to_grid(points: F64) -> I64:
-    """Put points on the grid.
+    """Round points to the grid.
 
-    points : (..., k) float64, mm
-    Returns (..., k) int64, ten-thousandths of a mm.  Raises OutputError where a value is not finite or beyond 1 km.
+    points : (..., k) float64, mm, any frame
+
+    Returns (..., k) int64, ten-thousandths of a mm.
+
+    Raises
+    ------
+    OutputError
+        A value is not finite or larger than 1 km.
     """
     p = np.asarray(points, dtype=np.float64)
     if not np.isfinite(p).all() or (p.size and np.abs(p).max() > REACH):
@@ -45,9 +51,10 @@ def to_grid(points: F64) -> I64:
 
 
 def without_repeats(points: I64) -> I64:
-    """The points without those equal to the one before them; the first stays.
+    """The points without those that equal the point before them; the first stays.
 
-    points : (n, k) int64, grid units
+    points : (n, k) int64, grid steps of 0.0001 mm
+
     Returns (m, k) int64, 1 <= m <= n for n >= 1.
     """
     if len(points) < 2:
@@ -60,7 +67,7 @@ def without_repeats(points: I64) -> I64:
 
 @dataclass(frozen=True)
 class GridArc:
-    """An arc or helix about Z as it is written, grid units: X, Y, Z of both ends, X and Y of the centre.
+    """An arc or helix about Z on the grid: X, Y, Z of both ends, X and Y of the centre, grid steps.
 
     left : counter-clockwise seen from above
     """
@@ -72,7 +79,7 @@ class GridArc:
 
     @property
     def offset(self) -> tuple[int, int]:
-        """X and Y of the centre from the start on."""
+        """X and Y of the centre, from the start."""
         return self.centre[0] - self.start[0], self.centre[1] - self.start[1]
 
     @property
@@ -83,9 +90,10 @@ class GridArc:
 
 
 def pieces(points: I64, arcs: Sequence[ArcSpan]) -> Iterator[I64 | GridArc]:
-    """What a path is written as: polylines (m, k), m >= 2, without repeats, and arcs, in order.
+    """The blocks of a path: polylines (m, k), m >= 2, without repeats, and arcs, in order.
 
-    points : (n, k) int64, grid units, X, Y, Z first;  arcs : of rows of it
+    points : (n, k) int64, grid steps of 0.0001 mm, X, Y, Z of the frame of the step first
+    arcs   : stretches of rows of ``points``
     """
     at = 0
     for arc in arcs:
@@ -104,17 +112,21 @@ def pieces(points: I64, arcs: Sequence[ArcSpan]) -> Iterator[I64 | GridArc]:
 def grid_path(step: Workingstep) -> list[tuple[Trajectory, I64]]:
     """The trajectories of a step on the grid, checked.
 
-    Returns pairs of the trajectory and its (m, 3) int64 points without repeats; m is 1 where a
-    trajectory is shorter than the grid.
-    Raises OutputError where a trajectory has a wrong shape or does not start at the end of the one
-    before it, where a rapid moves Z and XY in one block, or where a feed is no feed.
+    Returns pairs of the trajectory and its (m, 3) int64 points, grid steps of 0.0001 mm, frame of the step, without
+    repeats. m is 1 where a trajectory is shorter than the grid.
+
+    Raises
+    ------
+    OutputError
+        bad_trajectory: a trajectory has a wrong shape; gap_in_path: it does not start at the end of the one before it;
+        slanted_rapid: a rapid moves Z and XY in one block; bad_feed: a feed is not a positive number.
     """
     path: list[tuple[Trajectory, I64]] = []
     end: I64 | None = None
     for number, trajectory in enumerate(step.trajectories, start=1):
         where = (step.id, f"trajectory {number}")
         if trajectory.points.ndim != 2 or trajectory.points.shape[1] != 3 or len(trajectory.points) < 2:
-            raise OutputError(f"{step.id}: trajectory {number} is no polyline of two or more points in space",
+            raise OutputError(f"{step.id}: trajectory {number} is not a polyline of two or more points in space",
                               code="bad_trajectory", subjects=where, measured=list(trajectory.points.shape))
         points = to_grid(trajectory.points)
         if end is not None and (points[0] != end).any():
@@ -135,7 +147,8 @@ def grid_path(step: Workingstep) -> list[tuple[Trajectory, I64]]:
 def link(here: I64, start: I64, clearance: int) -> I64:
     """The rapid between two steps that do not join: up to the clearance plane, across, down.
 
-    here, start : (3,) int64, grid units;  clearance : int, grid units
+    here, start : (3,) int64, grid steps of 0.0001 mm, frame of the step;  clearance : int, grid steps
+
     Returns (k, 3) int64 from ``here`` to ``start``, k <= 4, without repeats; k is 1 where they are equal.
     """
     if (here == start).all():
@@ -145,7 +158,14 @@ def link(here: I64, start: I64, clearance: int) -> I64:
 
 
 def check_plan(plan: Workplan) -> None:
-    """Raise OutputError where the plan as a whole cannot be written: no steps, ids used twice, a bad spindle speed."""
+    """Check that the plan as a whole can be written.
+
+    Raises
+    ------
+    OutputError
+        empty_plan: no steps; id_twice: an id occurs twice; empty_step: a step has no trajectory; bad_spindle: a spindle
+        speed is below 1; tool_number_twice: two different tools have one number.
+    """
     if not plan.steps:
         raise OutputError(f"the workplan '{plan.name}' has no workingstep", code="empty_plan")
     ids = [step.id for step in plan.steps]
@@ -160,7 +180,7 @@ def check_plan(plan: Workplan) -> None:
             raise OutputError(f"{step.id} has no spindle speed", code="bad_spindle", subjects=(step.id,),
                               measured=step.spindle_rpm, limit=1.0)
         if bodies.setdefault(step.tool.number, step.tool) != step.tool:
-            raise OutputError(f"tool number {step.tool.number} stands for two different tools",
+            raise OutputError(f"two different tools have the number {step.tool.number}",
                               code="tool_number_twice", subjects=(bodies[step.tool.number].id, step.tool.id))
 
 

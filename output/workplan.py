@@ -13,19 +13,19 @@ from output.inverse_kinematics import RotaryMachine
 from toolpath.workingsteps import Trajectory, TrajectoryKind, Workingstep
 
 FIRST_NUMBER = 1000
-"""Of the first program of a job."""
+"""Number of the first program of a job."""
 
 
 @dataclass(frozen=True, eq=False)
 class StockBox:
-    """Bounding box of the stock, mm: lower and upper corner (3,)."""
+    """Bounding box of the stock: lower and upper corner, (3,) float64, mm, setup frame."""
 
     lower: F64
     upper: F64
 
 
 class Ap238(StrEnum):
-    """What an AP238 file is for.
+    """Purpose of an AP238 file.
 
     CC1            : tool paths, conformance class 1
     CC2            : class 2, with part and stock as shapes and the strategies of the operations
@@ -39,7 +39,12 @@ class Ap238(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class StockCylinder:
-    """A round blank: middle of its lower end (3,), mm, the way to the upper one (3,), unit, radius and height, mm."""
+    """A cylindrical blank.
+
+    base   : (3,) float64, mm, setup frame, middle of the lower end
+    axis   : (3,) float64, unit, from the lower end to the upper one
+    radius, height : mm
+    """
 
     base: F64
     axis: F64
@@ -49,7 +54,12 @@ class StockCylinder:
 
 @dataclass(frozen=True)
 class Assembly:
-    """What a tool is besides a shape: spindle face to tip, mm; number of teeth; minutes in cut its cutter lasts."""
+    """Data of a tool besides its shape.
+
+    gauge_length : mm, spindle face to tip
+    teeth        : number of teeth, None where it is unknown
+    life         : min in cut that its cutter lasts, None where it is unknown
+    """
 
     gauge_length: float
     teeth: int | None = None
@@ -57,11 +67,11 @@ class Assembly:
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
-    """The frame of an access in which steps are planned.
+class AccessFrame:
+    """The frame of an access, in which steps are planned.
 
     rotation  : (3, 3) float64, rows are its axes in the setup frame; Z is the tool axis
-    clearance : mm, its Z above which rapids across are free
+    clearance : mm, Z in this frame above which rapids in XY are free
     """
 
     rotation: F64
@@ -70,16 +80,16 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Clamping:
-    """A part held once on a machine that turns it, or the tool, from one access to the next.
+    """A part clamped once, on a machine that turns the part or the tool from one access to the next.
 
     machine : its rotary axes; frames : by id of the access
     centre  : (3,) float64, mm, setup frame
-    radius  : mm; part, stock and fixtures, and the room rapids keep to them, lie in the ball of this radius round it
+    radius  : mm; part, stock, fixtures and the clearance of rapids lie in this ball round ``centre``
     gauges  : mm, spindle face to tip, by T number
     """
 
     machine: RotaryMachine
-    frames: Mapping[str, Frame]
+    frames: Mapping[str, AccessFrame]
     centre: F64
     radius: float
     gauges: Mapping[int, float]
@@ -89,19 +99,19 @@ class Clamping:
 class Workplan:
     """A job for one access direction, or for one clamping: everything a writer needs.
 
-    clearance_plane : z in mm above which rapids in XY are free
-    clamping        : of a machine with rotary axes: steps are in the frame of their access; None: all in the setup's
+    clearance_plane : mm, Z above which rapids in XY are free
+    clamping        : on a machine with rotary axes; steps are then in the frame of their access. None: setup frame
     labels          : passed through to headers
     comments        : header lines for the machinist (ASCII, no parentheses)
     figures         : header lines for the figures of the proof, ``output.gcode.proof_header``
-    restart         : every step begins as after a tool change, so that a program can be started at each of them
-    stock_words     : what kind of blank it is, where it is no box: ``stock`` is then a box round it
-    cylinder        : the blank where it is one, or None; stock_mesh : where it is a mesh, or None
-    part_mesh       : the part, faces by number, or None where nobody wants it written
+    restart         : every step begins as after a tool change, so that a program can be started at each step
+    stock_words     : kind of the blank where it is not a box; ``stock`` is then its bounding box
+    cylinder        : the blank where it is a cylinder, or None; stock_mesh : where it is a mesh, or None
+    part_mesh       : the part with its face numbers, or None where the file needs no part
     assemblies      : by T number; surfaces : by face number, in the frame of the plan, where strategies follow them
-    ap238           : what the AP238 file is for
-    coolant         : whether it runs while a tool cuts
-    number, number_words : of the program, where a control tells programs apart by numbers, and what is said beside it
+    ap238           : purpose of the AP238 file
+    coolant         : whether coolant runs while a tool cuts
+    number, number_words : number of the program, for controls that number programs, and the comment beside it
     """
 
     name: str
@@ -131,10 +141,10 @@ class Workplan:
     number_words: str = ""
 
     def assembly(self, tool: ToolBody) -> Assembly:
-        """What is known of a tool; without more, it is as long as shank and holder stick out of the spindle."""
+        """Assembly of a tool; by default the gauge length is stickout plus holder length."""
         known = self.assemblies.get(tool.number)
         return known or Assembly(tool.stickout + sum(h.length for h in tool.holder))
 
 
-__all__ = ["FIRST_NUMBER", "Ap238", "Assembly", "Clamping", "Frame", "TrajectoryKind", "StockBox", "StockCylinder",
+__all__ = ["FIRST_NUMBER", "Ap238", "Assembly", "Clamping", "AccessFrame", "TrajectoryKind", "StockBox", "StockCylinder",
            "Trajectory", "Workingstep", "Workplan"]

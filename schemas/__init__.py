@@ -1,4 +1,5 @@
-"""Wire models: everything that travels as JSON, each number with its unit in its name.
+"""Wire models: the JSON that clients send and receive, with the unit of every number in its name.
 
-No rule of planning stands here; only ``service`` imports these models.
+Here live the models of setup, report, zones, jobs and errors, and their checks. Nothing here plans, proves or reads a
+file.
 """

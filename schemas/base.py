@@ -1,8 +1,8 @@
-"""What all wire models share: unknown fields refused, finite numbers only, references into the libraries.
+"""Base of all wire models: unknown fields are refused, numbers are finite, and setups may refer to libraries.
 
-A *library reference* is the string ``"lib:NAME"`` or ``"lib:NAME@VERSION"`` written where an object would stand (a
-tool, the machine, the material). It is replaced by the library's entry before validation; the entries come in by the
-validation context ``{"library": {"tools": {...}, "machines": {...}, "materials": {...}}}``.
+A *library reference* is the string ``"lib:NAME"`` or ``"lib:NAME@VERSION"`` in place of an object (a tool, the machine,
+the material). The entry of the library replaces it before validation. The validation context holds the entries:
+``{"library": {"tools": {...}, "machines": {...}, "materials": {...}}}``.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Count = Annotated[int, Field(strict=True)]
 """A JSON integer; strings and booleans are refused."""
 LARGEST = 1e6
-"""Largest component of a position (mm: a kilometre) or direction; beyond it double precision has no micrometre."""
+"""Largest component of a position (mm) or direction. It is a kilometre; double precision resolves 0.001 µm there."""
 BoundedNumber = Annotated[Number, Field(ge=-LARGEST, le=LARGEST)]
 """A number of no more than ``LARGEST`` in size."""
 Triple = Annotated[list[BoundedNumber], Field(min_length=3, max_length=3)]
@@ -33,19 +33,19 @@ FaceId = Annotated[str, Field(pattern=r"^F[1-9][0-9]{0,6}$", examples=["F12"])]
 
 
 class WireModel(BaseModel):
-    """Base of everything a client may send: unknown fields are refused."""
+    """Base of everything that a client may send: unknown fields are refused."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, str_max_length=4000)
 
 
 class ReportModel(BaseModel):
-    """Base of everything the service sends: later fields may be added, so unknown ones are kept."""
+    """Base of everything that the service sends. Later versions may add fields, so unknown fields are kept."""
 
     model_config = ConfigDict(extra="allow", allow_inf_nan=False)
 
 
 def split_reference(text: str) -> tuple[str, int | None]:
-    """Name and version of what stands behind "lib:"; None for the newest.
+    """Name and version of the text after "lib:"; the version is None for the newest.
 
     >>> split_reference("finisher"), split_reference("finisher@3"), split_reference("finisher@x")
     (('finisher', None), ('finisher', 3), ('finisher@x', None))
@@ -57,16 +57,16 @@ def split_reference(text: str) -> tuple[str, int | None]:
 
 
 def library_entry(value: Any, shelf: str, info: ValidationInfo) -> Any:
-    """Replace ``"lib:NAME"`` by the entry of that shelf; anything else passes through.
+    """Replace ``"lib:NAME"`` by the entry of that shelf; any other value passes through.
 
-    value : what stands in the setup
+    value : value in the setup
     shelf : 'tools', 'machines' or 'materials'
-    info  : carries the libraries in ``context["library"]``
+    info  : has the libraries in ``context["library"]``
 
     Raises
     ------
     ValueError
-        The shelf has no such entry; the message lists the names it has.
+        The shelf has no such entry; the message lists the entries it has.
     """
     if not (isinstance(value, str) and value.startswith(LIBRARY_PREFIX)):
         return value
@@ -79,7 +79,7 @@ def library_entry(value: Any, shelf: str, info: ValidationInfo) -> Any:
 
 
 class Shelf:
-    """Annotation: the field also takes ``"lib:NAME"``, looked up on this shelf; the JSON schema says so."""
+    """Annotation: the field also accepts ``"lib:NAME"``, an entry of this shelf. The JSON schema states it too."""
 
     def __init__(self, shelf: str) -> None:
         self.shelf = shelf

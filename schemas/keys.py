@@ -1,4 +1,4 @@
-"""API keys, as the HTTP interface shows them. No secret stands in them but in the answer that made one."""
+"""API keys in the HTTP interface. A secret appears only in the answer that creates its key."""
 
 from __future__ import annotations
 
@@ -12,36 +12,37 @@ KeyScope = Literal["submit", "read", "admin", "metrics"]
 
 
 class NewKey(WireModel):
-    """A key that is wanted."""
+    """Request for a new key."""
 
     principal: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._@-]{0,63}$", examples=["mes"],
-                                    description="Whose key it is; jobs and library entries belong to this name.")]
+                                    description="Name of the owner. Jobs and library entries belong to this name.")]
     scopes: Annotated[list[KeyScope], Field(
-        min_length=1, max_length=4, description="submit: post and cancel jobs, write library entries; read: jobs, "
-                                                "files, libraries; admin: keys and shared library entries; metrics: "
-                                                "/metrics alone.")] = ["submit", "read"]
-    days: Annotated[Number | None, Field(gt=0, le=36500, description="Days until it expires; null for never.")] = 365.0
-    note: Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$", description="What it is for.")] = ""
+        min_length=1, max_length=4, description="submit: post and cancel jobs, write library entries; read: read jobs, "
+                                                "files and libraries; admin: manage keys and shared library entries; "
+                                                "metrics: read /metrics only.")] = ["submit", "read"]
+    days: Annotated[Number | None, Field(gt=0, le=36500, description="Days until the key "
+                                                                     "expires; null: never.")] = 365.0
+    note: Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$", description="Purpose of the key.")] = ""
 
 
 class Key(ReportModel):
     """A key without its secret."""
 
-    id: Annotated[str, Field(description="Second part of the key's text.", examples=["0a1b2c3d4e5f"])]
+    id: Annotated[str, Field(description="Second part of the text of the key.", examples=["0a1b2c3d4e5f"])]
     principal: str
     scopes: list[KeyScope]
     note: str = ""
     created_at: Annotated[str, Field(description="UTC, ISO 8601.")]
-    expires_at: Annotated[str | None, Field(description="UTC, ISO 8601; null for never.")] = None
-    revoked_at: Annotated[str | None, Field(description="UTC, ISO 8601; null while it is good.")] = None
-    last_used_at: Annotated[str | None, Field(description="UTC, ISO 8601, to the hour; null before its first "
+    expires_at: Annotated[str | None, Field(description="UTC, ISO 8601; null: never.")] = None
+    revoked_at: Annotated[str | None, Field(description="UTC, ISO 8601; null while the key is valid.")] = None
+    last_used_at: Annotated[str | None, Field(description="UTC, ISO 8601, rounded to the hour; null before the first "
                                                           "use.")] = None
 
 
 class MadeKey(ReportModel):
-    """A new key: its text is told this once."""
+    """A new key with its text, which is shown only once."""
 
-    key: Annotated[str, Field(description="What goes behind Authorization: Bearer.")]
+    key: Annotated[str, Field(description="Value for the header Authorization: Bearer.")]
     about: Key
 
 

@@ -1,8 +1,9 @@
-"""Workpiece materials and their stated default cutting data.
+"""Workpiece materials and their default cutting data.
 
-The figures are shop practice, deliberately low: coated solid carbide, slender tools, with coolant. What could be held
-against a source, and what could not, is in docs/theory/feeds.md. A shop with its own figures writes a material into the
-library (``/v1/materials``) or inline into the setup, or speed and feed to a tool.
+The figures are shop practice, deliberately low, for slender coated carbide tools with coolant. docs/theory/feeds.md
+says
+which of them have been checked against a source. A shop with its own figures writes a material into the library
+(``/v1/materials``) or into the setup, or gives a tool its speed and feed.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ SOURCE = "shop practice, deliberately low"
 
 
 class FeedPoint(WireModel):
-    """Feed per tooth at one cutter diameter; values between two points are interpolated linearly."""
+    """Feed per tooth at one cutter diameter; between two points the feed is interpolated linearly."""
 
     diameter_mm: Annotated[Number, Field(ge=1e-3, le=2000, description="Cutter diameter, mm.")]
     feed_per_tooth_mm: Annotated[Number, Field(ge=1e-5, le=2, description="Feed per tooth at that diameter, mm.")]
@@ -29,24 +30,26 @@ class FeedPoint(WireModel):
 class Material(WireModel):
     """A workpiece material with its cutting data."""
 
-    name: Annotated[str, Field(min_length=1, max_length=64, description="Name, as it stands in programs.",
+    name: Annotated[str, Field(min_length=1, max_length=64, description="Name, as programs state it.",
                                examples=["Ti-6Al-4V"])]
-    cutting_speed_m_min: Annotated[Number, Field(ge=0.1, le=5000, description="Cutting speed at the full diameter, "
-                                                                              "m/min.")]
+    cutting_speed_m_min: Annotated[Number, Field(
+        ge=0.1, le=5000, description="Cutting speed at the full diameter, m/min.")]
     feed_per_tooth: Annotated[list[FeedPoint], Field(
-        min_length=1, description="Feed per tooth by diameter, ascending; beyond the ends it scales with diameter.")]
+        min_length=1, description="Feed per tooth by diameter, ascending. Beyond the ends "
+                                  "it scales with the diameter.")]
     specific_cutting_force_n_mm2: Annotated[Number | None, Field(
-        ge=1, le=100000, description="kc1.1: force of a chip of 1 mm by 1 mm, N/mm2, from which the bending of tools "
-                                     "is estimated; null: it is not.")] = None
+        ge=1, le=100000, description="kc1.1: cutting force of a chip of 1 mm by 1 mm, N/mm2. The deflection of tools "
+                                     "is estimated from it; null: no estimate.")] = None
     chip_thickness_exponent: Annotated[Number | None, Field(
-        ge=0, le=0.9, description="mc: the specific cutting force of a chip h mm thick is kc1.1 / h^mc. Both or none.")
+        ge=0, le=0.9, description="mc: the specific cutting force of a chip h mm thick is kc1.1 / h^mc. Give both or "
+                                  "none.")
     ] = None
-    source: Annotated[str, Field(max_length=200, description="Where the figures come from.")] = "user"
+    source: Annotated[str, Field(max_length=200, description="Source of the figures.")] = "user"
 
     @model_validator(mode="after")
     def _both_or_none(self) -> Material:
         if (self.specific_cutting_force_n_mm2 is None) != (self.chip_thickness_exponent is None):
-            raise ValueError("specific_cutting_force_n_mm2 and chip_thickness_exponent are given both or not at all")
+            raise ValueError("specific_cutting_force_n_mm2 and chip_thickness_exponent: give both or none")
         return self
 
     @model_validator(mode="after")
@@ -95,19 +98,19 @@ _BY_KEY = {_key(n): n for n in MATERIALS} | {_key(a): n for a, n in ALIASES.item
 
 
 def find_material(name: str) -> Material:
-    """The built-in material of that name; case, blanks and hyphens do not count.
+    """The built-in material of that name; case, spaces and hyphens do not matter.
 
     Raises
     ------
     ValueError
-        No such material; the message lists the known ones.
+        There is no such material; the message lists those that exist.
 
     >>> find_material("ti6al4v").name
     'Ti-6Al-4V'
     """
     found = _BY_KEY.get(_key(name))
     if found is None:
-        raise ValueError(f"material '{name}' is not known (known: {', '.join(MATERIALS)}); "
+        raise ValueError(f"unknown material '{name}' (known: {', '.join(MATERIALS)}); "
                          "give one of these, an object with its cutting data, or 'lib:NAME'")
     return MATERIALS[found]
 

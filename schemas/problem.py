@@ -18,11 +18,12 @@ class Problem(ReportModel):
                                examples=["urn:zonemill:problem:bad-setup:bad_setup"])]
     title: Annotated[str, Field(description="Short name of the class of problem.", examples=["The setup is wrong"])]
     status: Annotated[int, Field(ge=400, le=599, description="HTTP status.")]
-    detail: Annotated[str, Field(description="What happened, one sentence.")]
+    detail: Annotated[str, Field(description="The problem in one sentence.")]
     instance: Annotated[str | None, Field(description="Path of the request or of the job.")] = None
     code: Annotated[str, Field(description="Last part of the type.", examples=["bad_setup"])]
-    subjects: Annotated[list[str], Field(description="Ids or places concerned: F12, T3, tools[0].diameter_mm.")] = []
-    measured: Annotated[Any, Field(description="What was found.")] = None
-    limit: Annotated[Any, Field(description="What would have been allowed.")] = None
-    remedy: Annotated[str, Field(description="What to do about it.")] = ""
-    request_id: Annotated[str | None, Field(description="Id of the request, as in the log.")] = None
+    subjects: Annotated[list[str], Field(description="Ids or places concerned, such as F12, T3 or "
+                                                     "tools[0].diameter_mm.")] = []
+    measured: Annotated[Any, Field(description="Value that was found.")] = None
+    limit: Annotated[Any, Field(description="Value or values that are allowed.")] = None
+    remedy: Annotated[str, Field(description="How to solve the problem.")] = ""
+    request_id: Annotated[str | None, Field(description="Id of the request, the same as in the log.")] = None

@@ -1,7 +1,7 @@
-"""SETUP.json: everything about a job but the part. Lengths are always mm; unknown fields are refused.
+"""SETUP.json: everything about a job except the part. Lengths are always mm; unknown fields are refused.
 
-Only ``tools`` must be given. ``canonical_json`` and ``setup_sha256`` see the setup with all defaults filled
-in, so leaving a field out and writing its default are the same job.
+Only ``tools`` is required. ``canonical_json`` and ``setup_sha256`` use the setup with all defaults filled in, so a
+missing field and its default value are the same job.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ Box = Annotated[list[Triple], Field(min_length=2, max_length=2, description="Low
 
 
 class PartChoice(WireModel):
-    """Which body of the STEP file is meant."""
+    """The body of the STEP file to machine."""
 
-    solid: Annotated[Count | None, Field(ge=1, description="1-based number of one of several separate solids; null: "
-                                                           "the only one.")] = None
+    solid: Annotated[Count | None, Field(ge=1, description="Number of the solid, from 1, where the file has several "
+                                                           "separate solids; null: the only one.")] = None
 
 
 class Placement(WireModel):
     """The setup frame in STEP coordinates; its origin is program zero."""
 
     origin_mm: Annotated[Triple, Field(description="Origin of the setup frame, mm; within 1e6 of 0.")] = [0.0, 0.0, 0.0]
-    z_axis: Annotated[Triple, Field(description="Z of the setup frame; any length from 1e-6, components within "
-                                                "1e6.")] = [0.0, 0.0, 1.0]
-    x_axis: Annotated[Triple, Field(description="X of the setup frame, at right angles to Z; length as of "
-                                                "z_axis.")] = [1.0, 0.0, 0.0]
+    z_axis: Annotated[Triple, Field(description="Z of the setup frame; any length from "
+                                                "1e-6, components within 1e6.")] = [0.0, 0.0, 1.0]
+    x_axis: Annotated[Triple, Field(description="X of the setup frame, perpendicular to Z; "
+                                                "length as for z_axis.")] = [1.0, 0.0, 0.0]
 
     @model_validator(mode="after")
     def _check(self) -> Placement:
@@ -55,13 +55,13 @@ class Placement(WireModel):
 
 
 class Access(WireModel):
-    """A direction the part is machined from: tool tip to spindle, in the setup frame."""
+    """A direction from which the part is machined: tool tip to spindle, in the setup frame."""
 
     id: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9]{0,15}$", description="Id of the access.")] = "A1"
     direction: Annotated[Triple, Field(
-        description="Tool axis, any length but zero. On a 3-axis machine the program of this access is in the frame "
-                    "whose Z is this axis and whose X is the part of the setup's X square to it; on a 5-axis one all "
-                    "accesses are one program in the setup frame.")] = [0.0, 0.0, 1.0]
+        description="Tool axis, of any length above zero. On a 3-axis machine each access has its own program and "
+                    "frame: Z is this axis, and X is the X of the setup frame projected perpendicular to it. On a "
+                    "5-axis machine all accesses are one program in the setup frame.")] = [0.0, 0.0, 1.0]
     work_offset: Annotated[str, Field(pattern=r"^G5(4|5|6|7|8|9(\.[123])?)$", description="Work offset, G54 to G59, "
                                       "G59.1 to G59.3.")] = "G54"
 
@@ -77,35 +77,35 @@ class Access(WireModel):
 class Cylinder(WireModel):
     """A cylinder along Z of the setup frame."""
 
-    x: Annotated[Number, Field(ge=-1e6, le=1e6, description="Where its axis stands, mm.")] = 0.0
-    y: Annotated[Number, Field(ge=-1e6, le=1e6, description="Where its axis stands, mm.")] = 0.0
+    x: Annotated[Number, Field(ge=-1e6, le=1e6, description="Position of its axis, mm.")] = 0.0
+    y: Annotated[Number, Field(ge=-1e6, le=1e6, description="Position of its axis, mm.")] = 0.0
     bottom: Annotated[Number, Field(ge=-1e6, le=1e6, description="Height of its lower end, mm.")]
     diameter: Annotated[Number, Field(gt=0, le=1e6, description="mm.")]
     height: Annotated[Number, Field(gt=0, le=1e6, description="mm.")]
 
 
 class Stock(WireModel):
-    """The blank the job starts from."""
+    """The blank from which the job starts."""
 
     kind: Annotated[Literal["part_offset", "box", "cylinder", "step"], Field(
-        description="part_offset: the part grown by margin_mm; box: see box_mm; cylinder: see cylinder_mm; step: the "
-                    "solid of a STEP file, see step_file.")
+        description="part_offset: the part, enlarged by margin_mm; box: see box_mm; cylinder: see cylinder_mm; step: "
+                    "the solid of a STEP file, see step_file.")
         ] = "part_offset"
-    margin_mm: Annotated[Number, Field(ge=0, le=1000, description="How far the blank stands off the part, mm.")] = 1.0
-    uncertainty_mm: Annotated[Number, Field(ge=0, le=100, description="How far the real blank may stand beyond the "
-                                                                      "nominal one, mm.")] = 0.5
+    margin_mm: Annotated[Number, Field(ge=0, le=1000, description="Distance between part and blank, mm.")] = 1.0
+    uncertainty_mm: Annotated[Number, Field(
+        ge=0, le=100, description="How much larger the real blank may be than the nominal one, mm.")] = 0.5
     box_mm: Annotated[Box | None, Field(
-        description="Corners of a box blank in the setup frame, mm; null: the part's bounding box grown by "
+        description="Corners of a box blank in the setup frame, mm; null: the bounding box of the part, enlarged by "
                     "margin_mm.")] = None
     cylinder_mm: Annotated[Cylinder | None, Field(
-        description="A cylinder blank along Z of the setup frame, mm; null: round the part's bounding box, grown by "
-                    "margin_mm aside and on top.")] = None
+        description="A cylinder blank along Z of the setup frame, mm; null: around the bounding box of the part, "
+                    "enlarged by margin_mm at the side and on top.")] = None
     step_file: Annotated[str | None, Field(
         min_length=1, max_length=1000, pattern=r"^[^\x00-\x1f\x7f]*$",
-        description="The STEP file of a step blank, one closed solid in the coordinates of the part's file. On the "
-                    "command line its path, from the folder of the setup; over HTTP the file is sent as part 'stock' "
-                    "of the request and this name is not looked at. Its bytes count in the content of a job, its name "
-                    "does not.")] = None
+        description="STEP file of a blank with kind step: one closed solid in the coordinates of the part's file. On "
+                    "the command line it is a path, relative to the folder of the setup. Over HTTP the request sends "
+                    "the file as part 'stock', and this name is ignored. The bytes of the file count in the content "
+                    "hash of a job, its name does not.")] = None
 
     @model_validator(mode="after")
     def _check(self) -> Stock:
@@ -121,7 +121,7 @@ class Stock(WireModel):
 
 
 class Fixture(WireModel):
-    """A box that nothing may touch."""
+    """A box that no tool and no holder may touch."""
 
     box_mm: Annotated[Box, Field(description="Lower and upper corner in the setup frame, mm.")]
 
@@ -132,78 +132,84 @@ class Fixture(WireModel):
 
 
 class Clearance(WireModel):
-    """Radial distances kept to the part and to the stock that stands there, mm."""
+    """Radial distances to the part and to the stock, mm."""
 
     neck: Annotated[Number, Field(ge=0, le=100, description="Neck, mm.")] = 0.05
     shank: Annotated[Number, Field(ge=0, le=100, description="Shank, mm.")] = 0.2
     holder: Annotated[Number, Field(ge=0, le=100, description="Holder, mm.")] = 1.0
-    rapid: Annotated[Number, Field(ge=0, le=100, description="The whole tool in a rapid, mm.")] = 1.0
+    rapid: Annotated[Number, Field(ge=0, le=100, description="The whole tool during a rapid, mm.")] = 1.0
 
 
 class Quality(WireModel):
-    """What the finished surface must keep."""
+    """Requirements on the finished surface."""
 
-    scallop_height_mm: Annotated[Number, Field(ge=1e-4, description="Highest cusp between passes, along the "
-                                                                          "normal, mm; from 0.0001.")] = 0.01
-    chordal_tolerance_mm: Annotated[Number, Field(ge=1e-4, le=1, description="Greatest distance of path to "
-                                                  "surface along a pass, mm; from 0.0001.")] = 0.002
-    gouge_tolerance_mm: Annotated[Number, Field(ge=1e-3, le=1, description="Deepest cut into the part that is no "
-                                                "finding, mm; from 0.001, for the mesh must be finer still.")] = 0.01
+    scallop_height_mm: Annotated[Number, Field(
+        ge=1e-4, description="Largest scallop height between passes, along the normal, mm; from 0.0001.")] = 0.01
+    chordal_tolerance_mm: Annotated[Number, Field(
+        ge=1e-4, le=1, description="Largest distance from path to surface along a pass, mm; from 0.0001.")] = 0.002
+    gouge_tolerance_mm: Annotated[Number, Field(
+        ge=1e-3, le=1, description="Deepest cut into the part that is not a finding, mm; from 0.001, since the mesh "
+                                   "must be finer.")] = 0.01
     stock_allowance_mm: Annotated[Number, Field(ge=0, le=50, description="Material left on the part, mm.")] = 0.0
-    coverage_min: Annotated[Number, Field(ge=0, le=1, description="Least share of the machinable area for state "
-                                                                  "proved.")] = 0.0
+    coverage_min: Annotated[Number, Field(
+        ge=0, le=1, description="Smallest share of the machinable area for the state proved.")] = 0.0
 
 
 class Lean(WireModel):
-    """How far a nose leans off the normal of the face it finishes."""
+    """Lead and tilt of ball and bull-nose tools, from the normal of the face that they finish."""
 
-    lead_deg: Annotated[Number, Field(ge=0, le=60, description="Forwards along the pass, degrees. Over 7 the tool goes "
-                                                               "up between passes one way and back.")] = 0.0
-    tilt_deg: Annotated[Number, Field(ge=0, le=60, description="Aside of the pass, degrees, to the side where more of "
-                                                               "the passes is free.")] = 0.0
+    lead_deg: Annotated[Number, Field(
+        ge=0, le=60, description="Lead: angle forward along the pass, degrees. Above 7 the tool retracts between "
+                                 "passes of opposite directions.")] = 0.0
+    tilt_deg: Annotated[Number, Field(
+        ge=0, le=60, description="Tilt: angle across the pass, degrees, to the side where "
+                                 "more of the passes is free.")] = 0.0
     walls_tilt_deg: Annotated[Number | None, Field(
-        ge=0, le=89, description="The same on walls, without a lead; null: they are cut upright, or by flanks.")] = None
+        ge=0, le=89, description="Tilt on walls, degrees, without a lead; null: walls are cut upright or with the "
+                                 "flank of the tool.")] = None
 
     @property
     def asked(self) -> bool:
-        """Whether anything is to lean."""
+        """Whether any lead or tilt is set."""
         return self.lead_deg > 0 or self.tilt_deg > 0 or self.walls_tilt_deg is not None
 
 
 class Operations(WireModel):
-    """What to do and where."""
+    """What to machine, and how."""
 
-    roughing: Annotated[bool, Field(description="Take the stock off in layers first.")] = True
+    roughing: Annotated[bool, Field(description="Remove the stock in layers first.")] = True
     semi_finishing: Annotated[bool, Field(
-        description="After its layers a tool also goes over what stands between them, so that leaning walls and floors "
-                    "keep even stock: uneven by no more than a quarter of its deepest layer.")] = False
+        description="After its layers a tool also cuts the steps between them, so that inclined walls and floors keep "
+                    "even stock. It varies by at most a quarter of the deepest layer.")] = False
     finishing: Annotated[bool, Field(description="Finish the zones.")] = True
-    faces: Annotated[list[FaceId] | None, Field(description="Faces to machine; null: all that are in reach.")] = None
-    exclude_faces: Annotated[list[FaceId], Field(description="Faces to leave alone.")] = []
+    faces: Annotated[list[FaceId] | None, Field(description="Faces to machine; null: all faces within reach.")] = None
+    exclude_faces: Annotated[list[FaceId], Field(description="Faces to leave uncut.")] = []
     cut_direction: Annotated[Literal["climb", "conventional", "either"], Field(
         description="Direction of cut on walls.")] = "climb"
     pattern: Annotated[Literal["auto", "zigzag", "one_way", "spiral"], Field(
-        description="Passes over shallow area. auto: zigzag or spiral, whichever is less way.")] = "auto"
+        description="Pattern of passes on shallow areas. auto: zigzag or spiral, whichever is shorter.")] = "auto"
     lean: Annotated[Lean, Field(
-        description="On a 5-axis machine: balls and bull noses lean that far off the normal of faces that are not "
-                    "level, so that their centre does not rub; where they would meet something so, by the nearest axis "
-                    "that is free, up to 45 degrees off, turning evenly. Flanks and matched ends go first where they "
-                    "leave as little upright and are faster. Where no axis is free, and on level faces, the tool "
-                    "stays upright. Without lead and tilt tools lean where that is faster.")] = Lean()
+        description="On a 5-axis machine, ball and bull-nose tools are tilted by these angles from the normal of faces "
+                    "that are not level, so that their centre does not rub. Where the tool would collide, it takes the "
+                    "nearest free axis, up to 45 degrees away, and turns evenly. Flank milling and curvature-matched "
+                    "passes come first where they are faster and leave as little area upright. The tool stays upright "
+                    "where no axis is free, and on level faces. Without lead and tilt, tools are tilted where that is "
+                    "faster.")] = Lean()
     walls_in_turn: Annotated[bool, Field(
-        description="Both sides of a wall more than 10 times as high as thick go down in turn, so that it is never "
-                    "free for more than 10 times its thickness where it is finished; a program of one access on a "
-                    "3-axis machine that does not keep to that is not proved, of others it is a warning. false: such "
-                    "walls are held otherwise, and it is a warning.")] = True
+        description="true: both sides of a wall that is more than 10 times as high as thick are finished in "
+                    "alternating bands of depth. Where it is finished, no more than 10 times its thickness stands "
+                    "free. A program of one access on a 3-axis machine that breaks this rule is not proved; other "
+                    "programs get a warning. false: such walls are supported by other means, and the plan has a "
+                    "warning.")] = True
 
     @model_validator(mode="after")
     def _check(self) -> Operations:
         if not (self.roughing or self.finishing):
             raise ValueError("operations.roughing and operations.finishing are both false: nothing to do")
         if self.semi_finishing and not self.roughing:
-            raise ValueError("operations.semi_finishing goes over what layers leave, and operations.roughing is false")
+            raise ValueError("operations.semi_finishing needs operations.roughing, which is false")
         if both := sorted(set(self.faces or ()) & set(self.exclude_faces)):
-            raise ValueError(f"faces {', '.join(both)} stand in operations.faces and in exclude_faces")
+            raise ValueError(f"faces {', '.join(both)} are in operations.faces and in operations.exclude_faces")
         return self
 
 
@@ -213,7 +219,7 @@ Labels = Annotated[dict[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,
 
 
 def _describe(schema: dict[str, Any]) -> None:
-    """Example, and defaults that generated clients can write down: an object for a union field they cannot."""
+    """Adds an example, and defaults for generated clients: an object for a union field, which they cannot construct."""
     schema["examples"] = [{
         "tools": [{"id": "T1", "kind": "ball", "diameter_mm": 3, "flute_length_mm": 9, "neck_diameter_mm": 2.8,
                    "neck_length_mm": 20, "shank_diameter_mm": 6, "stickout_mm": 45,
@@ -224,22 +230,22 @@ def _describe(schema: dict[str, Any]) -> None:
 
 
 class Setup(WireModel):
-    """A setup: tools, machine, stock and the quality asked for. Only ``tools`` has no default."""
+    """A setup: tools, machine, stock and required quality. Only ``tools`` has no default."""
 
     model_config = {"json_schema_extra": lambda schema: _describe(schema)}
 
-    part: Annotated[PartChoice, Field(description="Which solid of the STEP file.")] = PartChoice()
+    part: Annotated[PartChoice, Field(description="The solid of the STEP file.")] = PartChoice()
     placement: Annotated[Placement, Field(description="The setup frame in STEP coordinates.")] = Placement()
     access: Annotated[list[Access], Field(min_length=1, max_length=6,
-                                          description="Directions to machine from.")] = [Access()]
+                                          description="Directions from which the part is machined.")] = [Access()]
     tools: Annotated[list[Annotated[Tool, Shelf("tools")]], Field(min_length=1, max_length=200,
-                                                                  description="Tools at hand, or 'lib:NAME'.")]
+                                                                  description="Available tools, or 'lib:NAME'.")]
     machine: Annotated[Machine, Shelf("machines"), Field(description="Machine, or 'lib:NAME'.")] = Machine()
     stock: Annotated[Stock, Field(description="The blank.")] = Stock()
-    fixtures: Annotated[list[Fixture], Field(max_length=200, description="Boxes nothing may touch.")] = []
+    fixtures: Annotated[list[Fixture], Field(max_length=200, description="Boxes that nothing may touch.")] = []
     clearance_mm: Annotated[Clearance, Field(description="Radial clearances.")] = Clearance()
-    quality: Annotated[Quality, Field(description="What the surface must keep.")] = Quality()
-    operations: Annotated[Operations, Field(description="What to do and where.")] = Operations()
+    quality: Annotated[Quality, Field(description="Requirements on the surface.")] = Quality()
+    operations: Annotated[Operations, Field(description="What to machine, and how.")] = Operations()
     material: Annotated[MaterialField, Field(
         description=f"Built-in material ({', '.join(MATERIALS)}), 'lib:NAME', or an object.")] = MATERIALS["Ti-6Al-4V"]
     labels: Labels = {}
@@ -253,14 +259,13 @@ class Setup(WireModel):
             raise ValueError(f"quality.scallop_height_mm {self.quality.scallop_height_mm:g} is not below the radius "
                              f"{smallest.diameter_mm / 2:g} of the smallest tool {smallest.id}")
         if self.operations.lean.asked and not (self.machine.kind == "5-axis" and self.machine.simultaneous):
-            raise ValueError("operations.lean wants tools to lean while they cut, and the rotary axes of this machine "
-                             "do not move then; give machine.kind '5-axis' with machine.simultaneous true, or leave "
-                             "operations.lean out")
+            raise ValueError("operations.lean tilts tools while they cut, which this machine cannot do; "
+                             "set machine.kind '5-axis' and machine.simultaneous true, or leave operations.lean out")
         return self
 
 
 def _check_accesses(access: list[Access]) -> None:
-    """Refuse two accesses of one id, or of one direction."""
+    """Refuse two accesses with one id or one direction."""
     for k, a in enumerate(access):
         for b in access[:k]:
             if a.id == b.id:
@@ -268,7 +273,7 @@ def _check_accesses(access: list[Access]) -> None:
             cosine = sum(p * q for p, q in zip(a.direction, b.direction, strict=True))
             cosine /= math.hypot(*a.direction) * math.hypot(*b.direction)
             if cosine > SAME_DIRECTION:
-                raise ValueError(f"access {a.id} has the direction of {b.id}; leave one of them out")
+                raise ValueError(f"access {a.id} has the same direction as {b.id}; leave one of them out")
 
 
 def _check_box(box: list[list[float]], name: str) -> None:
@@ -277,10 +282,11 @@ def _check_box(box: list[list[float]], name: str) -> None:
 
 
 def canonical_json(setup: Setup) -> bytes:
-    """The setup as canonical JSON: all defaults filled in, keys sorted, no blanks, UTF-8.
+    """The setup as canonical JSON: all defaults filled in, keys sorted, no spaces, UTF-8.
 
-    Two setups that mean the same give the same bytes: 3 and 3.0 too, as every number field is one float. What the file
-    of a blank is called is left out.
+    Equal setups give equal bytes, also for 3 and 3.0, since every number field is a float. The file name of a blank is
+    left
+    out.
     """
     data = setup.model_dump(mode="json", exclude={"stock": {"step_file"}})
     return json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
@@ -292,9 +298,9 @@ def setup_sha256(setup: Setup) -> str:
 
 
 def content_hash(part_bytes: bytes, setup: Setup, stock_bytes: bytes | None = None) -> str:
-    """What makes two jobs the same: SHA-256 over the hashes of the part's bytes and of the canonical setup, hex.
+    """Identity of a job: SHA-256 over the hashes of the part's bytes and of the canonical setup, hex.
 
-    The bytes of a blank's file count too where there is one. File name, media type and multipart boundary do not.
+    The bytes of a blank's file count too. File name, media type and multipart boundary do not.
     """
     text = f"{hashlib.sha256(part_bytes).hexdigest()}:{setup_sha256(setup)}"
     if stock_bytes is not None:

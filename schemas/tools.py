@@ -1,4 +1,4 @@
-"""Tools as they stand in a setup; every length in mm from the tip upwards."""
+"""Tools of a setup; every length in mm from the tip upwards."""
 
 from __future__ import annotations
 
@@ -42,54 +42,56 @@ class Tool(WireModel):
     id: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}$", description="Id of the tool.",
                              examples=["T1"])]
     number: Annotated[Count | None, Field(
-        ge=1, le=99999, description="T and H word of the program; default: the digits of the id where unique, else "
-                                    "the place in the list.")] = None
-    kind: Annotated[ToolKind, Field(description="Shape of the cutting end; tapered_ball and barrel are not built yet.")]
-    diameter_mm: Annotated[Length, Field(ge=0.01, description="Diameter of the cutting part, mm; from 0.01.")]
+        ge=1, le=99999, description="T and H word of the program. Default: the digits of the id where they are unique, "
+                                    "otherwise the position in the list.")] = None
+    kind: Annotated[ToolKind, Field(description="Shape of the cutting end. tapered_ball and barrel are not available "
+                                                "yet.")]
+    diameter_mm: Annotated[Length, Field(ge=0.01, description="Diameter of the cutting part, mm, from 0.01.")]
     corner_radius_mm: Annotated[Number, Field(
-        ge=0, description="Corner radius, mm: a bull nose needs it, a flat has 0; for a ball 0 means half the "
-                          "diameter.")] = 0.0
-    taper_angle_deg: Annotated[Number, Field(ge=0, lt=90, description="0 for every kind built so far.")] = 0.0
-    profile_radius_mm: Annotated[Number | None, Field(gt=0, description="Barrels only; null so far.")] = None
+        ge=0, description="Corner radius, mm. A bull nose needs it, a flat end mill has 0. For a ball, 0 means half "
+                          "the diameter.")] = 0.0
+    taper_angle_deg: Annotated[Number, Field(ge=0, lt=90, description="0 for every kind available so far.")] = 0.0
+    profile_radius_mm: Annotated[Number | None, Field(
+        gt=0, description="For barrels only; null for every kind available so far.")] = None
     flutes: Annotated[Count, Field(ge=1, le=50, description="Number of teeth.")] = 2
     flute_length_mm: Annotated[Length | None, Field(
-        description="Tip to the end of the cutting part, mm; default: 3 x diameter_mm, but no more than "
-                    "neck_length_mm and stickout_mm where given.")] = None
-    center_cutting: Annotated[bool, Field(description="The end cuts to the centre.")] = True
-    neck_diameter_mm: Annotated[Length | None, Field(description="Diameter of the relieved part, mm; default: "
-                                                                 "diameter_mm.")] = None
-    neck_length_mm: Annotated[Length | None, Field(description="Tip to shank, mm; default: flute_length_mm, that "
-                                                               "is, no neck.")] = None
-    shank_diameter_mm: Annotated[Length | None, Field(description="Diameter of the shank, mm; default: "
-                                                                  "diameter_mm.")] = None
+        description="Tip to the end of the cutting part, mm. Default: 3 x diameter_mm, but not more than "
+                    "neck_length_mm and stickout_mm where they are given.")] = None
+    center_cutting: Annotated[bool, Field(description="Whether the end cuts to the centre.")] = True
+    neck_diameter_mm: Annotated[Length | None, Field(
+        description="Diameter of the relieved part, mm. Default: diameter_mm.")] = None
+    neck_length_mm: Annotated[Length | None, Field(
+        description="Tip to shank, mm. Default: flute_length_mm, which means no neck.")] = None
+    shank_diameter_mm: Annotated[Length | None, Field(description="Diameter of the shank, "
+                                                                  "mm. Default: diameter_mm.")] = None
     stickout_mm: Annotated[Length | None, Field(
-        description="Tip to holder nose, mm. Must be given with a holder; without one the default is the greater of "
+        description="Tip to holder nose, mm. Required with a holder. Default without one: the greater of "
                     "neck_length_mm and 10 x diameter_mm.")] = None
     _gauge_given: bool = PrivateAttr(default=False)
     gauge_length_mm: Annotated[Length | None, Field(
-        description="Tip to spindle face, mm, for the length offset, the travel in Z and kinematics only; default: "
-                    "stickout_mm + the holder's lengths.")] = None
-    max_rpm: Annotated[Number | None, Field(ge=1, le=1e6, description="Highest spindle speed, 1/min; null: no limit of "
-                                                                       "the tool's own.")] = None
+        description="Tip to spindle face, mm. Used for the length offset, the travel in Z and the kinematics only. "
+                    "Default: stickout_mm plus the lengths of the holder.")] = None
+    max_rpm: Annotated[Number | None, Field(
+        ge=1, le=1e6, description="Highest spindle speed of the tool, 1/min; null: no limit.")] = None
     max_engagement_deg: Annotated[Number | None, Field(
-        ge=30, le=180, description="Most of the front half of the cutter that may be in stock, deg, where it cuts "
-                                   "deeper than a twentieth of its radius; 180 is a slot. No less than 30: the proof "
-                                   "tells angles apart by 11. null: not limited.")] = None
+        ge=30, le=180, description="Largest engagement of the front half of the cutter, deg, at depths of more than a "
+                                   "twentieth of its radius. 180 is a slot. At least 30, since the proof resolves 11. "
+                                   "null: no limit.")] = None
     life_min: Annotated[Number | None, Field(
-        gt=0, le=1e6, description="Life in cut, min: plans ask for a fresh cutter before it ends, between two passes; "
-                                  "null: not counted.")] = None
+        gt=0, le=1e6, description="Tool life in cut, min. Plans request a fresh cutter between two passes before it "
+                                  "ends. null: not counted.")] = None
     spindle_rpm: Annotated[Number | None, Field(
-        ge=1, le=1e6, description="Spindle speed, 1/min, of all its steps; null: from the material. No more than "
-                                  "max_rpm and machine.max_rpm allow.")] = None
+        ge=1, le=1e6, description="Spindle speed of all its steps, 1/min, at most max_rpm and machine.max_rpm. null: "
+                                  "from the material.")] = None
     feed_mm_min: Annotated[Number | None, Field(
-        ge=0.1, le=1e6, description="Feed in cut, mm/min, of all its steps; null: from material, flutes and speed. No "
-                                    "more than machine.max_feed_mm_min allows.")] = None
+        ge=0.1, le=1e6, description="Cutting feed of all its steps, mm/min, at most machine.max_feed_mm_min. null: "
+                                    "from material, flutes and speed.")] = None
     plunge_feed_mm_min: Annotated[Number | None, Field(
-        ge=0.1, le=1e6, description="How fast it may go down into the stock, mm/min: straight down, and on ramps "
-                                    "and helices as far as these go down; null: 0.3 of the feed in cut. No more than "
-                                    "machine.max_feed_mm_min allows.")] = None
-    holder: Annotated[list[HolderSegment], Field(max_length=50, description="Holder, upwards from its nose; empty: "
-                                                                            "no holder is checked.")] = []
+        ge=0.1, le=1e6, description="Downward feed into stock, mm/min: the feed of a plunge, and the downward part of "
+                                    "the feed on ramps and helices. At most machine.max_feed_mm_min. null: 0.3 of the "
+                                    "cutting feed.")] = None
+    holder: Annotated[list[HolderSegment], Field(
+        max_length=50, description="Segments of the holder, upwards from its nose; empty: no holder is checked.")] = []
 
     @model_validator(mode="after")
     def _check(self) -> Tool:
@@ -101,18 +103,18 @@ class Tool(WireModel):
     def _check_kind(self) -> None:
         radius = self.diameter_mm / 2
         if self.kind not in BUILT_KINDS:
-            raise ValueError(f"tool {self.id}: kind '{self.kind}' is not built yet; "
+            raise ValueError(f"tool {self.id}: kind '{self.kind}' is not available yet; "
                              f"use one of {', '.join(BUILT_KINDS)}")
         if self.taper_angle_deg != 0 or self.profile_radius_mm is not None:
             raise ValueError(f"tool {self.id}: taper_angle_deg and profile_radius_mm belong to tapered and barrel "
-                             "tools, which are not built yet; leave them at 0 and null")
+                             "tools, which are not available yet; leave them at 0 and null")
         if self.corner_radius_mm > radius + LENGTH_EPSILON:
             raise ValueError(f"tool {self.id}: corner_radius_mm {self.corner_radius_mm:g} is larger than half the "
                              f"diameter, {radius:g}")
         if self.kind == "flat" and self.corner_radius_mm != 0:
-            raise ValueError(f"tool {self.id}: a flat end mill has corner_radius_mm 0; call it bull")
+            raise ValueError(f"tool {self.id}: a flat end mill has corner_radius_mm 0; use kind bull")
         if self.kind == "bull" and self.corner_radius_mm == 0:
-            raise ValueError(f"tool {self.id}: a bull nose needs a corner_radius_mm above 0; call it flat")
+            raise ValueError(f"tool {self.id}: a bull nose needs a corner_radius_mm above 0; use kind flat")
         if self.kind == "ball":
             if self.corner_radius_mm not in (0, radius) and abs(self.corner_radius_mm - radius) > LENGTH_EPSILON:
                 raise ValueError(f"tool {self.id}: the corner_radius_mm of a ball is half its diameter, {radius:g}, "
@@ -141,7 +143,7 @@ class Tool(WireModel):
 
     @property
     def gauge_given(self) -> bool:
-        """Whether somebody gave the gauge length; else it is the default."""
+        """Whether the setup gives the gauge length; otherwise it is the default."""
         return self._gauge_given
 
     def _check_lengths(self) -> None:
@@ -166,16 +168,16 @@ def _given(value: float | None) -> float:
 
 
 def default_numbers(tools: list[Tool]) -> dict[str, int]:
-    """Tool numbers by id: as given, else the digits of the id where unique, else the place in the list.
+    """Tool numbers by id: as given, else the digits of the id where they are unique, else the position in the list.
 
     Raises
     ------
     ValueError
-        Two tools end up with the same number, or share an id.
+        Two tools have the same number or the same id.
     """
     ids = [t.id for t in tools]
     if doubled := sorted({i for i in ids if ids.count(i) > 1}):
-        raise ValueError(f"tool ids must be unique; {', '.join(doubled)} stands more than once")
+        raise ValueError(f"tool ids must be unique; {', '.join(doubled)} occurs more than once")
     digits = ["".join(c for c in t.id if c.isdigit()) for t in tools]
     numbers: dict[str, int] = {}
     for place, (tool, own) in enumerate(zip(tools, digits, strict=True), start=1):

@@ -1,4 +1,4 @@
-"""zones.json: what the decomposition of a part found."""
+"""zones.json: the decomposition of a part into zones."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Level = Literal["simple", "medium", "high"]
 
 
 class PartFacts(ReportModel):
-    """The part as it was read."""
+    """The part as read."""
 
     faces: Annotated[int, Field(ge=1, description="Number of B-rep faces.")]
     volume_mm3: float
@@ -29,33 +29,35 @@ class WallFacts(ReportModel):
 
 
 class ConnectionFacts(ReportModel):
-    """Material that bridges a channel; one wall id twice = two stretches of one wall."""
+    """Material that bridges a channel. One wall id twice means two stretches of one wall."""
 
     id: Annotated[str, Field(examples=["C2"])]
     walls: Annotated[list[str], Field(min_length=2)]
 
 
 class ChannelFacts(ReportModel):
-    """The void between two facing walls."""
+    """The space between two facing walls."""
 
     id: Annotated[str, Field(examples=["H1"])]
     walls: list[str]
-    gap_min_mm: Annotated[float, Field(description="Least outward ray distance between the walls' sides, connections "
-                                                   "and their fillets left out, mm.")]
+    gap_min_mm: Annotated[float, Field(description="Smallest distance between the sides of the walls, mm, along "
+                                                   "outward rays, without connections and their fillets.")]
 
 
 class AccessFacts(ReportModel):
-    """A tool axis that zones are cut along."""
+    """A tool axis along which zones are cut."""
 
     id: Annotated[str, Field(examples=["A1", "I1"])]
-    axis: Annotated[list[float], Field(min_length=3, max_length=3, description="Tip to spindle, setup frame, unit.")]
-    found: Annotated[bool, Field(description="Looked for by the planner on a 5-axis machine; else of the setup.")]
+    axis: Annotated[list[float], Field(
+        min_length=3, max_length=3, description="Unit vector from tip to spindle, setup frame.")]
+    found: Annotated[bool, Field(description="true: the planner found this axis on a 5-axis machine. false: the setup "
+                                             "gave it.")]
     rotary_deg: Annotated[list[float] | None, Field(
-        description="How tilting and turning axis stand for it, but for whole turns; null on a 3-axis machine.")]
+        description="Angles of the tilting and the turning axis, deg, up to whole turns; null on a 3-axis machine.")]
 
 
 class Rejection(ReportModel):
-    """A strategy or tool that was considered and not taken."""
+    """A strategy or tool that was considered and rejected."""
 
     reason: str
     strategy: str | None = None
@@ -65,82 +67,82 @@ class Rejection(ReportModel):
 
 
 class SideProfile(ReportModel):
-    """Profile of one side of a wall in plan."""
+    """Profile of one side of a wall, in plan view."""
 
     wall: Annotated[str, Field(examples=["W1"])]
     profile: Annotated[str | None, Field(description="C1 to C10; null: straight.")] = None
     level: Level
-    margin: Annotated[float, Field(ge=0, le=1, description="Least relative change of a measure that would change the "
-                                                           "type.")]
+    margin: Annotated[float, Field(ge=0, le=1, description="Smallest relative change of a measure that would change "
+                                                           "the type.")]
 
 
 class ApproachCone(ReportModel):
-    """A circular cone of tool axes by each of which the tool gets to all of a zone."""
+    """A circular cone of tool axes. With each of them the tool reaches the whole zone."""
 
     axis: Annotated[list[float], Field(min_length=3, max_length=3, description="Tip to spindle, setup frame.")]
     half_angle_deg: float
-    resolution_deg: Annotated[float, Field(description="How far the half angle may be off.")]
+    resolution_deg: Annotated[float, Field(description="Uncertainty of the half angle, deg.")]
 
 
 class Patch(ReportModel):
-    """What a zone holds of a face, as a trimmed face."""
+    """The part of a face that belongs to a zone, as a trimmed face."""
 
     face: Annotated[str, Field(examples=["F12"])]
     area_mm2: float
-    whole: Annotated[bool, Field(description="The zone holds all of the face.")]
-    loops: Annotated[int, Field(description="Borders: the outer one and the holes.")]
+    whole: Annotated[bool, Field(description="The whole face belongs to the zone.")]
+    loops: Annotated[int, Field(description="Borders: the outer one, then the holes.")]
 
 
 class ZoneFacts(ReportModel):
-    """A machinable zone with its tool, axis and depth; the figures of passes and proof stand only in a report."""
+    """A machinable zone with its tool, axis and depth. Only a report has the figures of passes and proof."""
 
     id: Annotated[str, Field(examples=["Z3"])]
-    kind: Annotated[Literal["SCZ", "SCZI"] | None, Field(description="Split computable zone; SCZI: on, under or over "
-                                                                    "a connection.")] = None
+    kind: Annotated[Literal["SCZ", "SCZI"] | None, Field(
+        description="SCZ: split computable zone; SCZI: the same on, under or over a connection.")] = None
     profile: Annotated[str | None, Field(description="Profile type C1 to C10 of the most complex side; null: straight, "
                                                      "or no wall.")] = None
     level: Annotated[Level | None, Field(description="Complexity of the profile; null: no wall.")] = None
-    profiles: Annotated[list[SideProfile], Field(description="The sides of walls the zone lies on.")] = []
+    profiles: Annotated[list[SideProfile], Field(description="The sides of walls on which the zone lies.")] = []
     open: Annotated[bool | None, Field(description="Passes can leave the zone sideways at their level.")] = None
     region: Annotated[str | None, Field(examples=["H1", "H1.2", "H1 over C2", "W1", "C2", "top", "floor",
                                                   "free"])] = None
-    merged: Annotated[list[str], Field(description="Cells over or under connections that were joined to it.")] = []
+    merged: Annotated[list[str], Field(description="Cells over or under connections that were merged into it.")] = []
     form: Literal["level", "shallow", "steep"] | None = None
     faces: list[Any] = []
-    patches: Annotated[list[Patch], Field(description="The same as trimmed faces.")] = []
+    patches: Annotated[list[Patch], Field(description="The same area as trimmed faces.")] = []
     access: str | None = None
     tool: str | None = None
     axis: Annotated[list[float] | None, Field(description="Tool axis in the setup frame.")] = None
     approach: ApproachCone | None = None
     depth_mm: Annotated[list[float] | None, Field(description="Top and bottom along the axis, mm.")] = None
-    cutting_plane_mm: Annotated[float | None, Field(description="Height along the axis below which the tool is not "
-                                                                "asked.")] = None
+    cutting_plane_mm: Annotated[float | None, Field(
+        description="Height along the axis, mm, below which the tool is not used.")] = None
     area_mm2: float | None = None
     strategy: str | None = None
     rejected: list[Rejection] = []
 
 
 class ComputableZone(ReportModel):
-    """Main computable zone: what one tool can touch along one axis."""
+    """Main computable zone: the area that one tool can touch along one axis."""
 
     access: str
     tool: str
-    area_mm2: Annotated[float, Field(description="With shank and holder clear.")]
-    cutter_area_mm2: Annotated[float, Field(description="By the cutting part alone.")]
+    area_mm2: Annotated[float, Field(description="Area that it touches with shank and holder clear.")]
+    cutter_area_mm2: Annotated[float, Field(description="Area that its cutting part touches.")]
 
 
 class CuttingPlane(ReportModel):
-    """Where a tool, or an access, ends in a region."""
+    """Lowest height of a tool, or of an access, in a region."""
 
     access: str
-    z_mm: Annotated[float, Field(description="Along the access direction.")]
+    z_mm: Annotated[float, Field(description="Height along the access direction, mm.")]
     region: str
     tool: str | None = None
     reason: str
 
 
 class Place(ReportModel):
-    """What an entry holds of a face, and where."""
+    """The part of a face that belongs to an entry, and its bounding box."""
 
     face: Annotated[str, Field(examples=["F12"])]
     area_mm2: float
@@ -149,25 +151,26 @@ class Place(ReportModel):
 
 
 class Remainder(ReportModel):
-    """Area that the setup cannot reach, why, and what would."""
+    """Area that the setup cannot reach, the reason, and what would reach it."""
 
     faces: list[Any]
     area_mm2: float
     reason: Annotated[str, Field(description="undercut, undercut behind connection C2, fixture, pass, shank, holder, "
                                              "gap, corner or sharp corner; see the glossary.")]
     would_need: Annotated[dict[str, Any], Field(
-        description="The tool that would do: kind, diameter_mm, corner_radius_mm, neck_length_mm, shank_diameter_mm, "
-                    "stickout_mm in sizes that are sold, like (the tool at hand whose holder it was measured with), "
-                    "share (of the area it does). Or kind 'other access', 'other clamping' or 'other process'. Empty "
-                    "where no tool is needed or none would do.")] = {}
-    tool_at_hand: Annotated[str | None, Field(description="Reason pass: the tool of the setup that touches it; reason "
-                                                          "fixture: the one that would without fixtures.")] = None
+        description="The tool that would reach it, in available sizes: kind, diameter_mm, corner_radius_mm, "
+                    "neck_length_mm, shank_diameter_mm, stickout_mm, like (the tool of the setup with the same holder) "
+                    "and share (of the area it reaches). Or kind 'other access', 'other clamping' or 'other process'. "
+                    "Empty where no tool is needed or none would reach it.")] = {}
+    tool_at_hand: Annotated[str | None, Field(description="Reason pass: the tool of the setup that touches the area. "
+                                                          "Reason fixture: the tool that would touch it without "
+                                                          "fixtures.")] = None
     why_left: Annotated[str | None, Field(description="Reason pass: why that tool was not used.")] = None
-    patches: Annotated[list[Place], Field(description="Area by face, and where.")] = []
+    patches: Annotated[list[Place], Field(description="Area and bounding box for each face.")] = []
 
 
 class ProposedTool(ReportModel):
-    """A tool to add, lengths from the tip."""
+    """A tool to add; lengths are from the tip."""
 
     kind: str
     diameter_mm: float
@@ -178,21 +181,21 @@ class ProposedTool(ReportModel):
     shank_diameter_mm: float
     stickout_mm: float
     slenderness: Annotated[float, Field(description="Neck length over diameter.")]
-    instead_of: Annotated[str | None, Field(description="Tool at hand with the same cutter.")] = None
-    like: Annotated[str | None, Field(description="Tool at hand whose holder it was measured with.")] = None
+    instead_of: Annotated[str | None, Field(description="Tool of the setup with the same cutter.")] = None
+    like: Annotated[str | None, Field(description="Tool of the setup with the same holder.")] = None
     access: str
     area_mm2: Annotated[float, Field(
-        description="Of the remainder, what zones with it hold; it is asked for nothing else.")]
-    tool: Annotated[Tool | None, Field(description="The same as an entry for tools of the setup, complete.")] = None
+        description="Area of the remainder that zones with this tool cover, mm2. It is used for nothing else.")]
+    tool: Annotated[Tool | None, Field(description="The same tool as a complete entry for tools of the setup.")] = None
 
 
 class Proposal(ReportModel):
-    """The fewest tools to add, and what they leave."""
+    """The fewest tools to add, and the area that remains with them."""
 
     tools: list[ProposedTool]
     emptied_mm2: float
-    stays_mm2: Annotated[dict[str, float], Field(description="By reason: undercut, fixture, sharp corner, slender, "
-                                                             "pass, too little.")]
+    stays_mm2: Annotated[dict[str, float], Field(
+        description="By reason: undercut, fixture, sharp corner, slender, pass, too little.")]
 
 
 class Zones(ReportModel):
@@ -206,8 +209,8 @@ class Zones(ReportModel):
     mcz: list[ComputableZone] = []
     cutting_planes: list[CuttingPlane] = []
     machinable_area_mm2: Annotated[float | None, Field(
-        description="Of all faces asked for. In a dry check zones and remainder sum to it; in a report what is proved, "
-                    "the findings and the remainder do.")] = None
+        description="Area of all requested faces. In zones.json the areas of zones and remainder add up to it; in a "
+                    "report those of proved area, findings and remainder.")] = None
     machinable_by_role_mm2: Annotated[dict[str, float], Field(
         description="The same by the role of the faces: wall, connection, floor, base, fillet, free.")] = {}
     zones: list[ZoneFacts]

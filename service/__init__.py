@@ -1,4 +1,4 @@
-"""Command line, HTTP, jobs and the pipeline: the only package that may import all others.
+"""HTTP, command line, jobs and the engine: the only layer that may import all others.
 
-No geometry is computed here.
+Here live settings, the pipeline and its rooms. Geometry, planning and simulation do not live here.
 """

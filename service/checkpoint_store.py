@@ -1,9 +1,9 @@
-"""What an attempt at a job keeps for the next one, as files by name in a folder of the job's content.
+"""Checkpoints of an attempt at a job for the next attempt, as files in a folder of the content of the job.
 
-    data/kept/ab/abcdef.../NAME    digest of the rest, then the rest; written beside, flushed, renamed
+    data/kept/ab/abcdef.../NAME    digest of the rest, then the rest; written as temporary file, flushed, renamed
 
-A file that is torn, or is of other content than its name says, is thrown away and counts as never written. Keeping is
-a help, never a duty: where there is no room the job goes on without.
+A file that is damaged, or whose content does not match its name, is deleted and counts as missing. Checkpoints only
+save time: where the disk is full the job continues without them.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ DIGEST = 32  # bytes of a SHA-256
 
 
 class Kept:
-    """What is kept of a job; nothing where there is no folder.
+    """Checkpoints of a job; none where there is no folder.
 
     folder : made when the first file is written
-    tell   : called with what has been taken over so far, each time something is: how many, by kind
+    tell   : called after each use with the number of checkpoints used so far, by kind
     """
 
     def __init__(self, folder: Path | None = None, tell: Callable[[Mapping[str, int]], None] | None = None) -> None:
@@ -35,7 +35,7 @@ class Kept:
         return self.folder is not None
 
     def get(self, kind: str, name: str) -> memoryview | None:
-        """What was put under a name; None where it is not there or not whole."""
+        """The bytes under a name; None where they are missing or damaged."""
         if self.folder is None:
             return None
         path = self.folder / f"{kind}-{name}"
@@ -49,7 +49,7 @@ class Kept:
         return data[DIGEST:]
 
     def put(self, kind: str, name: str, data: bytes | bytearray) -> bool:
-        """Keep bytes under a name; False where that could not be done."""
+        """Store bytes under a name; False where that failed."""
         if self.folder is None:
             return False
         target = self.folder / f"{kind}-{name}"
@@ -63,24 +63,24 @@ class Kept:
                 os.fsync(out.fileno())
             os.replace(written, target)
             sync_folder(self.folder)
-        except OSError:  # no room, or somebody cleared the folder away
+        except OSError:  # the disk is full, or the folder was removed
             try:
                 written.unlink(missing_ok=True)
             except OSError:
-                pass  # it goes with the folder
+                pass  # it is deleted with the folder
             return False
         return True
 
     def drop(self, kind: str, name: str) -> None:
-        """Throw away what is kept under a name."""
+        """Delete the bytes under a name."""
         if self.folder is not None:
             try:
                 (self.folder / f"{kind}-{name}").unlink(missing_ok=True)
             except OSError:
-                pass  # it is refused again the next time
+                pass  # it is refused again at the next read
 
     def took(self, kind: str, count: int = 1) -> None:
-        """Count what was taken over, and tell."""
+        """Count used checkpoints, and report the totals."""
         self.taken[kind] += count
         if self.tell is not None:
             self.tell(dict(self.taken))

@@ -1,7 +1,7 @@
 """``zonemill``: plan, zones, verify, serve, view, keys, demo, family, warm, openapi.
 
-Exit codes: 0 proved (verify: no finding; zones: done), 2 bad input, 3 not proved, 1 a bug. The result alone goes to
-stdout; logs and progress go to stderr. Heavy imports stand inside the commands, so that ``--help`` is quick.
+Exit codes: 0 proved (verify: no finding; zones: done), 2 bad input, 3 not proved, 1 a bug. Only the result goes to
+stdout; logs and progress go to stderr. Heavy imports are inside the commands, so that ``--help`` is quick.
 """
 
 from __future__ import annotations
@@ -15,7 +15,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from service.commands import key_commands
-from service.commands.arguments import blank_file, known_dialect, make_folder, mesh_wish, read_program, reported
+from service.commands.arguments import (
+    blank_file,
+    error_reporting,
+    known_dialect,
+    make_folder,
+    read_program,
+    requested_mesh,
+)
 from service.version import VERSION
 
 if TYPE_CHECKING:
@@ -23,18 +30,25 @@ if TYPE_CHECKING:
     from service.console import Progress
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
-                  help="From a STEP part of walls and internal connections to a proved milling job.")
+                  help="Turns a STEP file and a list of tools into G-code and STEP-NC that a simulator has verified.")
 app.add_typer(key_commands.app, name="keys")
 
-Part = Annotated[Path, typer.Argument(metavar="PART.step", help="The part, a STEP file.", show_default=False)]
+Part = Annotated[Path, typer.Argument(metavar="PART.step", help="STEP file of the part.", show_default=False)]
 SetupPath = Annotated[Path, typer.Option("--setup", metavar="SETUP.json", help="The setup.", show_default=False)]
-MeshBox = Annotated[str | None, typer.Option(metavar="x0,y0,z0,x1,y1,z1", help="Mesh this window only, mm in the "
-                                             "coordinates of the program; small ones take steps down to 0.002.")]
+MeshBox = Annotated[str | None, typer.Option(metavar="x0,y0,z0,x1,y1,z1", help="Mesh only this window, mm in program "
+                                                                               "coordinates; small windows allow steps "
+                                                                               "down to 0.002.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print errors as JSON (problem document) on stdout.")]
 
 
 def show_version(wanted: bool) -> None:
-    """Print the version and leave, where ``--version`` stands on the command line."""
+    """Print the version and exit, for ``--version``.
+
+    Raises
+    ------
+    Exit
+        Always, where ``wanted``.
+    """
     if wanted:
         typer.echo(f"zonemill {VERSION}")
         raise typer.Exit
@@ -43,25 +57,25 @@ def show_version(wanted: bool) -> None:
 @app.callback()
 def root(version: Annotated[bool, typer.Option("--version", callback=show_version, is_eager=True,
                                                help="Print the version and exit.")] = False) -> None:
-    """Options that stand before a command."""
+    """Options before a command."""
 
 
 @app.command()
 def plan(part: Part, setup: SetupPath,
          out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.")],
-         mesh_step: Annotated[float | None, typer.Option(help="Also write machined.stl, the part as the program leaves "
-                                                              "it, with nodes so many mm apart.")] = None,
+         mesh_step: Annotated[float | None, typer.Option(help="Also write machined.stl, the part after the program; "
+                                                              "the value is the distance of its nodes, mm.")] = None,
          mesh_box: MeshBox = None, as_json: AsJson = False) -> None:
-    """Plan and prove a part: report, zones, programs and STEP-NC into DIR; the report also on stdout."""
+    """Plan and prove a part; write report, zones, programs and STEP-NC into DIR, and the report to stdout."""
 
     def run(given: Setup, progress: Progress, blank: Path | None) -> tuple[Any, int]:
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
         from service.pipeline import plan as plan_job
 
-        report = plan_job(part, given, out, progress, mesh_wish(mesh_step, mesh_box), blank_path=blank)
+        report = plan_job(part, given, out, progress, requested_mesh(mesh_step, mesh_box), blank_path=blank)
         return report, EXIT_PROVED if report["state"] == "proved" else EXIT_UNPROVED
 
-    with reported(as_json):
+    with error_reporting(as_json):
         make_folder(out)
     _exit(part, setup, run, as_json)
 
@@ -80,28 +94,29 @@ def zones(part: Part, setup: SetupPath, as_json: AsJson = False) -> None:
 
 @app.command()
 def verify(part: Part, setup: SetupPath,
-           program: Annotated[Path, typer.Option("--program", metavar="FILE", help="The NC program, or STEP-NC: "
-                                                                                      "AP238 or ISO 14649.")],
-           access: Annotated[str | None, typer.Option(help="Access of the setup the program is for; default the "
-                                                          "first.")] = None,
-           dialect: Annotated[str | None, typer.Option(help="Control the program is for: linuxcnc, fanuc, haas, "
-                                                            "siemens or heidenhain; default by its text, its name and "
+           program: Annotated[Path, typer.Option("--program", metavar="FILE", help="NC program, or STEP-NC file (AP238 "
+                                                                                   "or ISO 14649).")],
+           access: Annotated[str | None, typer.Option(help="Access of the setup to which the program belongs; default: "
+                                                           "the first.")] = None,
+           dialect: Annotated[str | None, typer.Option(help="Control of the program: linuxcnc, fanuc, haas, siemens or "
+                                                            "heidenhain; default: detected from its text, its name and "
                                                             "machine.dialects.")] = None,
-           spindle_tool: Annotated[int, typer.Option(min=0, help="T number of the tool in the spindle, length offset "
-                                                                 "on, before the first line; 0 for none.")] = 0,
+           spindle_tool: Annotated[int, typer.Option(min=0, help="T number of the tool in the spindle before the first "
+                                                                 "line, with its length offset on; 0: none.")] = 0,
            out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for report, deviation map and "
-                                                                           "mesh; none is written without.")] = None,
-           mesh_step: Annotated[float, typer.Option(help="mm between the nodes of machined.stl; 0 leaves it "
-                                                         "out.")] = 0.2,
+                                                                                 "mesh; without it no "
+                                                                                 "file is written.")] = None,
+           mesh_step: Annotated[float, typer.Option(help="Distance of the nodes of machined.stl, mm; "
+                                                         "0: no such file.")] = 0.2,
            mesh_box: MeshBox = None, as_json: AsJson = False) -> None:
-    """Prove any program or STEP-NC, also foreign ones; the report goes to stdout, what was found in short to stderr."""
+    """Prove any program or STEP-NC, also from other CAM systems; print the report to stdout, a summary to stderr."""
 
     def run(given: Setup, progress: Progress, blank: Path | None) -> tuple[Any, int]:
         from service.console import say, verification_summary
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
         from service.pipeline import verify_program
 
-        started, wish = time.monotonic(), mesh_wish(mesh_step or None, mesh_box) if out is not None else None
+        started, wish = time.monotonic(), requested_mesh(mesh_step or None, mesh_box) if out is not None else None
         result = verify_program(part, given, read_program(program), progress, access, out, wish, spindle_tool, blank,
                                 known_dialect(dialect), program.suffix)
         progress.close()
@@ -109,34 +124,35 @@ def verify(part: Part, setup: SetupPath,
         return result, EXIT_UNPROVED if result["findings"] else EXIT_PROVED
 
     if out is not None:
-        with reported(as_json):
+        with error_reporting(as_json):
             make_folder(out, verification=True)
     _exit(part, setup, run, as_json)
 
 
 @app.command()
-def serve(host: Annotated[str | None, typer.Option(help="Address; default 127.0.0.1.")] = None,
-          port: Annotated[int | None, typer.Option(help="Port; default 8000, 0 takes a free one.")] = None,
-          data: Annotated[Path | None, typer.Option(help="Data folder; default ./data.")] = None,
+def serve(host: Annotated[str | None, typer.Option(help="Address; default: 127.0.0.1.")] = None,
+          port: Annotated[int | None, typer.Option(help="Port; default: 8000; 0: any free port.")] = None,
+          data: Annotated[Path | None, typer.Option(help="Data folder; default: ./data.")] = None,
           as_json: AsJson = False) -> None:
-    """Serve the HTTP interface, engine included; every other setting comes from ZONEMILL_* variables."""
+    """Serve the HTTP interface and run its jobs. ZONEMILL_* variables hold all other settings."""
     from service.api.server import settings_with
 
     given = {"host": host, "port": port, "data_dir": data}
-    with reported(as_json):
+    with error_reporting(as_json):
         from service.api.server import run_server
 
         run_server(settings_with(given))
 
 
 @app.command()
-def view(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of plan --out, or of verify --out.",
-                                                show_default=False)],
-         port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 takes a free one.")] = 0,
-         browser: Annotated[bool, typer.Option(help="Open it in the browser.")] = True,
+def view(folder: Annotated[Path, typer.Argument(
+             metavar="DIR", help="Folder that plan --out or verify --out has written.", show_default=False)],
+         port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0: any free port.")] = 0,
+         browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
          as_json: AsJson = False) -> None:
-    """Show a folder of results in the browser: the page of a job, served to this machine until Ctrl-C."""
-    with reported(as_json):
+    """Show a folder of results in the browser, as the web page of a job, until Ctrl-C. Only this machine can open it.
+    """
+    with error_reporting(as_json):
         from service.commands.view_command import show_folder
 
         show_folder(folder, port, open_browser=browser)
@@ -146,8 +162,14 @@ def view(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of p
 def demo(out: Annotated[Path, typer.Option("--out", help="Folder for the files.")] = Path("out"),
          keep: Annotated[bool, typer.Option("--keep", help="Keep serving until Ctrl-C.")] = False,
          as_json: AsJson = False) -> None:
-    """Make a sample part, post it to an embedded service, and fetch its files."""
-    with reported(as_json):
+    """Make a sample part, post it to a service of its own, and fetch the resulting files.
+
+    Raises
+    ------
+    Exit
+        With the exit code of the job.
+    """
+    with error_reporting(as_json):
         from service.commands.demo import run_demo
 
         code = run_demo(out, keep=keep)
@@ -157,15 +179,16 @@ def demo(out: Annotated[Path, typer.Option("--out", help="Folder for the files."
 @app.command()
 def family(out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.",
                                              show_default=False)],
-           recipe: Annotated[str, typer.Option(help="What is drawn; docs/family.md lists the recipes.")] = "mixed",
-           seed: Annotated[int, typer.Option(min=0, help="Of the first part; the same seed gives the same part.")] = 0,
-           count: Annotated[int, typer.Option(min=1, help="Parts, with seeds one after the other.")] = 1,
-           walls: Annotated[int | None, typer.Option(help="Walls of each part; drawn when left out.")] = None,
-           connections: Annotated[int | None, typer.Option(help="Connections; drawn when left out.")] = None,
-           reach: Annotated[bool, typer.Option("--reach", help="Compute what the setup can reach as well.")] = False,
+           recipe: Annotated[str, typer.Option(help="Recipe of the parts; docs/family.md lists them.")] = "mixed",
+           seed: Annotated[int, typer.Option(min=0, help="Seed of the first part; it fixes the part.")] = 0,
+           count: Annotated[int, typer.Option(min=1, help="Number of parts, with consecutive seeds.")] = 1,
+           walls: Annotated[int | None, typer.Option(help="Number of walls of each part; default: random.")] = None,
+           connections: Annotated[int | None, typer.Option(
+               help="Number of connections of each part; default: random.")] = None,
+           reach: Annotated[bool, typer.Option("--reach", help="Also compute what the setup can reach.")] = False,
            as_json: AsJson = False) -> None:
-    """Write random test parts with truth: NAME.step, NAME.truth.json, NAME.setup.json; prints the list of files."""
-    with reported(as_json):
+    """Write random test parts with known features: NAME.step, NAME.truth.json, NAME.setup.json; print the file list."""
+    with error_reporting(as_json):
         from service.console import print_json, say
 
         make_folder(out)
@@ -179,8 +202,8 @@ def family(out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folde
 
 @app.command()
 def warm(as_json: AsJson = False) -> None:
-    """Compile what is otherwise compiled in the first job, which then takes a minute longer."""
-    with reported(as_json):
+    """Compile the kernels once, so that the first job starts at once. This takes about a minute."""
+    with error_reporting(as_json):
         from service.commands.demo import run_warm
         from service.console import say
 
@@ -200,15 +223,14 @@ def openapi() -> None:
 def write_family_part(recipe: str, seed: int, out: Path, wanted: dict[str, int], *, reach: bool) -> tuple[Path, ...]:
     """Write one part of the family; returns its three paths.
 
-    wanted : walls and connections asked for, where the recipe lets one choose
-    reach  : whether the truth says what the suggested setup can reach
+    wanted : required numbers of walls and connections, where the recipe lets one choose
+    reach  : whether the truth contains the area that the suggested setup can reach
 
     Raises
     ------
     InputError
-        There is no such recipe (``unknown_recipe``), it lets one choose nothing of the kind (``not_of_this_recipe``),
-        no draw kept the rules of the family (``impossible_layout``), or cadquery is not installed
-        (``generator_not_installed``).
+        unknown_recipe: there is no such recipe; not_of_this_recipe: it has fixed numbers; impossible_layout: no random
+        part satisfied the rules of the family; generator_not_installed: cadquery is not installed.
     """
     import inspect
 
@@ -217,12 +239,12 @@ def write_family_part(recipe: str, seed: int, out: Path, wanted: dict[str, int],
     from geometry.errors import InputError
 
     if recipe not in RECIPES:
-        raise InputError(f"the family has no recipe {recipe!r}", code="unknown_recipe", measured=recipe,
-                         limit=sorted(RECIPES), remedy="take one of the recipes listed")
+        raise InputError(f"unknown recipe {recipe!r}", code="unknown_recipe", measured=recipe,
+                         limit=sorted(RECIPES), remedy="use one of the listed recipes")
     takes = inspect.signature(RECIPES[recipe]).parameters
     if any(key not in takes for key in wanted):
         raise InputError(f"recipe {recipe} sets its own number of walls and connections", code="not_of_this_recipe",
-                         subjects=tuple(wanted), remedy="leave --walls and --connections out, or take recipe mixed")
+                         subjects=tuple(wanted), remedy="leave out --walls and --connections, or use recipe mixed")
     try:
         return make_part(seed, recipe, **wanted).write(out, reach=reach)
     except ModuleNotFoundError as error:
@@ -233,13 +255,13 @@ def write_family_part(recipe: str, seed: int, out: Path, wanted: dict[str, int],
                          "runtime environment cannot hold cadquery") from None
     except LayoutError as error:
         raise InputError(f"no part for recipe {recipe} and seed {seed}: {error}", code="impossible_layout",
-                         remedy="take another seed, or fewer walls and connections") from None
+                         remedy="use another seed, or fewer walls and connections") from None
 
 
 def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress, Path | None], tuple[Any, int]],
           as_json: bool) -> None:
-    """Run a command on part and setup, print its result and leave with its exit code."""
-    with reported(as_json):
+    """Run a command on part and setup, print its result and exit with its exit code."""
+    with error_reporting(as_json):
         from geometry.step_import.text_checks import check_text
         from service.console import Progress, print_json
         from service.from_wire import read_setup

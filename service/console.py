@@ -1,4 +1,4 @@
-"""What the command line says: the result on stdout, everything else on stderr, errors as one clear block."""
+"""Output of the command line: the result on stdout, everything else on stderr, errors as one clear block."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import time
 from typing import Any
 
 from geometry.errors import CamError
-from service.errors import mapping_of, problem_document
+from service.errors import error_mapping, problem_document
 
 MEASURED_SHOWN = 20
 LIVE_EVERY_S, LINE_EVERY_S = 1.0, 5.0  # between two lines of one stage, on a terminal and elsewhere
@@ -75,9 +75,9 @@ def print_json(data: Any) -> None:
 
 
 def verification_summary(report: dict[str, Any], seconds: float) -> str:
-    """A verification in a few lines: state, findings by kind with the first line of each, coverage, files, time.
+    """A verification in a few lines: state, findings by kind with the first of each, coverage, files, time.
 
-    report  : as ``service.pipeline.verify_program`` gives it; seconds : it took
+    report  : from ``service.pipeline.verify_program``; seconds : duration of the verification
     """
     count = sum(report.get("finding_counts", {}).values())
     lines = [f"{report['state']}: {count or 'no'} finding{'' if count == 1 else 's'}"]
@@ -91,7 +91,7 @@ def verification_summary(report: dict[str, Any], seconds: float) -> str:
     if report.get("gouge_max_mm"):
         lines.append(f"  deepest    {report['gouge_max_mm']:g} mm cut into the part")
     if made := report.get("machined"):
-        lines.append(f"  machined   {made['volume_mm3']:g} mm3 stand, nodes {made['step_mm']:g} mm apart")
+        lines.append(f"  machined   {made['volume_mm3']:g} mm3 remain, nodes {made['step_mm']:g} mm apart")
     if files := report.get("files"):
         lines.append(f"  files      {', '.join(f['name'] for f in files)}, report.json")
     lines.append(f"  took       {seconds:.1f} s")
@@ -99,7 +99,7 @@ def verification_summary(report: dict[str, Any], seconds: float) -> str:
 
 
 def error_block(error: CamError) -> str:
-    """An error as a person wants to read it."""
+    """An error as text for people."""
     lines = [f"error: {error.message}", f"  code      {error.code} ({type(error).__name__})"]
     if error.subjects:
         lines.append(f"  concerns  {', '.join(error.subjects)}")
@@ -118,9 +118,9 @@ def error_block(error: CamError) -> str:
 
 
 def report_error(error: CamError, *, as_json: bool) -> int:
-    """Print an error (block on stderr, with ``as_json`` the problem document on stdout); returns the exit code."""
+    """Print an error (block on stderr; with ``as_json`` the problem document on stdout) and return the exit code."""
     if as_json:
         print_json(problem_document(error))
     else:
         say(error_block(error))
-    return mapping_of(error).exit_code
+    return error_mapping(error).exit_code

@@ -1,6 +1,6 @@
-"""Spindle speed and feed of a tool in a material, and what a machine does, with every default stated.
+"""Spindle speed and feed of a tool in a material, and rates of a machine, with every default stated.
 
-Formulas and where each figure is from: docs/theory/feeds.md.
+docs/theory/feeds.md has the formulas and the source of each figure.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ DEFAULT_MAX_RPM = 18000.0
 DEFAULT_MAX_FEED_MM_MIN = 5000.0
 PLUNGE_FACTOR = 0.3
 STEP_DOWN = {"ball": 0.3, "bull": 0.3, "flat": 0.5}
-"""Deepest layer by the kind of a tool, of its diameter."""
-MOST_THINNING = 1.5
-"""The most that a thin chip raises the feed per tooth: where a cutter runs head on into a rib the chip is not thin."""
+"""Deepest layer by the kind of a tool, as a share of its diameter."""
+MAX_CHIP_THINNING = 1.5
+"""Largest increase of the feed per tooth for a thin chip. Where a cutter runs into a rib the chip is not thin."""
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,11 @@ class CuttingData:
     spindle_rpm    : 1/min, whole
     feed           : mm/min, cutting
     plunge_feed    : mm/min, moves that descend in or near material; ``PLUNGE_FACTOR`` of the feed
-    cutting_speed  : m/min at the widest place in cut, after the speed limits
+    cutting_speed  : m/min at the largest diameter in cut, after the speed limits
     feed_per_tooth : mm, after the feed limit
-    limited_by     : 'material', 'tool', 'machine', 'default' or 'setup', what set the speed
-    source         : where the material's figures come from
-    cut_back       : what the setup asks of this tool and is not given: field, asked, limit
+    limited_by     : 'material', 'tool', 'machine', 'default' or 'setup', the origin of the speed
+    source         : source of the material's figures
+    cut_back       : values of the setup for this tool that exceed a limit: field, value, limit
     """
 
     spindle_rpm: float
@@ -59,7 +59,7 @@ class CuttingData:
 
 
 def feed_per_tooth(points: list[FeedPoint], diameter: float) -> float:
-    """Feed per tooth at a diameter, mm: linear between the points, in proportion to diameter beyond the ends.
+    """Feed per tooth at a diameter, mm: linear between the points, proportional to the diameter beyond the ends.
 
     >>> round(feed_per_tooth(MATERIALS["C45"].feed_per_tooth, 3.0), 6)
     0.02
@@ -75,13 +75,14 @@ def feed_per_tooth(points: list[FeedPoint], diameter: float) -> float:
 
 
 def chip_thinning(corner_radius: float, depth: float | None, engaged: float = math.pi) -> float:
-    """Feed per tooth over the thickness of the thickest chip, no more than ``MOST_THINNING``.
+    """Feed per tooth over the thickness of the thickest chip [Altintas2012], at most ``MAX_CHIP_THINNING``.
 
     corner_radius, depth : mm; None: any depth, so that the full radius may cut
     engaged              : rad, of the front half of the cutter; in a side cut cos(engaged) = 1 - 2 ae / D
 
-    1 / (sin(kappa) sin(engaged)): the edge of a round corner stands at kappa to the axis at the depth,
-    cos(kappa) = 1 - depth / r, and from ae >= D / 2 on the chip gets its full thickness.
+    The factor is 1 / (sin(kappa) sin(engaged)). At the depth the edge of a round corner has the angle kappa to the
+    axis,
+    with cos(kappa) = 1 - depth / r. From ae >= D / 2 on the chip gets its full thickness.
 
     >>> chip_thinning(0.0, 1.0), round(chip_thinning(0.0, 1.0, math.radians(60.0)), 4)
     (1.0, 1.1547)
@@ -92,29 +93,33 @@ def chip_thinning(corner_radius: float, depth: float | None, engaged: float = ma
     if depth is not None and depth < corner_radius:
         axial = math.sqrt(depth * (2.0 * corner_radius - depth)) / corner_radius
     radial = math.sin(engaged) if engaged < 0.5 * math.pi else 1.0
-    return 1.0 / max(axial * radial, 1.0 / MOST_THINNING)
+    return 1.0 / max(axial * radial, 1.0 / MAX_CHIP_THINNING)
 
 
 def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float | None = None) -> CuttingData:
     """Spindle speed and feed of a tool in a material on a machine.
 
-    depth : mm, of layers in roughing; None: finishing, where a wall may meet all of the cutter
+    depth : mm, of layers in roughing; None: finishing, where a wall may touch the whole cutter
 
-    The speed is n = 1000 vc / (pi d) at the widest place in cut, the feed n z fz with the thinning of the chip counted
-    in for layers where the setup bounds the engaged angle, and where layers meet the corner only. What the setup says
-    of the tool stands instead. Both are held to the tool's and the machine's limits; where a machine states none and
-    the tool has no figure of its own, ``DEFAULT_MAX_RPM`` and ``DEFAULT_MAX_FEED_MM_MIN`` are. No feed is below
-    ``MIN_FEED``.
+    Notes
+    -----
+    The speed is n = 1000 vc / (pi d) at the largest diameter in cut, the feed n z fz [Tabellenbuch2022]. Chip thinning
+    is
+    applied to layers where the setup bounds the engagement, or where only the corner cuts. Values of the setup for the
+    tool
+    replace these. AxisLimits of tool and machine apply to both. Where the machine states none and the tool has no value of
+    its
+    own, the limits are ``DEFAULT_MAX_RPM`` and ``DEFAULT_MAX_FEED_MM_MIN``. No feed is below the least feed.
     """
     deep = tool.corner_radius_mm if depth is None else depth
     wide = effective_diameter(tool.diameter_mm, tool.corner_radius_mm, deep)
     cut_back: list[tuple[str, float, float]] = []
 
-    def given(field: str, asked: float, *limits: float | None) -> float:
+    def given(field: str, value: float, *limits: float | None) -> float:
         limit = min([x for x in limits if x is not None], default=math.inf)
-        if asked > limit:
-            cut_back.append((field, asked, limit))
-        return min(asked, limit)
+        if value > limit:
+            cut_back.append((field, value, limit))
+        return min(value, limit)
 
     if tool.spindle_rpm is not None:
         limited_by, rpm = "setup", given("spindle_rpm", tool.spindle_rpm, tool.max_rpm, machine.max_rpm)
@@ -128,7 +133,7 @@ def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float 
     if tool.feed_mm_min is not None:
         feed = given("feed_mm_min", tool.feed_mm_min, machine.max_feed_mm_min)
     else:
-        # a finish may have the whole front in a skin, which no limit counts: its chip is as thick as in a slot
+        # a finishing pass may engage the whole front in a thin skin, so its chip is as thick as in a slot
         limit = None if depth is None else tool.max_engagement_deg
         engaged = math.radians(180.0 if limit is None else limit)
         per_tooth = feed_per_tooth(material.feed_per_tooth, tool.diameter_mm) * chip_thinning(
@@ -143,13 +148,14 @@ def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float 
 
 
 def bending(setup: Setup, tool: Tool, body: ToolBody, data: CuttingData, depth: float | None) -> DeflectionModel | None:
-    """What the cuts of a tool bend it by; None where the material has no specific cutting force.
+    """Load and stiffness for the deflection of a tool; None where the material has no specific cutting force.
 
     body  : the shape of the tool; data : its speeds in this kind of work
     depth : mm, of layers; None: finishing
 
-    Layers may bend it by half of what they leave for the finish, ``LAYER_LIMIT`` at most. A finish that climbs bends it
-    off the wall and may leave what a cusp may; else it may dig, by half of the gouge tolerance.
+    A layer may bend the tool by half of the stock it leaves for finishing, at most ``LAYER_LIMIT``. A climbing finish
+    bends
+    it away from the wall, by at most the scallop height. Otherwise it may cut in, by half of the gouge tolerance.
     """
     material = setup.material
     if material.specific_cutting_force_n_mm2 is None or material.chip_thickness_exponent is None:
@@ -164,12 +170,12 @@ def bending(setup: Setup, tool: Tool, body: ToolBody, data: CuttingData, depth: 
 
 
 def rates_of(setup: Setup) -> Rates:
-    """What the machine of a setup does; corners are rounded by what programs allow (``output.linuxcnc``)."""
+    """Rates of the machine of a setup; corners are rounded by the tolerance of the programs (``path_tolerance``)."""
     machine = setup.machine
     return Rates(machine.rapid_mm_min or RATES.rapid, machine.acceleration_mm_s2 or RATES.acceleration,
                  min(RATES.rounding, 0.5 * setup.quality.chordal_tolerance_mm))
 
 
-__all__ = ["DEFAULT_MAX_FEED_MM_MIN", "DEFAULT_MAX_RPM", "MATERIALS", "MOST_THINNING",
+__all__ = ["DEFAULT_MAX_FEED_MM_MIN", "DEFAULT_MAX_RPM", "MATERIALS", "MAX_CHIP_THINNING",
            "PLUNGE_FACTOR", "STEP_DOWN", "CuttingData", "bending", "chip_thinning", "cutting_data", "feed_per_tooth",
            "find_material", "rates_of"]

@@ -1,4 +1,4 @@
-"""Folders and flushes: what is written here is there whole after a crash, or not at all."""
+"""Folders and flushes: after a crash a file is complete or absent."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ from pathlib import Path
 
 
 def make_private(folder: Path) -> None:
-    """Make a folder that only this user can look into; one that is there keeps its mode."""
+    """Make a folder that only this user can read; an existing folder keeps its mode."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     folder.mkdir(mode=0o700, exist_ok=True)
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and flush the entries of those above that had to be made for it: a file that is flushed may be lost
-    with the entry of its folder."""
+    """Make a folder and flush the entries of the new folders above it.
+
+    A flushed file may be lost with the entry of its folder.
+    """
     if not folder.is_dir():
         make_folder(folder.parent)
         folder.mkdir(exist_ok=True)
@@ -22,7 +24,7 @@ def make_folder(folder: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Flush a folder's entries to the disk."""
+    """Flush the entries of a folder to the disk."""
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(handle)

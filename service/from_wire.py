@@ -1,4 +1,4 @@
-"""From the wire to the plain values of the inner packages, and nothing else."""
+"""Converts wire models into the plain values of the inner packages, and does nothing else."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from geometry.errors import CamError, OutputError, SetupError
 from geometry.tool_body import HolderFrustum, ToolBody
-from output.inverse_kinematics import RotaryMachine, said_limits
+from output.inverse_kinematics import RotaryMachine, program_limits
 from schemas.machine import Machine
 from schemas.setup import Placement, Setup
 from schemas.tools import Tool
@@ -21,34 +21,35 @@ from verify.kinematics import Kinematics
 
 LOWEST_AXIS = -0.5  # Z of the unit tool axis: 30 degrees below level
 OBJECT_WANTED = ("model_type", "model_attributes_type", "dict_type")
-MOST_TOLD = 200  # problems of one setup, or of one request; a few megabytes can have a million
+MAX_PROBLEMS_LISTED = 200  # of one setup or request; a few megabytes can contain a million
 Library = Mapping[str, Mapping[str, Any]]
 
 
 def parse_setup(data: bytes | str | Mapping[str, Any], library: Library | None = None) -> Setup:
     """Read a setup.
 
-    data    : JSON text, or the object it stands for
+    data    : JSON text, or a parsed JSON object
     library : entries by shelf ('tools', 'machines', 'materials') for ``"lib:NAME"`` references
 
     Raises
     ------
     SetupError
-        Code 'setup_not_json', 'repeated_key', 'bad_text', 'bad_setup' (``measured`` lists every problem, or the first
-        ``MOST_TOLD``, as {"at", "problem"}, ``subjects`` the places), or as ``check_blank``.
+        Code 'setup_not_json', 'repeated_key', 'bad_text', 'bad_setup' (``measured`` lists the problems, at most the
+        first
+        ``MAX_PROBLEMS_LISTED``, as {"at", "problem"}, ``subjects`` the places), or as ``check_blank``.
     """
     if isinstance(data, bytes | str):
         try:
             data = json.loads(data, object_pairs_hook=_without_repeats)
         except (ValueError, RecursionError) as error:
             raise SetupError(f"the setup is not JSON: {error}", code="setup_not_json",
-                             remedy="send one JSON object as described by the Setup schema") from None
+                             remedy="send one JSON object that fits the schema Setup") from None
     try:
         json.dumps(data, ensure_ascii=False, default=str).encode()
     except UnicodeEncodeError as error:
-        raise SetupError("the setup holds half a character (a lone surrogate), which no text may", code="bad_text",
+        raise SetupError("the setup contains a lone surrogate, which is not a valid character", code="bad_text",
                          measured=ascii(error.object[max(0, error.start - 20):error.end + 20]),
-                         remedy="write the text of the setup as UTF-8") from None
+                         remedy="send the text of the setup as UTF-8") from None
     try:
         setup = Setup.model_validate(data, context={"library": library or {}})
     except ValidationError as error:
@@ -58,36 +59,36 @@ def parse_setup(data: bytes | str | Mapping[str, Any], library: Library | None =
 
 
 def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A JSON object whose names are all different; the usual reading, the last one counts, hides a mistake."""
+    """A JSON object with distinct names; the default parser hides a repeated name, which is a mistake."""
     found: dict[str, Any] = {}
     for name, value in pairs:
         if name in found:
-            raise SetupError(f"the name {json.dumps(name)} stands twice in one object of the setup",
+            raise SetupError(f"the name {json.dumps(name)} occurs twice in one object of the setup",
                              code="repeated_key", subjects=(name,), measured=sum(n == name for n, _ in pairs), limit=1,
-                             remedy="leave one of them out")
+                             remedy="leave out one of them")
         found[name] = value
     return found
 
 
-def of_blank(error: CamError) -> CamError:
-    """The same error about the file of a blank: of the class and the code that it has about that of a part."""
-    remedy = ("export the one body that is the blank to a file of its own" if error.code == "several_solids"
+def blank_error(error: CamError) -> CamError:
+    """An error of the part's STEP file, turned into the same error of the blank's file: same class, same code."""
+    remedy = ("export the blank as a single body into a separate file" if error.code == "several_solids"
               else error.remedy)
     return type(error)(f"the blank: {error.message}", code=error.code, subjects=("stock.step_file", *error.subjects),
                        measured=error.measured, limit=error.limit, remedy=remedy)
 
 
 def no_stock_file() -> SetupError:
-    """The blank of a setup is a STEP file, and nobody says which."""
-    return SetupError("the blank is a STEP file (stock.kind 'step') and none was given", code="no_stock_file",
-                      subjects=("stock.step_file",), remedy="name it in stock.step_file, from the folder of the setup; "
-                                                            "over HTTP send it as the part 'stock' of the form")
+    """Error: the blank is a STEP file, and no file is given."""
+    return SetupError("stock.kind is 'step', but no STEP file of the blank is given", code="no_stock_file",
+                      subjects=("stock.step_file",), remedy="set stock.step_file to a path relative to the setup; over "
+                                                            "HTTP send the file as part 'stock' of the form")
 
 
 def check_blank(setup: Setup) -> None:
-    """Refuse a blank grown from the part that leaves nothing to cut, or less than is to stay on the part.
+    """Refuse a blank that leaves nothing to cut, or less than the allowance.
 
-    A box grown by 0 still holds stock in the pockets of the part; what fills a box wholly is found with the part.
+    A box enlarged by 0 still has stock in the pockets of the part. A part that fills the box wholly is found later.
 
     Raises
     ------
@@ -100,20 +101,22 @@ def check_blank(setup: Setup) -> None:
     grown = stock.margin_mm + stock.uncertainty_mm
     offset = stock.kind == "part_offset"
     if offset and grown <= 0:
-        raise SetupError("nothing stands on the part that could be cut: stock.margin_mm and stock.uncertainty_mm are "
-                         "both 0", code="no_stock", subjects=("stock.margin_mm", "stock.uncertainty_mm"),
-                         measured=grown, limit=0.0, remedy="give a stock.margin_mm above 0, or the real blank as a box")
+        raise SetupError("there is no stock to cut: stock.margin_mm and "
+                         "stock.uncertainty_mm are both 0", code="no_stock",
+                         subjects=("stock.margin_mm", "stock.uncertainty_mm"),
+                         measured=grown, limit=0.0, remedy="set stock.margin_mm above 0, or give the real blank as a "
+                                                           "box")
     if allowance > grown or (offset and allowance == grown):
         raise SetupError(f"quality.stock_allowance_mm {allowance:g} is not below the {grown:g} mm (margin_mm "
                          f"{stock.margin_mm:g} + uncertainty_mm {stock.uncertainty_mm:g}) of stock on the part",
                          code="allowance_beyond_stock",
                          subjects=("quality.stock_allowance_mm", "stock.margin_mm", "stock.uncertainty_mm"),
-                         measured=allowance, limit=grown, remedy="leave less on the part, or give the blank a larger "
-                                                                 "margin_mm")
+                         measured=allowance, limit=grown, remedy="reduce stock_allowance_mm, or increase "
+                                                                 "stock.margin_mm")
 
 
 def check_plannable(setup: Setup) -> None:
-    """Refuse accesses the machine cannot turn to.
+    """Refuse accesses that the machine cannot reach.
 
     Raises
     ------
@@ -127,55 +130,57 @@ def check_plannable(setup: Setup) -> None:
 
 
 def _check_turning(setup: Setup, machine: RotaryMachine) -> None:
-    """Refuse what a job that turns cannot be planned for: rapids, lengths, limits, accesses, a second clamping."""
+    """Checks for a machine with rotary axes: rapids, lengths, limits, accesses, and a single clamping."""
     if setup.machine.rapid_motion == "dogleg":
-        raise SetupError("a job that turns needs rapids along straight lines; on this machine each axis runs at its "
-                         "own speed, so where the tool is while it turns cannot be known", code="dogleg_rapids",
+        raise SetupError("a 5-axis job needs rapids along straight lines; on this machine each axis moves at its own "
+                         "speed, so the tool path during a turn is unknown", code="dogleg_rapids",
                          subjects=("machine.rapid_motion",), measured="dogleg", limit="linear",
-                         remedy="set the control to linear rapids and say machine.rapid_motion 'linear', or plan on "
+                         remedy="set the control to linear rapids and set machine.rapid_motion 'linear', or plan on "
                                 "three axes")
     if machine.tilts_head and not machine.tcp:
         bare = [t.id for t in setup.tools if not t.gauge_given]
         if bare:
-            raise SetupError(f"tools {', '.join(bare)}: the head swings the tool and the program is of joints, so "
-                             "every tip depends on the length from the spindle face", code="no_gauge_length",
-                             subjects=tuple(bare), remedy="give gauge_length_mm as measured, tip to spindle face")
+            raise SetupError(f"tools {', '.join(bare)}: the head tilts the tool and the program contains joint "
+                             "positions, so every tip depends on the length "
+                             "from the spindle face", code="no_gauge_length",
+                             subjects=tuple(bare), remedy="give the measured gauge_length_mm, tip to spindle face")
     if "heidenhain" in setup.machine.dialects and not machine.tcp and setup.machine.simultaneous:
-        raise SetupError("cuts that turn an axis need an inverse-time feed where the program is of joints, and "
+        raise SetupError("a program of joint positions needs an inverse-time feed for cuts that turn an axis, and "
                          "heidenhain has none", code="no_inverse_time",
                          subjects=("machine.dialects", "machine.tcp"), measured=setup.machine.dialects,
-                         remedy="say machine.tcp true and let the control keep the tip (M128), or set "
+                         remedy="set machine.tcp true so that the control keeps the tip (M128), or set "
                                 "machine.simultaneous false")
     for letter, limits in zip(machine.letters, setup.machine.rotary_deg or (), strict=False):
         if not limits[0] <= 0.0 <= limits[1]:
-            raise SetupError(f"machine.rotary_deg of {letter}, {limits[0]:g} to {limits[1]:g}, leaves out 0, where the "
-                             "setup frame lies and tools are changed", code="no_rotary_zero",
+            raise SetupError(f"machine.rotary_deg of {letter}, {limits[0]:g} to {limits[1]:g}, does not contain 0, the "
+                             "angle of the setup frame and of tool changes", code="no_rotary_zero",
                              subjects=("machine.rotary_deg",), measured=limits, limit=0.0,
-                             remedy="count the angle from where the part stands as in the setup frame")
+                             remedy="count the angle from the position in which the part stands as in the setup frame")
     for access in setup.access:
         axis = np.array([access.direction], dtype=np.float64)
         axis /= np.linalg.norm(axis)
         if not machine.stands(axis)[0]:
             both = np.degrees(machine.words(machine.turns(axis)[0])).round(3).tolist()
-            raise SetupError(f"access {access.id}, tool axis {access.direction}, cannot be turned to",
+            raise SetupError(f"access {access.id}, tool axis {access.direction}, is outside the limits of the rotary "
+                             "axes",
                              code="access_out_of_reach", subjects=(access.id, "machine.rotary_deg"), measured=both,
                              limit=setup.machine.rotary_deg,
-                             remedy=f"{machine.letters} would have to stand at one of these; give another direction, "
-                                    "or turn the setup frame by placement")
+                             remedy=f"{machine.letters} would need one of these angles; give another direction, or "
+                                    "turn the setup frame by placement")
         if axis[0, 2] < LOWEST_AXIS:
-            raise SetupError(f"access {access.id}, tool axis {access.direction}, comes from below: there the table is",
+            raise SetupError(f"access {access.id}, tool axis {access.direction}, points from below, where the table is",
                              code="access_from_below", subjects=(access.id,), measured=float(axis[0, 2]),
-                             limit=LOWEST_AXIS, remedy="turn the part over in a clamping of its own")
+                             limit=LOWEST_AXIS, remedy="turn the part over in a separate clamping")
         if access.work_offset != setup.access[0].work_offset:
             raise SetupError(f"access {access.id} has work offset {access.work_offset} and {setup.access[0].id} has "
-                             f"{setup.access[0].work_offset}: a machine with rotary axes holds the part once",
+                             f"{setup.access[0].work_offset}; on a machine with rotary axes the part is clamped once",
                              code="two_clampings", subjects=(access.id,), measured=access.work_offset,
                              limit=setup.access[0].work_offset,
-                             remedy="give all accesses one work offset, or plan each clamping as a job of its own")
+                             remedy="give all accesses the same work offset, or plan each clamping as a separate job")
 
 
 def check_spindle_tool(setup: Setup, number: int) -> None:
-    """Refuse a tool in the spindle that the setup does not have; 0 is none.
+    """Refuse a spindle tool that the setup lacks; 0 is none.
 
     Raises
     ------
@@ -184,13 +189,13 @@ def check_spindle_tool(setup: Setup, number: int) -> None:
     """
     known = sorted(t.number or 0 for t in setup.tools)
     if number != 0 and number not in known:
-        raise SetupError(f"the setup has no tool T{number} that could stand in the spindle; it has "
+        raise SetupError(f"the setup has no tool T{number} for the spindle; it has "
                          f"{', '.join(f'T{n}' for n in known)}", code="no_such_tool", subjects=("spindle_tool",),
-                         measured=number, limit=known, remedy="name one of them, or leave it out")
+                         measured=number, limit=known, remedy="use one of them, or leave it out")
 
 
 def machine_kinematics(machine: Machine) -> Kinematics | None:
-    """Rotary axes of a machine in the words of the proof; None on one of three axes."""
+    """Rotary axes of a machine as the proof needs them; None on a 3-axis machine."""
     if machine.kinematics is None:
         return None
     pivots = machine.pivots_mm
@@ -199,25 +204,25 @@ def machine_kinematics(machine: Machine) -> Kinematics | None:
 
 
 def _sense(machine: Machine) -> tuple[int, int]:
-    """Whether the words of the tilting and the turning axis count as the table turns, 1, or the other way, -1."""
+    """For the tilting and the turning axis: 1 where a positive angle turns the table right-handed, else -1."""
     tilting = (machine.kinematics or "AC")[-2]
     return -1 if tilting in machine.iso_axes else 1, -1 if "C" in machine.iso_axes else 1
 
 
 def rotary_machine(machine: Machine) -> RotaryMachine | None:
-    """Rotary axes of a machine in the words of the writers; None on one of three axes.
+    """Rotary axes of a machine as the writers need them; None on a 3-axis machine.
 
     Raises
     ------
     SetupError
-        Code 'no_pivots': the control does not keep the tip, and nobody says where the rotary axes lie.
+        Code 'no_pivots': the control does not keep the tip, and the setup has no pivots.
     """
     if machine.kinematics is None:
         return None
     pivots = None if machine.pivots_mm is None else tuple((x, y, z) for x, y, z in machine.pivots_mm)
     try:
         limits, sense = rotary_limits(machine), _sense(machine)
-        return RotaryMachine(machine.kinematics, pivots, None if limits is None else said_limits(limits, sense),
+        return RotaryMachine(machine.kinematics, pivots, None if limits is None else program_limits(limits, sense),
                              machine.tcp, sense)
     except OutputError as refusal:
         raise SetupError(refusal.message, code=refusal.code, subjects=refusal.subjects,
@@ -225,8 +230,11 @@ def rotary_machine(machine: Machine) -> RotaryMachine | None:
 
 
 def rotary_limits(machine: Machine) -> NDArray[np.float64] | None:
-    """(2, 2) float64, rad, least and greatest angle of the tilting and the turning axis, as programs say them; None
-    where not limited."""
+    """Limits of the rotary axes in angles of programs.
+
+    Returns (2, 2) float64, rad, least and greatest angle of the tilting and the turning axis, machine coordinates; None
+    without limits.
+    """
     return None if machine.rotary_deg is None else np.radians(machine.rotary_deg)
 
 
@@ -236,7 +244,7 @@ def read_setup(path: Path, library: Library | None = None) -> Setup:
     Raises
     ------
     SetupError
-        The file cannot be read, or what it holds is no setup.
+        The file cannot be read, or is not a setup.
     """
     try:
         text = path.read_bytes()
@@ -252,9 +260,9 @@ def problems_of(error: ValidationError, root: str = "setup") -> list[dict[str, s
     for item in error.errors(include_url=False, include_context=False, include_input=False):
         at = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in item["loc"]).lstrip(".")
         if at == "tools" and item["type"] in ("missing", "too_short"):
-            text = "no tools are given; a setup needs at least one"
+            text = "the setup has no tools; it needs at least one"
         elif not at and item["type"] in OBJECT_WANTED:
-            text = f"the {root} is to be a JSON object"
+            text = f"the {root} must be a JSON object"
         else:
             text = sentence(item["type"], item["msg"])
         found.append({"at": at or root, "problem": text})
@@ -262,27 +270,33 @@ def problems_of(error: ValidationError, root: str = "setup") -> list[dict[str, s
 
 
 def sentence(kind: str, message: str) -> str:
-    """What a validation found, in the words of JSON; ``kind`` and ``message`` are those of the validation."""
+    """The text of a validation problem in terms of JSON; ``kind`` and ``message`` come from the validation."""
     if kind == "extra_forbidden":
         return "unknown field"
     if kind in OBJECT_WANTED:
-        return "this is to be a JSON object"
+        return "this must be a JSON object"
     return message.removeprefix("Value error, ")
 
 
 def setup_error(error: ValidationError) -> SetupError:
-    """The ``SetupError`` that says what a failed validation found."""
+    """The ``SetupError`` of a failed validation."""
     problems = problems_of(error)
     first, more = problems[0], f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-    problems = problems[:MOST_TOLD]
+    problems = problems[:MAX_PROBLEMS_LISTED]
     prefix = "" if first["at"] == "setup" else f"{first['at']}: "
     return SetupError(f"{prefix}{first['problem']}{more}", code="bad_setup",
                       subjects=tuple(p["at"] for p in problems), measured=problems,
-                      remedy="correct the fields named; lengths are mm, the schema is in openapi.yaml under Setup")
+                      remedy="correct these fields; lengths are mm, the schema is Setup in openapi.yaml")
 
 
 def tool_body(tool: Tool) -> ToolBody:
-    """The shape of one tool; lengths mm from the tip."""
+    """The shape of one tool; lengths mm from the tip.
+
+    Raises
+    ------
+    SetupError
+        incomplete_tool: the tool has not been validated in a Setup.
+    """
     number, flute, neck_d, neck_l, shank, stickout = (
         tool.number, tool.flute_length_mm, tool.neck_diameter_mm, tool.neck_length_mm, tool.shank_diameter_mm,
         tool.stickout_mm)
@@ -311,7 +325,7 @@ def placement_frame(placement: Placement) -> tuple[NDArray[np.float64], NDArray[
     -------
     origin : (3,) float64, mm
     axes   : (3, 3) float64, rows are the unit x, y and z axis of the setup frame, so a point p of the file
-             stands at ``axes @ (p - origin)`` in the setup frame
+             is ``axes @ (p - origin)`` in the setup frame
     """
     z = np.array(placement.z_axis, dtype=np.float64)
     z /= np.linalg.norm(z)

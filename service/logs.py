@@ -23,8 +23,10 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029]")
 
 
 def _harmless(_logger: Any, _name: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
-    """Text of others cannot make lines or colours of the log: control characters are written out, and traces, which
-    may hold any text, stand behind a bar."""
+    """Make text from outside harmless in the log.
+
+    Control characters are escaped, so that text cannot make lines or colours. Tracebacks stand behind a bar.
+    """
     for key, value in event.items():
         if isinstance(value, str):
             text = _CONTROL.sub(lambda m: ascii(m[0])[1:-1], value)
@@ -33,7 +35,7 @@ def _harmless(_logger: Any, _name: str, event: MutableMapping[str, Any]) -> Muta
 
 
 class _Stderr:
-    """Whatever stderr is now; a stderr that is closed or full must not stop the one who logs."""
+    """The current stderr; a closed or full stderr must not stop the program."""
 
     def write(self, text: str) -> int:
         with suppress(OSError, ValueError):
@@ -49,9 +51,9 @@ STDERR = cast(TextIO, _Stderr())
 
 
 def configure_once(level: str, form: str) -> None:
-    """The same in a process where nobody has said how to log: a worker of the cluster.
+    """Configure logging in a process that has not done so, such as a cluster worker.
 
-    What structlog does by itself goes to stdout in colours, and shows the values of all variables with a trace.
+    The default of structlog writes to stdout in colours, and shows the values of all variables with a traceback.
     """
     if not structlog.is_configured():
         configure(level, form)
@@ -65,7 +67,7 @@ def configure(level: str, form: str) -> None:
     common: list[Any] = [_request_id, structlog.processors.add_log_level,
                          structlog.processors.TimeStamper(fmt="iso", utc=True), structlog.processors.format_exc_info,
                          *([] if form == "json" else [_harmless])]
-    others = logging.StreamHandler(STDERR)  # what libraries say, in the same form
+    others = logging.StreamHandler(STDERR)  # messages of libraries, in the same form
     others.setFormatter(structlog.stdlib.ProcessorFormatter(
         foreign_pre_chain=[structlog.stdlib.add_logger_name, *common],
         processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, renderer]))

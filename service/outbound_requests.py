@@ -1,8 +1,8 @@
-"""The only requests this service makes by itself: to hosts that the settings name, at addresses that were looked at.
+"""The only requests that the service sends by itself: to configured hosts, at checked addresses.
 
-A name is resolved once; every address it has must be public, or in a network that the settings name; the connection
-goes to that very address, so that a second answer of the name server changes nothing. There are no redirects, no
-proxies and no cookies, and nothing of the answer is read but its head.
+A name is resolved once. Every address must be public, or in a configured network. The connection goes to exactly that
+address, so that a second answer of the name server changes nothing. There are no redirects, proxies or cookies, and
+only the head of the answer is read.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ _NAT64 = (ipaddress.ip_network("64:ff9b::/96"), ipaddress.ip_network("64:ff9b:1:
 
 
 class BlockedError(Exception):
-    """A target that must not be called; the text says why."""
+    """A target that must not be called; the text gives the reason."""
 
 
 @dataclass(frozen=True)
-class Target:
-    """Where a webhook goes. host : lower case, an IPv6 address without brackets; path : with its query."""
+class WebhookTarget:
+    """Target of a webhook. host : lower case, an IPv6 address without brackets; path : with its query."""
 
     scheme: str
     host: str
@@ -42,12 +42,12 @@ class Target:
 
     @property
     def origin(self) -> str:
-        """Scheme, host and port: what may be logged, and what the settings allow."""
+        """Scheme, host and port: the part that may be logged and that the settings allow."""
         return f"{self.scheme}://{f'[{self.host}]' if ':' in self.host else self.host}:{self.port}"
 
 
-def parse_target(url: str) -> Target:
-    """Read a URL of http or https; user names, fragments, blanks and control characters are refused.
+def parse_target(url: str) -> WebhookTarget:
+    """Read a URL of http or https; user names, fragments, spaces and control characters are refused.
 
     Raises
     ------
@@ -60,20 +60,20 @@ def parse_target(url: str) -> Target:
     found = _URL.fullmatch(url) if len(url) <= LONGEST_URL else None
     port = int(found[3]) if found and found[3] else None
     if found is None or "#" in url or (port is not None and not 0 < port < 65536):
-        raise RequestError("webhook_url is no plain http or https URL", code="bad_webhook_url",
+        raise RequestError("webhook_url is not a plain http or https URL", code="bad_webhook_url",
                            subjects=("webhook_url",), measured=ascii(url[:200]), limit=LONGEST_URL,
                            remedy="send scheme, host and path, without user name or fragment")
     path = found[4] if found[4].startswith("/") else f"/{found[4]}"
-    return Target(found[1], found[2].strip("[]").lower(), port or PORTS[found[1]], path)
+    return WebhookTarget(found[1], found[2].strip("[]").lower(), port or PORTS[found[1]], path)
 
 
 def parse_origin(text: str) -> str:
-    """An origin of the settings, in one form.
+    """An origin of the settings, in canonical form.
 
     Raises
     ------
     ValueError
-        It has a path, or is none.
+        The text has a path, or is not an origin.
 
     >>> parse_origin("https://mes.example.com")
     'https://mes.example.com:443'
@@ -81,28 +81,28 @@ def parse_origin(text: str) -> str:
     try:
         target = parse_target(text)
     except RequestError:
-        raise ValueError(f"{ascii(text)} is no origin such as https://mes.example.com") from None
+        raise ValueError(f"{ascii(text)} is not an origin such as https://mes.example.com") from None
     if urlsplit(text).path not in ("", "/") or "?" in text:
-        raise ValueError(f"{ascii(text)} has a path; name scheme, host and port only")
+        raise ValueError(f"{ascii(text)} has a path; give only scheme, host and port")
     return target.origin
 
 
-def check_allowed(target: Target, origins: Iterable[str]) -> None:
-    """Refuse a target that the settings do not name.
+def check_allowed(target: WebhookTarget, origins: Iterable[str]) -> None:
+    """Refuse a target that the settings do not allow.
 
     Raises
     ------
     RequestError
-        Code 'webhook_not_allowed'. What would be allowed is not told: it is nobody's business.
+        Code 'webhook_not_allowed'. The error does not list the allowed origins, since they are internal.
     """
     if target.origin not in origins:
-        raise RequestError(f"no webhook may go to {target.origin}", code="webhook_not_allowed",
+        raise RequestError(f"webhooks to {target.origin} are not allowed", code="webhook_not_allowed",
                            subjects=("webhook_url",), measured=target.origin,
-                           remedy="ask whoever runs the service to add it to ZONEMILL_WEBHOOK_ORIGINS")
+                           remedy="ask the operator of the service to add it to ZONEMILL_WEBHOOK_ORIGINS")
 
 
 def is_public(address: Address) -> bool:
-    """Whether an address is of the public internet, also when it is wrapped into another.
+    """Whether an address belongs to the public internet, also when it is embedded in another address.
 
     >>> is_public(ipaddress.ip_address("::ffff:127.0.0.1")), is_public(ipaddress.ip_address("9.9.9.9"))
     (False, True)
@@ -119,10 +119,10 @@ def is_public(address: Address) -> bool:
     return address.is_global and not (address.is_multicast or address.is_reserved or address.is_unspecified)
 
 
-def resolve(target: Target, networks: Iterable[Network]) -> list[str]:
-    """Addresses of a target's host, each looked at; at most four.
+def resolve(target: WebhookTarget, networks: Iterable[Network]) -> list[str]:
+    """Addresses of the host of a target, each checked; at most four.
 
-    networks : in which addresses may lie that are not public
+    networks : non-public networks that are allowed
 
     Raises
     ------
@@ -146,7 +146,7 @@ def resolve(target: Target, networks: Iterable[Network]) -> list[str]:
 class _Pinned(http.client.HTTPConnection):
     """A connection to one address; name and certificate are those of the host."""
 
-    def __init__(self, target: Target, address: str, timeout_s: float) -> None:
+    def __init__(self, target: WebhookTarget, address: str, timeout_s: float) -> None:
         super().__init__(target.host, target.port, timeout=timeout_s)
         self.target, self.address = target, address
 
@@ -155,7 +155,7 @@ class _Pinned(http.client.HTTPConnection):
         self.sock = socket.create_connection((self.address, self.target.port), self.timeout)
 
     def secure(self) -> None:
-        """Agree on TLS where the target wants it; ``cut`` ends that too, which may drip in for days otherwise."""
+        """Negotiate TLS where the target requires it; ``cut`` can end that too, since it may take very long."""
         if self.target.scheme == "https":
             tls = ssl.create_default_context().wrap_socket(self.sock, server_hostname=self.target.host,
                                                            do_handshake_on_connect=False)
@@ -163,7 +163,7 @@ class _Pinned(http.client.HTTPConnection):
             tls.do_handshake()
 
     def cut(self) -> None:
-        """End it from another thread, whatever it waits for."""
+        """End it from another thread, at any point."""
         sock = self.sock
         if sock is not None:
             try:
@@ -172,15 +172,15 @@ class _Pinned(http.client.HTTPConnection):
                 pass  # it has ended
 
 
-def send(target: Target, addresses: list[str], body: bytes, headers: dict[str, str], timeout_s: float) -> int:
-    """POST a body to the first of the addresses that takes a connection; returns the status of the answer.
+def send(target: WebhookTarget, addresses: list[str], body: bytes, headers: dict[str, str], timeout_s: float) -> int:
+    """POST a body to the first address that accepts a connection; returns the status of the answer.
 
-    timeout_s : for connecting, and again for all the rest together, of each address
+    timeout_s : for connecting, and again for the rest of the exchange, of each address
 
     Raises
     ------
     OSError, http.client.HTTPException
-        No connection, no answer in time, or no HTTP.
+        No connection, no answer in time, or an answer that is not HTTP.
     """
     failure: OSError = ConnectionError("no address")
     for address in addresses:

@@ -1,11 +1,11 @@
-"""Plans and proofs as bytes and back: plain values, arrays and the classes named here, nothing that could run.
+"""Plans and proofs as bytes and back: plain values, arrays and the classes in this module; nothing executable.
 
     8 bytes      length of the words, little-endian
     words        JSON, UTF-8: the tree of values, in which an array is its type, shape and place
-    arrays       one behind the other, each at a multiple of ``ALIGNED`` from the end of the words
+    arrays       one after the other, each at a multiple of ``ALIGNED`` from the end of the words
 
-What comes back is what went in: a number keeps its type (a numpy scalar rounds otherwise than a float), an array its
-type, shape, order in memory and bits. Objects that both sides have anyway go by their name (``Known``).
+The result equals the input. A number keeps its type (a numpy scalar rounds otherwise than a float). An array keeps its
+type, shape, memory order and bits. Objects that both sides have are packed by name (``Known``).
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ PLAIN = (type(None), bool, int, float, str)
 
 @dataclass(frozen=True)
 class Known:
-    """Objects that are not packed but named: by the name of their class, then by their ``id``."""
+    """Objects that are packed by name: the name of their class, then their ``id``."""
 
     objects: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
@@ -51,7 +51,7 @@ def pack(value: Any, known: Known = Known()) -> bytearray:
     Raises
     ------
     TypeError
-        Something in it is of a class that is not named here.
+        A part of the value has a class that is not listed here.
     """
     arrays: list[np.ndarray] = []
     words = json.dumps(_tree(value, known, arrays, [0]), separators=(",", ":")).encode()
@@ -64,15 +64,15 @@ def pack(value: Any, known: Known = Known()) -> bytearray:
 
 
 def unpack(data: bytes | bytearray | memoryview, known: Known = Known()) -> Any:
-    """The value that was packed.
+    """The packed value.
 
     Raises
     ------
     ValueError, KeyError, TypeError
-        The bytes are not what ``pack`` writes, or name something that is not known here.
+        The bytes are not from ``pack``, or name an unknown object.
     """
     begin = 8 + int.from_bytes(data[:8], "little")
-    # a copy of its own, so that arrays can be written to as those of a plan can
+    # a copy, so that the arrays are writable like those of a plan
     room = np.frombuffer(data, np.uint8, offset=begin).copy()
     return _value(json.loads(bytes(data[8:begin])), known, room)
 
@@ -86,14 +86,14 @@ def _tree(value: Any, known: Known, arrays: list[np.ndarray], used: list[int]) -
     if isinstance(value, np.ndarray):
         turned = value.flags.f_contiguous and not value.flags.c_contiguous
         if value.dtype.hasobject:
-            raise TypeError("an array of objects is not packed")
+            raise TypeError("an array of objects cannot be packed")
         place = used[0] + -used[0] % ALIGNED
         used[0] = place + value.nbytes
         arrays.append(value if turned else np.ascontiguousarray(value))
         return {"a": [value.dtype.str, list(value.shape), place, turned]}
     if kind.__name__ in known.objects:
         if known.objects[kind.__name__].get(value.id) != value:
-            raise TypeError(f"{kind.__name__} {value.id} is another than the one that is known")
+            raise TypeError(f"{kind.__name__} {value.id} differs from the known one")
         return {"k": [kind.__name__, value.id]}
     if isinstance(value, np.generic):
         return {"n": [value.dtype.str, value.item()]}
@@ -105,7 +105,7 @@ def _tree(value: Any, known: Known, arrays: list[np.ndarray], used: list[int]) -
         return {"l": [_tree(v, known, arrays, used) for v in value]}
     if isinstance(value, Mapping):
         return {"m": [[_tree(k, known, arrays, used), _tree(v, known, arrays, used)] for k, v in value.items()]}
-    raise TypeError(f"a {kind.__name__} is not packed")
+    raise TypeError(f"a {kind.__name__} cannot be packed")
 
 
 def _value(tree: Any, known: Known, room: np.ndarray) -> Any:
@@ -113,28 +113,28 @@ def _value(tree: Any, known: Known, room: np.ndarray) -> Any:
         return tuple(_value(t, known, room) for t in tree)
     if not isinstance(tree, dict):
         return tree
-    ((mark, said),) = tree.items()
+    ((mark, packed),) = tree.items()
     if mark == "a":
-        kind, shape, place, turned = said
+        kind, shape, place, turned = packed
         dtype = np.dtype(kind)
         size = dtype.itemsize * int(np.prod(shape, dtype=np.int64))
         if place + size > len(room):
-            raise ValueError("an array goes beyond the end")
+            raise ValueError("an array extends beyond the end")
         return room[place:place + size].view(dtype).reshape(shape, order="F" if turned else "C")
     if mark == "k":
-        return known.objects[said[0]][said[1]]
+        return known.objects[packed[0]][packed[1]]
     if mark == "n":
-        return np.dtype(said[0]).type(said[1])
+        return np.dtype(packed[0]).type(packed[1])
     if mark == "e":
-        return ENUMS[said[0]](said[1])
+        return ENUMS[packed[0]](packed[1])
     if mark == "c":
-        made = CLASSES[said[0]]
-        return made(*(_value(t, known, room) for t in said[1:]))
+        made = CLASSES[packed[0]]
+        return made(*(_value(t, known, room) for t in packed[1:]))
     if mark == "l":
-        return [_value(t, known, room) for t in said]
+        return [_value(t, known, room) for t in packed]
     if mark == "m":
-        return {_value(k, known, room): _value(v, known, room) for k, v in said}
-    raise ValueError(f"a mark {mark!r} is not known")
+        return {_value(k, known, room): _value(v, known, room) for k, v in packed}
+    raise ValueError(f"a mark {mark!r} is unknown")
 
 
 __all__ = ["Known", "pack", "unpack"]

@@ -1,6 +1,6 @@
-"""Every setting of the service; read from the environment (``ZONEMILL_PORT=9000``) or given in code.
+"""Every setting of the service, from the environment (``ZONEMILL_PORT=9000``) or from code.
 
-Each is described in docs/settings.md; a test keeps the page complete.
+docs/settings.md describes each of them; a test keeps the page complete.
 """
 
 from __future__ import annotations
@@ -24,52 +24,52 @@ class Settings(BaseSettings):
     model_config = SettingsConfigDict(env_prefix="ZONEMILL_", env_ignore_empty=True, extra="ignore")
 
     host: Annotated[str, Field(description="Address to listen on.")] = "127.0.0.1"
-    port: Annotated[int, Field(ge=0, le=65535, description="Port to listen on; 0 takes a free one.")] = 8000
-    data_dir: Annotated[Path, Field(description="Folder of uploads, results and the embedded database.")] = Path("data")
+    port: Annotated[int, Field(ge=0, le=65535, description="Port to listen on; 0: any free port.")] = 8000
+    data_dir: Annotated[Path, Field(description="Folder for uploads, results and the database.")] = Path("data")
     database_url: Annotated[str | None, Field(
         description="SQLAlchemy URL; unset: SQLite inside data_dir. PostgreSQL: postgresql+psycopg://...")] = None
     scheduler: Annotated[str | None, Field(
         description="Address of a Dask scheduler (tcp://host:8786); unset: embedded.")] = None
-    workers: Annotated[int, Field(ge=1, le=1024, description="Jobs at a time of the embedded engine.")] = max(
+    workers: Annotated[int, Field(ge=1, le=1024, description="Number of jobs that run at once, embedded.")] = max(
         1, _cores() // 2)
-    child_threads: Annotated[int, Field(ge=0, le=1024, description="Kernel threads of one job; 0: the cores over "
-                                                                   "the workers.")] = 0
+    child_threads: Annotated[int, Field(ge=0, le=1024, description="Kernel threads of one job; 0: "
+                                                                   "cores / workers.")] = 0
     job_time_limit_s: Annotated[float, Field(gt=0, description="Wall time of one attempt, s.")] = 1800.0
-    job_memory_limit_mb: Annotated[int, Field(ge=64, description="Resident memory of a job, its children counted, "
-                                                                 "MB.")] = 8000
-    max_attempts: Annotated[int, Field(ge=1, le=10, description="How often a job is started when its process is "
-                                                                "lost.")] = 3
-    lease_s: Annotated[float, Field(gt=0, description="How long a silent worker keeps a job, s.")] = 20.0
-    poll_s: Annotated[float, Field(gt=0, le=5, description="How often cancel and progress are looked at, s.")] = 0.2
+    job_memory_limit_mb: Annotated[int, Field(ge=64, description="Largest resident memory of a job, MB.")] = 8000
+    max_attempts: Annotated[int, Field(
+        ge=1, le=10, description="How often a job starts at most when its process is lost.")] = 3
+    lease_s: Annotated[float, Field(gt=0, description="Time after which a silent worker loses its job, s.")] = 20.0
+    poll_s: Annotated[float, Field(gt=0, le=5, description="Interval between checks of cancel and progress, s.")] = 0.2
     max_body_mb: Annotated[float, Field(gt=0, description="Largest request body, MB.")] = 256.0
     auth: Annotated[Literal["auto", "keys"], Field(
-        description="keys: a key is always asked for; auto: not on loopback until the first key is made.")] = "auto"
+        description="keys: a key is always required; auto: not on loopback until the first key exists.")] = "auto"
     post_rate: Annotated[str, Field(description="Most job submissions of a principal, for example 120/minute.")
                          ] = "120/minute"
-    max_queued: Annotated[int, Field(ge=1, description="Most jobs that wait; more are refused with 429.")] = 1000
-    max_queued_each: Annotated[int, Field(ge=1, description="Most jobs of one principal that wait.")] = 200
-    max_streams_each: Annotated[int, Field(ge=1, description="Most event streams of a principal at a time, in one "
-                                                             "process.")] = 50
-    min_free_mb: Annotated[int, Field(ge=0, description="Free disk of the data folder below which nothing is accepted "
-                                                        "or started, MB.")] = 500
-    retention_days: Annotated[float, Field(ge=0, description="Files of a job are removed so many days after its end; "
-                                                             "0 keeps them.")] = 0.0
-    sweep_every_s: Annotated[float, Field(gt=0, description="How often old and unused files are looked for, s.")
+    max_queued: Annotated[int, Field(ge=1, description="Most waiting jobs; more are refused with 429.")] = 1000
+    max_queued_each: Annotated[int, Field(ge=1, description="Most waiting jobs of one principal.")] = 200
+    max_streams_each: Annotated[int, Field(ge=1, description="Most open event streams of a "
+                                                             "principal, in one process.")] = 50
+    min_free_mb: Annotated[int, Field(ge=0, description="Free disk space, MB, below which no job is accepted or "
+                                                        "started.")] = 500
+    retention_days: Annotated[float, Field(
+        ge=0, description="Days until the files of an ended job are removed; 0 keeps them.")] = 0.0
+    sweep_every_s: Annotated[float, Field(gt=0, description="Interval between searches for old and unused files, s.")
                              ] = 3600.0
     webhook_origins: Annotated[list[str], Field(
-        description="Where webhooks may go, as JSON: [\"https://mes.example.com\"]; empty: nowhere.")] = []
+        description="Origins to which webhooks may go, as JSON: [\"https://mes.example.com\"]; empty: none.")] = []
     webhook_networks: Annotated[list[str], Field(
-        description="Networks that are not public and may be called all the same, as JSON: [\"10.1.0.0/16\"].")] = []
+        description="Non-public networks to which webhooks may go, as JSON: [\"10.1.0.0/16\"].")] = []
     webhook_secret: Annotated[SecretStr | None, Field(
-        min_length=32, description="Secret that those of the principals are derived from; unset: no webhooks.")] = None
+        min_length=32, description="Secret from which those of the principals are derived; unset: no webhooks.")] = None
     webhook_secret_before: Annotated[SecretStr | None, Field(
-        min_length=32, description="The secret before, while receivers change over; both sign.")] = None
-    webhook_attempts: Annotated[int, Field(ge=1, le=50, description="How often a webhook is tried.")] = 10
-    webhook_retry_s: Annotated[float, Field(gt=0, description="Pause after the first attempt, s; then four times the "
-                                                              "one before, six hours at most.")] = 5.0
-    webhook_timeout_s: Annotated[float, Field(gt=0, le=60, description="For connecting, and for the rest of an "
-                                                                       "attempt, s.")] = 10.0
-    log_level: Annotated[Literal["debug", "info", "warning", "error"], Field(description="Least level logged.")
+        min_length=32, description="Previous secret, while receivers change to the new one; both sign.")] = None
+    webhook_attempts: Annotated[int, Field(ge=1, le=50, description="Number of attempts of a webhook.")] = 10
+    webhook_retry_s: Annotated[float, Field(
+        gt=0, description="Pause after the first attempt, s; each further pause is four times longer, at most six "
+                          "hours.")] = 5.0
+    webhook_timeout_s: Annotated[float, Field(
+        gt=0, le=60, description="For connecting, and again for the rest of an attempt, s.")] = 10.0
+    log_level: Annotated[Literal["debug", "info", "warning", "error"], Field(description="Lowest level that is logged.")
                          ] = "info"
     log_format: Annotated[Literal["console", "json"], Field(description="Form of the log on stderr.")] = "console"
 
@@ -103,8 +103,8 @@ class Settings(BaseSettings):
         try:
             if value is not None:
                 make_url(value).get_dialect()
-        except ArgumentError:  # its message may hold the password
-            raise ValueError("is no SQLAlchemy URL of a database that can be reached from here") from None
+        except ArgumentError:  # its message may contain the password
+            raise ValueError("is not an SQLAlchemy URL of a supported database") from None
         return value
 
     @property
@@ -114,12 +114,12 @@ class Settings(BaseSettings):
 
     @property
     def webhooks_on(self) -> bool:
-        """Whether webhooks are sent at all."""
+        """Whether the service sends webhooks."""
         return bool(self.webhook_origins) and self.webhook_secret is not None
 
     @property
     def threads(self) -> int:
-        """Kernel threads of one job in use."""
+        """Kernel threads of one job."""
         return self.child_threads or max(1, _cores() // self.workers)
 
     @property
@@ -129,7 +129,7 @@ class Settings(BaseSettings):
 
 
 def is_loopback(host: str) -> bool:
-    """Whether an address can be reached from this machine only.
+    """Whether only this machine can reach an address.
 
     >>> is_loopback("127.0.0.1"), is_loopback("::1"), is_loopback("0.0.0.0")
     (True, True, False)

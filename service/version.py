@@ -1,4 +1,4 @@
-"""The version of the product, as programs, reports and the API carry it, and the digest of its sources."""
+"""The version of the product in programs, reports and the API, and the digest of its sources."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PACKAGES = ("geometry", "zones", "toolpath", "output", "verify", "schemas", "ser
 
 @lru_cache(maxsize=1)
 def code_version() -> str:
-    """Hash over every source file that can change a result, hex."""
+    """Hash of every source file that can change a result, hex."""
     root = Path(__file__).resolve().parent.parent
     digest = hashlib.sha256()
     for package in PACKAGES:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from output.arc_fitting import fitted
-from output.workplan import Frame, Workplan
+from output.workplan import AccessFrame, Workplan
 from tests.synthetic_plan import BALL, CLEAR, clamped, line, plan, step
 from toolpath.lines import thinned
 from toolpath.workingsteps import Trajectory, TrajectoryKind
@@ -63,7 +63,7 @@ def round_clamped() -> Workplan:
     ways = cutting(SHAPES["ring"], SHAPES["helix"], SHAPES["ring"], SHAPES["ring"]).steps
     steps = tuple(replace(s, access=a) for s, a in zip(ways, ("A1", "A1", "I1", "A1"), strict=True))
     turned = np.array([[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
-    frames = {**base.clamping.frames, "A1": Frame(turned, CLEAR)}
+    frames = {**base.clamping.frames, "A1": AccessFrame(turned, CLEAR)}
     return replace(base, steps=steps, clamping=replace(base.clamping, frames=frames))
 
 

@@ -9,8 +9,11 @@ import numpy as np
 from geometry.mesh import TriangleMesh
 from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import HolderFrustum, ToolBody
+from output.gcode.dialects.base import Switches
+from output.gcode.dialects.linuxcnc import LinuxCnc
+from output.gcode.program_writer import write_program
 from output.inverse_kinematics import RotaryMachine
-from output.workplan import Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
+from output.workplan import AccessFrame, Ap238, Assembly, Clamping, StockBox, StockCylinder, Workplan
 from toolpath.workingsteps import Trajectory, TrajectoryKind, Workingstep
 from zones.reach.access_view import access_rotation
 
@@ -19,6 +22,11 @@ BALL = ToolBody("T1", 1, 3.0, 1.5, 9.0, 2.8, 20.0, 6.0, 45.0, HOLDER)
 FLAT = ToolBody("T2", 2, 6.0, 0.0, 18.0, 6.0, 18.0, 6.0, 40.0, HOLDER)
 BULL = ToolBody("rougher Ø8", 7, 8.0, 1.0, 20.0, 7.6, 30.0, 8.0, 50.0, HOLDER)
 CLEAR = 25.0
+
+
+def write_linuxcnc(plan: Workplan) -> str:
+    """The program of a plan for LinuxCNC."""
+    return write_program(plan, LinuxCnc(Switches()))
 
 
 def line(motion: TrajectoryKind, *points: tuple[float, float, float], feed: float = 0.0) -> Trajectory:
@@ -112,9 +120,9 @@ def leaning(x: float, z: float, size: float = 0.2) -> tuple[Trajectory, ...]:
 
 def clamped(kind: str = "table-table-AC", tcp: bool = True, swings: bool = True) -> Workplan:
     """A job of one clamping: upright, leaning two ways, one pass with an axis that swings, two tools."""
-    frames = {"A1": Frame(np.eye(3), CLEAR)}
+    frames = {"A1": AccessFrame(np.eye(3), CLEAR)}
     for name, direction in (("I1", (0.5, -0.3, 0.9)), ("I2", (-0.8, 0.2, 0.1))):
-        frames[name] = Frame(access_rotation(direction), 40.0)
+        frames[name] = AccessFrame(access_rotation(direction), 40.0)
     pivots = ((5.0, 0.0, -80.0), (7.0, 3.0, -20.0)) if kind.startswith("table") else ((0.0, 0.0, 150.0), (20.0, -7, 0))
     machine = RotaryMachine(kind, pivots[:1] if kind.startswith("head-head") else pivots, None, tcp)
     steps = [replace(step(1, FLAT, "depth_layers", zone=None, faces=(), x=2.0, z=8.0), access="A1"),

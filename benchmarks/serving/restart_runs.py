@@ -47,7 +47,7 @@ from scipy.spatial import cKDTree  # noqa: E402
 from benchmarks.five_axis.five_axis_control import CONTROLLER, setup_of, write_bar  # noqa: E402
 from benchmarks.writing.stepnc_family import LABEL, from_labels  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
-from output.clamping_sequence import SPARE  # noqa: E402
+from output.clamping_sequence import BALL_CLEARANCE  # noqa: E402
 from schemas.setup import Setup  # noqa: E402
 from service import pipeline  # noqa: E402
 from service.from_wire import machine_kinematics, parse_setup  # noqa: E402
@@ -62,7 +62,7 @@ FLANK = {"id": "T1", "kind": "bull", "corner_radius_mm": 1, "flutes": 3, "diamet
 BEFORE = ["%", "G21 G17 G90 G94 G40 G49 G80 G54", "G53 G0 Z60.", "{tilt}25. C-70.", "M428", "G0 X20. Y-15. Z40.",
           "G55 G18 G91.1 G93"]
 MINUTE = 60.0
-BOUND, TURNING, CORNER = 0.002, 0.3, SPARE  # mm and deg
+BOUND, TURNING, CORNER = 0.002, 0.3, BALL_CLEARANCE  # mm and deg
 LAG = 0.02  # s, in which an axis comes to where the program has it
 FLAT = np.array([1.0, 1.0, 0.0, 1.0, 1.0])
 GRAIN = 0.1  # mm and deg, legs are cut into for the search

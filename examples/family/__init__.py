@@ -1,4 +1,4 @@
-"""The family of test parts with known truth: recipes, walls, connections, gaps, joins.
+"""The family of test parts with known features: recipes, walls, connections, gaps, joins.
 
-Nothing of the product depends on it; only the demo and ``zonemill family`` call it.
+The product does not depend on it; only the demo and ``zonemill family`` call it.
 """

@@ -1,8 +1,9 @@
-"""Rays from points on the sides of walls to the first other wall they meet.
+"""Rays from points on the sides of walls to the first other wall.
 
-Plan sections give the start, Newton on the ruled surface the exact foot. A free wall may be closed and may face itself;
-its rays count where they meet the other side within 72 degrees of square (``facing_dot``), and tops and ends of walls
-stop them.
+A plan section gives the start of the search, and Newton's method on the ruled surface the exact foot. A free wall may
+be
+closed and may face itself. Its rays count where they meet the other side within 72 degrees of perpendicular
+(``facing_dot``); tops and ends of walls stop them.
 """
 
 from __future__ import annotations
@@ -18,26 +19,28 @@ from examples.family.splines import F64
 from examples.family.walls import LEFT, RIGHT, WallSpec
 
 Blocked = Callable[[F64, F64], np.ndarray]
-"""(n, 3) start and (n, 3) end of rays, mm -> (n,) bool, whether something that is no wall stands between."""
+"""(n, 3) start and (n, 3) end of rays, mm -> (n,) bool, whether material other than a wall lies between."""
 
 FARTHEST = 40.0
-"""mm; rays from and to free walls are not followed beyond."""
+"""mm, longest ray from or to a free wall."""
 EDGE = 1e-9
 LID_SKIN = 0.01
-"""mm; tops and ends stop a ray only when that far before its end, and its own wall's that far behind its beginning."""
+"""mm; tops and ends stop a ray only at that distance before its end, or for its own wall after its start."""
 SKIN = 1e-3
-"""mm; a ray does not meet its own wall nearer than that."""
+"""mm, least distance at which a ray can meet its own wall."""
 
 
 def cast(
     walls: Sequence[WallSpec], i: int, side: int, u: F64, v: F64, blocked: Blocked | None, farthest: float = FARTHEST,
     among: set[int] | None = None,
 ) -> tuple[F64, np.ndarray, F64]:
-    """Rays from points of one side: where they start, which wall they meet first, how far that is (inf: none).
+    """Rays from points of one side: start points, number of the first wall, and distance to it (inf: none).
 
-    u, v     : (n,) float64, 0..1, places on the side
-    farthest : mm; free walls beyond are not looked at
-    among    : walls that are looked at, all when None
+    u, v     : (n,) float64, dimensionless, 0..1, parameters of the side
+    farthest : mm; free walls beyond are ignored
+    among    : walls that are considered, all when None
+
+    Returns (n, 3) float64, mm, part frame, (n,) int64, index, and (n,) float64, mm.
     """
     origin, normal = walls[i].side_point(side, u, v), walls[i].side_normal(side, u, v)
     first, reach, facing = met(walls, i, origin, normal, farthest, among)
@@ -54,9 +57,9 @@ def cast(
 
 def met(walls: Sequence[WallSpec], i: int, origin: F64, normal: F64, farthest: float, among: set[int] | None,
         ) -> tuple[np.ndarray, F64, np.ndarray]:
-    """The wall whose side rays meet first, how far that is (inf: none) and whether that side faces them, (n,) each.
+    """The wall whose side rays meet first, the distance (inf: none), and whether that side faces them, (n,) each.
 
-    origin, normal : (n, 3) float64, mm and unit
+    origin, normal : (n, 3) float64, coordinates in mm, and unit vectors
     """
     distance = np.full((len(walls), len(origin)), np.inf)
     faces = np.zeros((len(walls), len(origin)), bool)
@@ -76,7 +79,7 @@ def stopped(walls: Sequence[WallSpec], i: int, origin: F64, normal: F64, reach: 
             among: set[int] | None) -> np.ndarray:
     """(n,) bool: whether rays from a side of wall i meet the top or an end of a wall before their end.
 
-    origin, normal, reach : (n, 3), (n, 3) and (n,) float64, mm, unit and mm
+    origin, normal, reach : (n, 3), (n, 3) and (n,) float64, coordinates in mm, unit vectors, and mm
     """
     out = np.zeros(len(origin), bool)
     for k, wall in enumerate(walls):
@@ -123,7 +126,7 @@ def _first_triangle(p: F64, d: F64, triangles: F64, least: float, most: F64) -> 
                 continue
             wx, wy, wz = p[i, 0] - a[0], p[i, 1] - a[1], p[i, 2] - a[2]
             f = (wx * hx + wy * hy + wz * hz) / det
-            if f < -EDGE or f > 1.0 + EDGE:  # a ray along the floor meets the lower edge of an end
+            if f < -EDGE or f > 1.0 + EDGE:  # a ray along the floor can meet the lower edge of an end
                 continue
             qx, qy, qz = wy * e1z - wz * e1y, wz * e1x - wx * e1z, wx * e1y - wy * e1x
             g = (d[i, 0] * qx + d[i, 1] * qy + d[i, 2] * qz) / det
@@ -146,7 +149,7 @@ def _apart(origin: F64, wall: WallSpec) -> float:
 def _ray_to_side(origin: F64, normal: F64, wall: WallSpec, side: int) -> tuple[F64, np.ndarray]:
     """Distance along rays to one side of a wall, inf where the ray misses it, and whether the side faces the ray.
 
-    A ray that only grazes a side ends there all the same.
+    A ray that grazes a side ends there too.
     """
     grid = np.linspace(0.0, 1.0, wall.segments + 1)
     s, u = np.full(len(origin), np.inf), np.zeros(len(origin))
@@ -175,7 +178,7 @@ def _plan_hit(p: F64, d: F64, line: F64) -> tuple[F64, F64]:
     with np.errstate(divide="ignore", invalid="ignore"):
         s = (w[..., 0] * e[None, :, 1] - w[..., 1] * e[None, :, 0]) / cross
         t = (w[..., 0] * d[:, None, 1] - w[..., 1] * d[:, None, 0]) / cross
-    # A border ray may miss the end segment of the plan section by the lean of the wall: let Newton decide.
+    # A border ray may miss the end segment of the plan section because the wall leans, so Newton decides.
     slack = np.zeros((2, len(e)))
     slack[0, 0] = slack[1, -1] = 0.5
     good = (s > 1e-9) & (t >= -1e-9 - slack[0]) & (t <= 1 + 1e-9 + slack[1])

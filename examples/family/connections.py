@@ -1,9 +1,9 @@
 """Connections of the family: bars, webs and bent struts that bridge one channel.
 
-Every kind but the round bar is a ruled solid between a left and a right profile:
-the profiles lie half a width to either side of the axis, run from the middle of
-one wall to the middle of the other and hold a lower and an upper curve. The ends
-follow the direction of each wall, so they stay buried when the axis is skew.
+Every kind but the round bar is a ruled solid between a left and a right profile. The profiles lie half a width to
+either
+side of the axis. They run from the middle of one wall to the middle of the other and have a lower and an upper curve.
+The ends follow the direction of each wall, so they stay buried when the axis is skew.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ class ConnectionSpec:
         return Polygon(np.vstack([sides[0], sides[1][::-1]]))
 
     def caps(self) -> F64:
-        """(k, 3) float64, mm: points on the rims of both end faces, which must all be inside the walls."""
+        """(k, 3) float64, mm, part frame: points on the rims of both end faces, which must all lie inside the walls."""
         out = []
         for end, point in enumerate((self.start, self.end)):
             a, b = self.plan_corners(1)[end], self.plan_corners(-1)[end]
@@ -132,7 +132,7 @@ class ConnectionSpec:
 
     @cached_property
     def void_share(self) -> float:
-        """Share of the span with at least 0.5 mm of void between underside and floor."""
+        """Share of the span with at least 0.5 mm of free space between underside and floor."""
         s = np.linspace(*self.span, 201)
         return float((self.axis_height(s) - 0.5 * self.depth > self.walls[0].z_floor + 0.5).mean())
 

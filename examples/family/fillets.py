@@ -1,4 +1,4 @@
-"""Fillets in a process of their own, because the CAD kernel crashes on some of them.
+"""Fillets in a separate process, because the CAD kernel crashes on some of them.
 
     python -m examples.family.fillets IN.brep OUT.brep RADIUS EDGE [EDGE ...]
 
@@ -27,7 +27,8 @@ def filleted(solid: Any, radius: float, edges: list[int]) -> Any | None:
     with tempfile.TemporaryDirectory() as folder:
         before, after = Path(folder, "before.brep"), Path(folder, "after.brep")
         cq.Shape.exportBrep(solid, str(before))
-        command = [sys.executable, "-m", "examples.family.fillets", str(before), str(after), repr(radius), *map(str, edges)]
+        command = [sys.executable, "-m", "examples.family.fillets", str(before), str(after), repr(radius),
+                   *map(str, edges)]
         try:
             done = subprocess.run(command, cwd=Path(__file__).resolve().parents[2], capture_output=True,
                                   timeout=TIME_LIMIT)
@@ -40,7 +41,7 @@ def filleted(solid: Any, radius: float, edges: list[int]) -> Any | None:
 
 
 def main(arguments: list[str]) -> int:
-    """Do what the head of this file says; returns 0 when the file was written."""
+    """Run the command of the module docstring; returns 0 when the file was written."""
     import cadquery as cq
 
     before, after, radius, *edges = arguments

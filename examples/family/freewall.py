@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 from shapely.geometry import Polygon
 
-from examples.family.profiles import Profile
+from examples.family.profiles import DrawnProfile
 from examples.family.splines import F64, interpolate, interpolate_closed, to_edge
 from examples.family.walls import BURIED, LEFT, RIGHT, WallSpec
 
@@ -25,13 +25,14 @@ NODES = {None: 5, "C1": 17, "C4": 17, "C2": 25, "C3": 33, "C7": 41, "C8": 41, "C
 class FreeWall(WallSpec):
     """A wall whose centre line is a drawn profile.
 
-    profile : Profile in plan, mm; its curve is the middle of an open wall and the inner side of a closed one
-    strips  : faces that each side is cut into along the wall; a closed side of one face has a seam
+    profile : DrawnProfile in plan, mm; its curve is the middle of an open wall and the inner side of a closed one
+    strips  : number of faces of each side along the wall; a closed side of one face has a seam
     merged  : whether both sides and both ends are one face (ends rounded)
+
     Thickness, lean and height are those of WallSpec; lean differs between start and end where the wall is twisted.
     """
 
-    profile: Profile = None  # type: ignore[assignment]
+    profile: DrawnProfile = None  # type: ignore[assignment]
     strips: int = 1
     merged: bool = False
 
@@ -53,7 +54,7 @@ class FreeWall(WallSpec):
 
     @property
     def features(self) -> set[str]:
-        """Words for what is special about the wall."""
+        """Words for the special features of the wall."""
         words = {"closed"} if self.closed else set()
         words |= {"seam"} if self.closed and self.strips == 1 else set()
         words |= {"strips"} if self.strips > (2 if self.closed else 1) else set()
@@ -102,8 +103,9 @@ class FreeWall(WallSpec):
 
         v : 0 at the floor, 1 at the top
 
-        The ends have the parameter speed of the sides, and the nodes of a side come closer together towards an end:
-        a step of either would ring.
+        The ends have the parameter speed of the sides, and the nodes of a side come closer together towards an end. A
+        step of
+        either would make the curve oscillate.
         """
         u, half_turn = self._side_nodes, np.linspace(0, np.pi, CAP_NODES + 2)[1:-1]
         right, left = self._rail(RIGHT, v), self._rail(LEFT, v)
@@ -145,12 +147,12 @@ class FreeWall(WallSpec):
         return self.loop(0.0), self.loop(1.0)
 
     def _along_loop(self, side: int, u: F64) -> tuple[F64, float]:
-        """Parameter of the loop at u of a side, and how fast it goes there."""
+        """Parameter of the loop at u of a side, and the parameter speed there."""
         t = 2.0 + self._caps[1] - np.asarray(u) if side == LEFT else np.asarray(u)
         return t, -1.0 if side == LEFT else 1.0
 
     def with_ends(self) -> FreeWall:
-        """The wall with sides that reach round its ends to their middle, where sides and ends are one face."""
+        """The wall with sides that extend around its ends to their middle, where sides and ends are one face."""
         return self._whole if self.merged else self
 
     @cached_property
@@ -158,7 +160,12 @@ class FreeWall(WallSpec):
         return _RoundEnded(**{f.name: getattr(self, f.name) for f in fields(self)})
 
     def side_point(self, side: int, u: F64, v: F64) -> F64:
-        """Points of a side surface, (n, 3) mm; see WallSpec."""
+        """Points of a side surface, as WallSpec.side_point.
+
+        u, v : (n,) float64, dimensionless, parameters along the wall and up
+
+        Returns (n, 3) float64, mm, part frame.
+        """
         if not self.merged:
             return super().side_point(side, u, v)
         t, _ = self._along_loop(side, u)
@@ -166,7 +173,12 @@ class FreeWall(WallSpec):
         return np.asarray(lo + (hi - lo) * np.asarray(v)[..., None])
 
     def side_derivatives(self, side: int, u: F64, v: F64) -> tuple[F64, F64]:
-        """Partial derivatives of a side by u and by v, two (n, 3) mm; see WallSpec."""
+        """Partial derivatives of a side surface by u and by v, as WallSpec.side_derivatives.
+
+        u, v : (n,) float64, dimensionless, parameters along the wall and up
+
+        Returns two (n, 3) float64, mm, part frame.
+        """
         if not self.merged:
             return super().side_derivatives(side, u, v)
         t, sign = self._along_loop(side, u)
@@ -191,9 +203,11 @@ class FreeWall(WallSpec):
         return Polygon(right, [left]) if self.closed else Polygon(np.vstack([left, right[::-1]]))
 
     def side_curve(self, side: int, v: float = 0.5, samples: int = 1001) -> F64:
-        """A side at one height, walked with the void on the left: (samples, 2) float64, mm, evenly spaced.
+        """A side at one height, in the direction with the free space on the left.
 
-        Closed sides come without their end point again, one point less.
+        Returns (samples, 2) float64, mm, plan coordinates, evenly spaced. Closed sides have one point less, since the
+        end point
+        is not repeated.
         """
         u = np.linspace(0.0, 1.0, 4 * samples)
         p = self.side_point(side, u, np.full(len(u), v))[:, :2]

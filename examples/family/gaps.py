@@ -1,10 +1,9 @@
 """True channels and gaps, by dense rays between the generating surfaces of the walls.
 
-From a grid of points on each side of each wall a ray leaves along the normal (``examples.family.casting``); the
-first other wall it meets inside that wall's sides decides the channel, and the
-shortest such ray is the gap. Connections are left out, as in the definition of the gap.
-The shortest ray may begin on a border of a side, or end on one (``examples.family.rims``). Where a wall is one face all
-round, its round ends belong to its sides.
+Rays leave a grid of points on each side of each wall along the normal (``examples.family.casting``). The first other
+wall that a ray meets, inside the sides of that wall, decides the channel. The shortest such ray is the gap. Connections
+are left out, as in the definition of the gap. The shortest ray may begin or end on a border of a side
+(``examples.family.rims``). Where a wall is one face all round, its round ends belong to its sides.
 """
 
 from __future__ import annotations
@@ -20,11 +19,11 @@ from examples.family.splines import F64
 from examples.family.walls import LEFT, RIGHT, WallSpec
 
 ZOOMS = 3
-"""Times the grid is drawn again, eight times finer, round the shortest ray."""
+"""Number of refinements of the grid around the shortest ray, each eight times finer."""
 ROUNDS = 40
-"""Windows that the search for the shortest ray of a free wall looks through at most."""
+"""Most windows in the search for the shortest ray of a free wall."""
 STARTS = 4
-"""Places on a free wall where the search for the shortest ray begins; one at each height, for it may end at a hub."""
+"""Start points on a free wall of the search for the shortest ray; one at each height, as it may end at a hub."""
 
 
 @dataclass(frozen=True)
@@ -52,12 +51,14 @@ def channels(
     """All channels between the walls of a layout.
 
     walls    : the walls
-    blocked  : tells which rays end in material that is no wall (a hub)
-    n_u, n_v : samples along and up each side, for the areas and as the start of the search for the shortest ray;
-               the gap is refined to 1/512 of that pitch, also where it ends at a border or a hub
+    blocked  : says which rays end in material other than a wall (a hub)
+    n_u, n_v : samples along and up each side, for the areas and as the start of the search for the shortest ray. The
+               gap is
+               refined to 1/512 of that pitch, also where it ends at a border or a hub
     foot     : mm above the floor where sides begin, the height of a fillet
     exact    : whether the shortest ray is refined between the samples
-    Returns Gap per pair with at least 1 % of a side facing, in order of the pair.
+
+    Returns one Gap for each pair with at least 1 % of a side facing, in order of the pair.
     """
     walls = [w.with_ends() for w in walls]
     found: dict[tuple[int, int], Gap] = {}
@@ -105,7 +106,7 @@ def _facing(
 
 
 def _starts(wall: WallSpec, reach: F64, mine: np.ndarray, n_v: int) -> list[int]:
-    """Samples to search round: the shortest ray, on a free wall also other short ones elsewhere along it."""
+    """Samples at which the search begins: the shortest ray, and on a free wall other short rays along it."""
     order = mine[np.argsort(reach[mine], kind="stable")]
     if not wall.sees_itself:
         return [int(order[0])]
@@ -120,7 +121,8 @@ def _zoom(
     walls: Sequence[WallSpec], i: int, side: int, blocked: Blocked | None, j: int, start: tuple[float, float],
     counts: tuple[int, int], low: float, gap: float, near: set[int] | None, zooms: int,
 ) -> tuple[float, F64, bool]:
-    """Shortest ray from a side of wall i to wall j round a sample: its length, its start, whether on the border."""
+    """Shortest ray from a side of wall i to wall j around a sample: its length, its start, whether it is on the border.
+    """
     centre, pitch = np.array(start), np.array([1.0, 1.0]) / (np.array(counts) - 1)
     at = walls[i].side_point(side, centre[:1], centre[1:])[0]
     border = _on_border(walls[i], start[0], start[1], low)

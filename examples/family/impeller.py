@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.random import Generator
 
-from examples.family.layout import HubDisc, Layout, connect
+from examples.family.layout import HubDisc, PartLayout, connect
 from examples.family.splines import F64
 from examples.family.walls import WallSpec
 
@@ -21,7 +21,7 @@ def _swept(radii: tuple[float, float], start: float, sweep: float) -> F64:
     return np.column_stack([r * np.cos(angle), r * np.sin(angle)])
 
 
-def impeller(rng: Generator, blades: int = 4) -> Layout:
+def impeller(rng: Generator, blades: int = 4) -> PartLayout:
     """Hub with ``blades`` blades, a splitter between each two, and a strut from each blade to the splitter after it."""
     disc = HubDisc(radius=30.0, thickness=4.0, hub_radius=(8.0, 6.5), hub_height=13.0)
     height = 11.0
@@ -33,7 +33,7 @@ def impeller(rng: Generator, blades: int = 4) -> Layout:
         walls.append(WallSpec("blade", blade, disc.thickness, height, (1.8, 1.4), (0.05, 0.02)))
         split = _swept((15.0, 28.0), (k + 0.5) * pitch + 0.35 * sweep, 0.65 * sweep)
         walls.append(WallSpec("splitter", split, disc.thickness, 0.9 * height, (1.5, 1.2)))
-    layout = Layout("impeller", disc, walls)
+    layout = PartLayout("impeller", disc, walls)
     kinds = ("round_bar", "bar", "arch", "bow")
     struts = []
     for k in range(blades):

@@ -1,6 +1,6 @@
-"""Connections between free walls: straight across to whatever comes first, another stretch of the same wall included.
+"""Connections between free walls: straight across to the next wall, which may be another stretch of the same wall.
 
-A fork leaves one wall, divides over the channel and ends at two places of the walls beyond.
+A fork leaves one wall, divides over the channel, and ends at two places of the walls beyond.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from examples.family.splines import F64
 from examples.family.walls import WallSpec
 
 LONGEST = 12.5
-"""mm; connections do not span more."""
+"""mm, longest span of a connection."""
 BURIED_BY = 0.1
 KEEP_OFF = 1.0
-"""mm; no connection stands nearer to the place where a gap is least."""
+"""mm, least distance between a connection and the narrowest place of a gap."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,12 +89,18 @@ class Across:
 
 
 def look_across(walls: Sequence[WallSpec], i: int, start: F64, way: F64, z: float) -> Across:
-    """What a plan ray from the centre line of a wall meets first.
+    """The first wall that a plan ray from the centre line of a wall meets.
 
     walls : of the layout
-    i     : wall it starts in, at plan point ``start`` (2,), mm, along ``way`` (2,), unit
-    z     : mm, height of the cut
-    Raises LayoutError where nothing stands within 30 mm or its centre line is missed.
+    i     : wall where it starts
+    start : (2,) float64, mm, plan coordinates
+    way   : (2,) float64, unit, plan coordinates, direction
+    z     : mm, height of the section
+
+    Raises
+    ------
+    LayoutError
+        There is no wall within 30 mm, or its centre line is missed.
     """
     ray = LineString([start, start + 30.0 * way])
     entries: list[tuple[float, int]] = []
@@ -149,11 +155,15 @@ def join(
     walls: Sequence[WallSpec], i: int, side: int, u: float, kind: str, z: tuple[float, float], *, width: float,
     depth: float, bend: float = 0.0,
 ) -> ConnectionSpec:
-    """Connection from the side of a wall square across the channel.
+    """Connection from the side of a wall, perpendicular across the channel.
 
     walls : of the layout; the connection leaves wall ``i`` on ``side`` (LEFT or RIGHT) at parameter ``u``
     z, width, depth, bend : mm, see ``examples.family.layout.connect``
-    Raises LayoutError where there is nothing opposite, the ends cannot be buried, or other material is in the way.
+
+    Raises
+    ------
+    LayoutError
+        There is no opposite wall, the ends cannot be buried, or other material is in the way.
     """
     first = walls[i]
     start = first.axis_point(u, z[0])
@@ -175,7 +185,7 @@ def join(
 def _ends_only_there(
     walls: Sequence[WallSpec], outline: Polygon, wanted: set[int], z: tuple[float, float], ends: int
 ) -> None:
-    """Hold a footprint to meeting the wanted walls alone, in as many places as it has ends."""
+    """Check that a footprint meets only the wanted walls, in as many places as it has ends."""
     for level in z:
         pieces = 0
         for k, wall in enumerate(walls):
@@ -199,7 +209,11 @@ def fork(
     walls, i, side, u : as in ``join``
     z      : mm, of its level axis
     spread : rad, of each arm off the stem
-    Raises LayoutError as ``join``.
+
+    Raises
+    ------
+    LayoutError
+        As ``join``.
     """
     start = walls[i].axis_point(u, z)
     way = side * walls[i].plan_normal(np.array([u]))[0]
@@ -255,8 +269,10 @@ def _fork_buried(
 
 
 def within_hub(base: Plate | HubDisc, walls: Sequence[WallSpec], spec: Any) -> bool:
-    """Whether the hub swallows a connection: outside the hub it does not reach the wall it should end at, or more than
-    half of what shows between the walls lies within the hub, which makes it a swelling of the hub.
+    """Whether the hub swallows a connection.
+
+    That is the case where outside the hub it does not reach the wall at its end, or where more than half of its visible
+    part lies within the hub.
 
     base, walls : of the layout
     spec        : ConnectionSpec or ForkSpec
@@ -283,11 +299,12 @@ def draw_joins(
     rng: Generator, base: Plate | HubDisc, walls: Sequence[WallSpec], gaps: list[Gap], count: int,
     kinds: tuple[str, ...],
 ) -> list[Any]:
-    """Draw up to ``count`` connections anywhere between the walls, some over each other.
+    """Draw up to ``count`` connections anywhere between the walls, some above each other.
 
     base : its hub swallows no connection and no end of one
-    gaps : true channels; no connection covers the place where one is least
-    Returns ConnectionSpec and ForkSpec; fewer than asked only where 30 draws a piece found no room.
+    gaps : true channels; no connection covers the narrowest place of one
+
+    Returns ConnectionSpec and ForkSpec; fewer than ``count`` only where 30 draws for each found no room.
     """
     out: list[Any] = []
     starts: list[tuple[int, int, float]] = []
@@ -310,7 +327,7 @@ def draw_joins(
 
 
 def takes_fillets(c: Any) -> bool:
-    """Whether a connection may have fillets; on bent walls the kernel cannot make them."""
+    """Whether a connection may have fillets; the kernel cannot make them on bent walls."""
     return c.kind in ("bar", "web", "round_bar") and all(
         isinstance(w, FreeWall) and w.profile.type is None and w.lean[0] == w.lean[1] for w in c.walls
     )

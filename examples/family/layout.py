@@ -17,7 +17,7 @@ from examples.family.walls import WallSpec
 
 
 class LayoutError(ValueError):
-    """A drawn layout breaks a rule of the family; the recipe draws again."""
+    """A drawn layout breaks a rule of the family; the recipe then draws again."""
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,16 @@ class Plate:
         return x0 >= b[0] + 1 and y0 >= b[1] + 1 and x1 <= b[2] - 1 and y1 <= b[3] - 1
 
     def blocked(self, start: F64, end: F64) -> np.ndarray:
-        """(n,) bool: whether the base stands above its floor between two points; a plate never does."""
+        """Whether the base is above its floor between two points; a plate never is.
+
+        start, end : (n, 3) float64, mm, part frame
+
+        Returns (n,) bool.
+        """
         return np.zeros(len(start), bool)
 
     def above_floor(self, z: float) -> Polygon:
-        """Plan outline at height z of what stands above the floor, mm; of a plate nothing."""
+        """Plan outline at height z of material above the floor, mm; empty for a plate."""
         return Polygon()
 
 
@@ -79,14 +84,19 @@ class HubDisc:
         return bool(np.hypot(xy[:, 0], xy[:, 1]).max() <= self.radius - 1)
 
     def blocked(self, start: F64, end: F64) -> np.ndarray:
-        """(n,) bool: whether the hub touches the segment between two points, (n, 3) float64 in mm."""
+        """Whether the hub touches the segment between two points.
+
+        start, end : (n, 3) float64, mm, part frame
+
+        Returns (n,) bool.
+        """
         f = np.linspace(0.0, 1.0, 65)[:, None]
         p = start[:, None] + (end - start)[:, None] * f
         above = p[..., 2] > self.thickness + self.hub_height
         return np.asarray(((np.hypot(p[..., 0], p[..., 1]) <= self._radius_at(p[..., 2])) & ~above).any(axis=1))
 
     def above_floor(self, z: float) -> Polygon:
-        """Plan outline of the hub at height z, mm; empty over its top."""
+        """Plan outline of the hub at height z, mm; empty above its top."""
         if z > self.thickness + self.hub_height:
             return Polygon()
         return Point(0, 0).buffer(float(self._radius_at(z)), quad_segs=64)
@@ -114,7 +124,7 @@ class WindowSpec:
     z: tuple[float, float]
 
     def footprint(self) -> Polygon:
-        """Plan outline of what is cut away, mm."""
+        """Plan outline of the opening, mm."""
         low, high = (self.wall.axis_point(self.u, z) for z in self.z)
         n = self.wall.plan_normal(np.array([self.u]))[0]
         t = np.array([n[1], -n[0]])
@@ -123,8 +133,9 @@ class WindowSpec:
         corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
         return Polygon([middle + 0.5 * self.width * a * t + reach * b * n for a, b in corners])
 
-    def fits(self, layout: Layout, gaps: list[Gap]) -> bool:
-        """Whether the opening passes the wall cleanly and leaves all else, and every least gap, alone."""
+    def fits(self, layout: PartLayout, gaps: list[Gap]) -> bool:
+        """Whether the opening passes the wall cleanly, without touching other material or the narrowest place of a gap.
+        """
         outline = self.footprint()
         around = outline.buffer(1.0)
         corners = list(outline.exterior.coords)
@@ -146,7 +157,7 @@ class WindowSpec:
         return not any(around.contains(Point(g.at[:2])) for g in gaps if self.index in g.walls)
 
     def solid(self) -> Any:
-        """What is cut away, as a cadquery Solid."""
+        """The opening as a cadquery Solid, to be cut away."""
         import cadquery as cq
 
         corners = list(self.footprint().exterior.coords)[:-1]
@@ -155,8 +166,8 @@ class WindowSpec:
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
-    """Everything a recipe decides.
+class PartLayout:
+    """All decisions of a recipe.
 
     name        : of the recipe
     base        : Plate or HubDisc
@@ -165,9 +176,9 @@ class Layout:
     fillet      : mm, radius of the fillets between walls and floor, 0 for none
     windows     : openings through walls
     rounded     : mm, radius of the fillets where connections meet walls, 0 for none
-    least       : mm, no two walls stand nearer than this in plan
-    meets       : pairs of walls that are meant to meet (T, cross)
-    features    : words for what the recipe put in on purpose
+    least       : mm, least distance between two walls in plan
+    meets       : pairs of walls that meet on purpose (T, cross)
+    features    : words for features that the recipe added on purpose
     """
 
     name: str
@@ -199,13 +210,17 @@ def connect(
     depth: float,
     bend: float = 0.0,
 ) -> ConnectionSpec:
-    """Connection from wall ``pair[0]`` square across to wall ``pair[1]``.
+    """Connection from wall ``pair[0]`` perpendicular across to wall ``pair[1]``.
 
     u     : parameter on the centre line of the first wall
     z     : mm, height of the axis on the first and on the second wall
     width, depth, bend : mm, see ConnectionSpec; the width is reduced until both ends are buried
-    Raises LayoutError where the second wall is missed, the ends cannot be buried, there is no void below,
-    the bend is over 0.3 of the length, or the connection would meet a third wall.
+
+    Raises
+    ------
+    LayoutError
+        The second wall is missed, the ends cannot be buried, there is no free space below, the bend is over 0.3 of the
+        length, or the connection would meet a third wall.
     """
     first, second = walls[pair[0]], walls[pair[1]]
     start = first.axis_point(u, z[0])
@@ -230,9 +245,12 @@ def connect(
 
 
 def settled(spec: ConnectionSpec, depth: float, rounds: int) -> ConnectionSpec:
-    """The connection narrowed until both ends lie ``depth`` mm inside their walls.
+    """The connection, narrowed until both ends lie ``depth`` mm inside their walls.
 
-    Raises LayoutError where so many rounds are not enough, or too little of it is left, or no void below.
+    Raises
+    ------
+    LayoutError
+        ``rounds`` steps are not enough, too little of it is left, or there is no free space below.
     """
     for _ in range(rounds):
         if spec.buried(depth):
@@ -267,8 +285,14 @@ def clear_of(spec: ConnectionSpec, others: list[ConnectionSpec], plan: float = 1
     return True
 
 
-def check(layout: Layout) -> None:
-    """Hold a layout to the rules of the family; raises LayoutError naming the broken one."""
+def check(layout: PartLayout) -> None:
+    """Check a layout against the rules of the family.
+
+    Raises
+    ------
+    LayoutError
+        A rule is broken; the message names it.
+    """
     outlines = [[w.section(z) for z in (w.z_floor, 0.5 * (w.z_floor + w.z_top), w.z_top)] for w in layout.walls]
     for wall, cuts in zip(layout.walls, outlines, strict=True):
         if not all(c.is_valid and layout.base.holds(c) for c in cuts):
@@ -285,11 +309,11 @@ def check(layout: Layout) -> None:
 
 
 def try_connections(
-    rng: Generator, layout: Layout, pairs: list[tuple[int, int]], count: int, kinds: tuple[str, ...]
+    rng: Generator, layout: PartLayout, pairs: list[tuple[int, int]], count: int, kinds: tuple[str, ...]
 ) -> list[ConnectionSpec]:
     """Draw up to ``count`` connections between given pairs of walls.
 
-    Returns the ConnectionSpec list; shorter than asked only where 40 draws a piece found no room.
+    Returns the ConnectionSpec list; shorter than ``count`` only where 40 draws for each found no room.
     """
     out: list[ConnectionSpec] = []
     for k in range(count):
@@ -302,7 +326,7 @@ def try_connections(
     return out
 
 
-def _draw(rng: Generator, layout: Layout, pair: tuple[int, int], kind: str) -> ConnectionSpec | None:
+def _draw(rng: Generator, layout: PartLayout, pair: tuple[int, int], kind: str) -> ConnectionSpec | None:
     first, second = (layout.walls[k] for k in pair)
     floor, top = first.z_floor, min(first.z_top, second.z_top)
     depth = float({"web": rng.uniform(0.8, 1.5)}.get(kind, rng.uniform(1.2, 2.2)))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.random import Generator
 
 from examples.family.gaps import channels
-from examples.family.layout import Layout, LayoutError, Plate, check, connect, try_connections
+from examples.family.layout import LayoutError, PartLayout, Plate, check, connect, try_connections
 from examples.family.splines import F64, interpolate
 from examples.family.walls import WallSpec
 
@@ -41,7 +41,7 @@ def _smooth(rng: Generator, x: F64, amplitude: float, knots: int = 5) -> F64:
     return np.asarray(interpolate(at, rng.uniform(-amplitude, amplitude, knots))(x))
 
 
-def demo(rng: Generator) -> Layout:
+def demo(rng: Generator) -> PartLayout:
     """Three wavy walls about 55 mm long, three connections, one narrow stretch of channel."""
     jitter = rng.uniform(-0.1, 0.1, 4) if rng is not None else np.zeros(4)
     x = np.linspace(-26.0, 26.0, 9)
@@ -58,10 +58,10 @@ def demo(rng: Generator) -> Layout:
         connect(walls, (0, 1), "arch", 0.70 + 0.1 * jitter[3], (8.5, 8.5), width=2.4, depth=1.6, bend=1.4),
         connect(walls, (1, 2), "web", 0.28, (10.5, 10.5), width=5.0, depth=1.2),
     ]
-    return Layout("demo", _plate_for(walls, z, 3.0), walls, connections)
+    return PartLayout("demo", _plate_for(walls, z, 3.0), walls, connections)
 
 
-def narrow(rng: Generator) -> Layout:
+def narrow(rng: Generator) -> PartLayout:
     """Two wavy walls that come within 0.8 mm of each other, joined by a bar and a web."""
     x = np.linspace(-24.0, 24.0, 9)
     wave = _smooth(rng, x, 1.6)
@@ -70,14 +70,14 @@ def narrow(rng: Generator) -> Layout:
     open_gap = 4.5 - 3.6 * np.exp(-(((x - float(rng.uniform(4, 10))) / 8.0) ** 2))
     b = WallSpec("curved", np.column_stack([x, wave + 1.8 + open_gap]), z, h, (1.8, 1.6))
     walls = _shift_to_gap([a, b], 1, 0.8)
-    layout = Layout("narrow", _plate_for(walls, z), walls)
+    layout = PartLayout("narrow", _plate_for(walls, z), walls)
     first = connect(walls, (0, 1), "bar", 0.2, (9.0, 9.0), width=1.6, depth=1.6)
     second = connect(walls, (0, 1), "web", 0.4, (10.0, 10.0), width=4.0, depth=1.0)
     return replace(layout, connections=[first, second])
 
 
-def leaning_pair(rng: Generator) -> Layout:
-    """Two walls that lean the same way, so that one side of each is undercut from above."""
+def leaning_pair(rng: Generator) -> PartLayout:
+    """Two walls that lean the same way, so that one side of each is an undercut from above."""
     x = np.linspace(-22.0, 22.0, 8)
     wave = _smooth(rng, x, 1.5)
     lean = float(np.tan(np.radians(rng.uniform(8, 11))))
@@ -85,11 +85,11 @@ def leaning_pair(rng: Generator) -> Layout:
     a = WallSpec("leaning", np.column_stack([x, wave]), z, h, (2.4, 1.8), (lean, lean))
     b = WallSpec("leaning", np.column_stack([x, 0.8 * wave + 8.0]), z, h, (2.4, 1.8), (lean, 0.85 * lean))
     walls = _shift_to_gap([a, b], 1, 5.0)
-    layout = Layout("leaning_pair", _plate_for(walls, z), walls)
+    layout = PartLayout("leaning_pair", _plate_for(walls, z), walls)
     return replace(layout, connections=try_connections(rng, layout, [(0, 1)], 2, ("round_bar", "bar", "bow")))
 
 
-def three_walls(rng: Generator) -> Layout:
+def three_walls(rng: Generator) -> PartLayout:
     """A straight, an arched and a wavy wall of different height; one strut rises from the floor."""
     x = np.linspace(-25.0, 25.0, 9)
     z = 4.0
@@ -105,18 +105,18 @@ def three_walls(rng: Generator) -> Layout:
         connect(walls, (1, 2), "bow", 0.35, (9.0, 9.0), width=1.6, depth=1.6, bend=1.4),
         connect(walls, (1, 2), "web", 0.75, (11.0, 11.0), width=5.0, depth=1.2),
     ]
-    return Layout("three_walls", _plate_for(walls, z), walls, connections)
+    return PartLayout("three_walls", _plate_for(walls, z), walls, connections)
 
 
-def wavy(rng: Generator) -> Layout:
-    """Two long wavy walls with connections at several heights; takes fillets well."""
+def wavy(rng: Generator) -> PartLayout:
+    """Two long wavy walls with connections at several heights, suitable for fillets."""
     x = np.linspace(-30.0, 30.0, 11)
     wave = 2.2 * np.sin(2 * np.pi * x / float(rng.uniform(32, 40)))
     z = 5.0
     a = WallSpec("curved", np.column_stack([x, wave]), z, 14.0, (2.6, 1.8))
     b = WallSpec("curved", np.column_stack([x, 0.8 * wave + 9.0]), z, 14.0, (2.4, 2.0))
     walls = _shift_to_gap([a, b], 1, 4.5)
-    layout = Layout("wavy", _plate_for(walls, z), walls)
+    layout = PartLayout("wavy", _plate_for(walls, z), walls)
     return replace(layout, connections=try_connections(rng, layout, [(0, 1)], 3, ALL_KINDS))
 
 
@@ -125,7 +125,7 @@ def random(
     walls: int | None = None,
     connections: int | None = None,
     gap: tuple[float, float] = (0.8, 12.0),
-) -> Layout:
+) -> PartLayout:
     """A random part of the family.
 
     walls       : 2 to 6; drawn when None
@@ -144,7 +144,7 @@ def random(
     least = np.exp(rng.uniform(np.log(gap[0]), np.log(gap[1]), count - 1))
     for k in range(1, count):
         lanes = _shift_to_gap(lanes, k, float(least[k - 1]))
-    layout = Layout("random", _plate_for(lanes, z), lanes)
+    layout = PartLayout("random", _plate_for(lanes, z), lanes)
     check(layout)
     facing = {c.walls for c in channels(lanes, n_u=61, n_v=3) if c.gap_min <= 12.5}
     pairs = [(k, k + 1) for k in range(count - 1) if (k, k + 1) in facing]

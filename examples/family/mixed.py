@@ -1,4 +1,5 @@
-"""The scored recipe: 2 to 12 free walls of all profile types, side by side or round a hub, 0 to 16 connections."""
+"""The scored recipe: 2 to 12 free walls of all profile types, side by side or around a hub, with 0 to 16 connections.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +13,8 @@ from shapely.ops import unary_union
 from examples.family.freewall import FreeWall
 from examples.family.gaps import Gap
 from examples.family.joins import draw_joins, takes_fillets
-from examples.family.layout import HubDisc, Layout, LayoutError, Plate, WindowSpec, check
-from examples.family.profiles import CLOSED_TYPES, OPEN_TYPES, Profile, clear, draw_closed, draw_hairpin, draw_open
+from examples.family.layout import HubDisc, LayoutError, PartLayout, Plate, WindowSpec, check
+from examples.family.profiles import CLOSED_TYPES, OPEN_TYPES, DrawnProfile, clear, draw_closed, draw_hairpin, draw_open
 from examples.family.walls import LEFT, RIGHT
 
 KINDS = ("round_bar", "bar", "web", "arch", "bow", "fork")
@@ -21,15 +22,15 @@ CHORD: dict[str | None, tuple[float, float]] = {
     None: (24, 50), "C1": (24, 50), "C4": (24, 50), "C2": (32, 55), "C3": (45, 65), "C9": (44, 62), "C7": (50, 68),
     "C8": (50, 68), "C10": (60, 78),
 }
-"""Length, mm, that a profile is drawn at, so that its bends stay well wider than the wall is thick."""
+"""Length of a profile, mm, so that its bends are much wider than the thickness of the wall."""
 
 
 @dataclass(frozen=True, eq=False)
 class Unit:
-    """Walls that take one lane of a plate, or one lane's share of it.
+    """Walls that take one lane of a plate, or the share of one lane.
 
-    walls : FreeWall, in plan round the origin
-    meets : pairs of places in ``walls`` that are meant to meet
+    walls : FreeWall, in plan around the origin
+    meets : pairs of places in ``walls`` that meet on purpose
     """
 
     walls: tuple[FreeWall, ...]
@@ -39,7 +40,7 @@ class Unit:
 
 @dataclass(frozen=True)
 class Style:
-    """What all walls of a part share: floor height and wall height, mm."""
+    """Properties that all walls of a part share: floor height and wall height, mm."""
 
     z: float
     height: float
@@ -48,14 +49,18 @@ class Style:
 def mixed(
     rng: Generator, walls: int | None = None, connections: int | None = None, gap: tuple[float, float] = (0.3, 12.0),
     arrangement: str | None = None,
-) -> Layout:
-    """A random part with everything the family has.
+) -> PartLayout:
+    """A random part with all features of the family.
 
     walls       : 2 to 12; drawn when None
-    connections : 0 to 16; drawn when None (fewer where no room is left)
+    connections : 0 to 16; drawn when None (fewer where there is no room)
     gap         : mm, range of the least distance between lanes
     arrangement : 'linear' or 'radial'; drawn when None
-    Raises LayoutError where the draw breaks a rule of the family.
+
+    Raises
+    ------
+    LayoutError
+        The draw breaks a rule of the family.
     """
     count = walls if walls is not None else int(rng.integers(2, 13))
     wanted = connections if connections is not None else int(rng.integers(0, 17))
@@ -79,18 +84,18 @@ def mixed(
 
 def mixed_linear(
     rng: Generator, walls: int | None = None, connections: int | None = None, gap: tuple[float, float] = (0.3, 12.0)
-) -> Layout:
+) -> PartLayout:
     """``mixed`` with its walls side by side on a plate."""
     return mixed(rng, walls, connections, gap, "linear")
 
 
-def mixed_radial(rng: Generator, walls: int | None = None, connections: int | None = None) -> Layout:
+def mixed_radial(rng: Generator, walls: int | None = None, connections: int | None = None) -> PartLayout:
     """``mixed`` with blades, and splitters between them, round a hub; at least three."""
     return mixed(rng, walls, connections, arrangement="radial")
 
 
 def _shows(hub: HubDisc | None, wall: FreeWall) -> bool:
-    """Whether both sides show their type where sections are taken, outside a hub."""
+    """Whether both sides show their type at the heights of the sections, outside a hub."""
     for side, label in zip((LEFT, RIGHT), wall.profile.labels, strict=True):
         for v in (0.35, 0.5, 0.65):
             curve = wall.side_curve(side, v)
@@ -101,7 +106,7 @@ def _shows(hub: HubDisc | None, wall: FreeWall) -> bool:
     return True
 
 
-def _wall(rng: Generator, style: Style, profile: Profile, thickest: float, kind: str = "curved") -> FreeWall:
+def _wall(rng: Generator, style: Style, profile: DrawnProfile, thickest: float, kind: str = "curved") -> FreeWall:
     """A wall of a profile with drawn height, thickness, taper, lean and twist, its faces whole, in strips or merged.
 
     Raises LayoutError where no draw kept both sides clear of the borders of their types.
@@ -113,7 +118,7 @@ def _wall(rng: Generator, style: Style, profile: Profile, thickest: float, kind:
     raise LayoutError("a profile came out near the border of its type")
 
 
-def _draw_wall(rng: Generator, style: Style, profile: Profile, thickest: float, kind: str) -> FreeWall:
+def _draw_wall(rng: Generator, style: Style, profile: DrawnProfile, thickest: float, kind: str) -> FreeWall:
     height = style.height * float(rng.uniform(0.85, 1.15))
     foot = float(rng.uniform(1.2, min(thickest, 0.3 * height)))
     top = foot * (float(rng.uniform(0.75, 0.95)) if rng.random() < 0.5 else 1.0)
@@ -180,7 +185,7 @@ def _nested(rng: Generator, style: Style) -> Unit:
     centre = hollow.centroid if hollow.contains(hollow.centroid) else hollow.representative_point()
     draw = draw_closed(rng, "oval", 1.0)
     for radius in np.linspace(14.0, 4.0, 41):
-        profile = Profile("oval", draw.control * radius, True).at((centre.x, centre.y))
+        profile = DrawnProfile("oval", draw.control * radius, True).at((centre.x, centre.y))
         inner = _wall(np.random.default_rng(int(1e6 * room)), style, profile, 2.0, "closed")
         if hollow.contains(inner.section(style.z)) and hollow.contains(inner.section(inner.z_top)):
             return Unit((outer, inner), features=("closed", "nested"))
@@ -211,7 +216,7 @@ def _tee(rng: Generator, style: Style, arms: int) -> Unit:
 
 def _straight(rng: Generator, style: Style, a: tuple[float, float], b: tuple[float, float]) -> FreeWall:
     share = np.linspace(0.0, 1.0, 10)[:, None]
-    profile = Profile(None, np.array(a) + (np.array(b) - np.array(a)) * share)
+    profile = DrawnProfile(None, np.array(a) + (np.array(b) - np.array(a)) * share)
     foot = float(rng.uniform(1.4, 2.2))
     return FreeWall("straight", profile.control, style.z, style.height, (foot, foot), profile=profile)
 
@@ -234,7 +239,7 @@ def _slide(placed: list[FreeWall], arriving: list[FreeWall], gap: float, way: tu
     return float(shift)
 
 
-def _linear(rng: Generator, count: int, gap: tuple[float, float], style: Style) -> Layout:
+def _linear(rng: Generator, count: int, gap: tuple[float, float], style: Style) -> PartLayout:
     """Lanes along x, stacked along y at drawn least distances."""
     units = _draw_units(rng, style, count)
     walls: list[FreeWall] = []
@@ -252,8 +257,8 @@ def _linear(rng: Generator, count: int, gap: tuple[float, float], style: Style) 
     boxes = np.array([w.bounds for w in walls])
     low, high = boxes[:, :2].min(axis=0) - 3.5, boxes[:, 2:].max(axis=0) + 3.5
     x0, y0, x1, y1 = (float(round(c, 1)) for c in (*low, *high))
-    return Layout("mixed", Plate((x0, y0, x1, y1), style.z), walls, least=0.9 * min(gap[0], 0.5), meets=tuple(meets),
-                  features=("linear", *features))
+    return PartLayout("mixed", Plate((x0, y0, x1, y1), style.z), walls, least=0.9 * min(gap[0], 0.5),
+                      meets=tuple(meets), features=("linear", *features))
 
 
 def _draw_units(rng: Generator, style: Style, count: int) -> list[Unit]:
@@ -280,7 +285,7 @@ def _draw_units(rng: Generator, style: Style, count: int) -> list[Unit]:
     return units
 
 
-def _radial(rng: Generator, count: int, style: Style) -> Layout:
+def _radial(rng: Generator, count: int, style: Style) -> PartLayout:
     """Blades round a hub, where the number is even often every second one a splitter; at least three of them."""
     count = max(count, 3)
     split = count % 2 == 0 and count >= 6 and rng.random() < 0.6
@@ -299,14 +304,14 @@ def _radial(rng: Generator, count: int, style: Style) -> Layout:
         wall = _wall(own, style, profile, min(2.2, _thickest(kinds[int(short)])), "splitter" if short else "blade")
         wall = replace(wall, height=min(wall.height, style.height * 1.1), strips=1)
         walls.append(replace(wall, profile=profile.at((0.0, 0.0), 2 * np.pi * k / count)))
-    return Layout("mixed", disc, walls, least=0.3, features=("radial", *(("splitters",) if split else ())))
+    return PartLayout("mixed", disc, walls, least=0.3, features=("radial", *(("splitters",) if split else ())))
 
 
 def _blade_type(rng: Generator) -> str | None:
     return (None, "C1", "C4", "C2")[int(rng.integers(4))]
 
 
-def _rounded_feet(rng: Generator, layout: Layout) -> Layout:
+def _rounded_feet(rng: Generator, layout: PartLayout) -> PartLayout:
     """Fillets at the feet of some layouts whose walls stand apart and meet nothing."""
     if rng.random() > 0.15 or layout.meets or isinstance(layout.base, HubDisc):
         return layout
@@ -316,7 +321,7 @@ def _rounded_feet(rng: Generator, layout: Layout) -> Layout:
     return replace(layout, fillet=round(radius, 2)) if nearest > 2.0 * radius + 0.4 else layout
 
 
-def _windows(rng: Generator, layout: Layout, gaps: list[Gap]) -> Layout:
+def _windows(rng: Generator, layout: PartLayout, gaps: list[Gap]) -> PartLayout:
     """An opening through one wall, clear of everything else; the layout unchanged where 20 draws found no place."""
     for _ in range(20):
         k = int(rng.integers(len(layout.walls)))

@@ -1,10 +1,10 @@
-"""The ten profile types of the paper, drawn from control points by hand-set rules.
+"""The ten profile types of [Arivazhagan2020], drawn from control points by hand-set rules.
 
 A profile is the plan curve of a wall: a B-spline of order 5 through ten control points, chord from (0, 0) to (1, 0).
-Open ones have open uniform knots, closed ones periodic uniform knots and run counter-clockwise. A *bend* is a longest
-run of one sign of curvature that turns by 20 degrees or more. With the void on the left of the way an *up* bend
-bulges towards the void and a *down* bend away from it. Labels follow from the polygon a curve was drawn with, never
-from looking at the curve; ``clear`` only refuses curves that came out near the border of a class.
+Open profiles have open uniform knots. Closed ones have periodic uniform knots and run counter-clockwise. A *bend* is a
+longest run of one sign of curvature that turns by 20 degrees or more. With the free space on the left, an *up* bend
+bulges towards it and a *down* bend away from it. Labels follow from the control polygon, not from the shape of the
+curve; ``clear`` only refuses curves near the border of a class.
 """
 
 from __future__ import annotations
@@ -41,24 +41,24 @@ BENDS: dict[str | None, tuple[int, ...]] = {
     "C7": (UP, DOWN) * 2 + (UP,), "C8": (UP, DOWN) * 2 + (UP,), "C9": (UP, DOWN) * 2 + (UP,),
     "C10": (UP, DOWN) * 3 + (UP,),
 }
-"""Bends that each open type is drawn with, walking with the void on the left."""
+"""Bends of each open type, in the direction with the free space on the left."""
 
 OTHER_SIDE: dict[str | None, str | None] = {
     None: None, "C1": "C4", "C2": "C1", "C3": "C2", "C4": "C1", "C5": "C5", "C6": "C6", "C7": "C2", "C8": "C2",
     "C9": "C2", "C10": "C3", "oval": "C4",
 }
-"""Type seen from the other side, set by hand: ups become downs, and the number of ups decides first."""
+"""Type as seen from the other side, set by hand: ups become downs, and the number of ups decides first."""
 
 OPEN_TYPES: tuple[str | None, ...] = (None, "C1", "C2", "C3", "C4", "C7", "C8", "C9", "C10")
 CLOSED_TYPES = ("C5", "C6", "oval")
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
-    """A drawn plan curve.
+class DrawnProfile:
+    """A drawn plan curve of one of the types of [Arivazhagan2020].
 
     type    : 'C1' to 'C10', 'oval' (closed and convex: C1 from outside, C4 from inside), None for straight
-    control : (10, 2) float64, control points in mm; the void of the left side lies on +y
+    control : (10, 2) float64, control points in mm; the free space of the left side lies on +y
     closed  : whether the curve closes; the left side is then the inner one
     """
 
@@ -78,14 +78,14 @@ class Profile:
         """The curve, parameter 0 to 1."""
         return spline(self.control, self.closed)
 
-    def at(self, centre: tuple[float, float], turn: float = 0.0) -> Profile:
+    def at(self, centre: tuple[float, float], turn: float = 0.0) -> DrawnProfile:
         """The profile turned by ``turn`` rad about the origin, which then moves to ``centre`` (mm)."""
         c, s = np.cos(turn), np.sin(turn)
-        return Profile(self.type, self.control @ np.array([[c, s], [-s, c]]) + centre, self.closed)
+        return DrawnProfile(self.type, self.control @ np.array([[c, s], [-s, c]]) + centre, self.closed)
 
 
 def spline(control: F64, closed: bool = False) -> BSpline:
-    """B-spline of order 5 on ten control points, parameter 0 to 1.
+    """B-spline of order 5 on ten control points, parameter 0 to 1 [DeBoor1978].
 
     control : (10, d) float64, mm
     closed  : periodic uniform knots instead of open uniform ones (five zeros, 1/6 to 5/6, five ones)
@@ -98,8 +98,8 @@ def spline(control: F64, closed: bool = False) -> BSpline:
     return BSpline(np.concatenate([np.zeros(ORDER), inner, np.ones(ORDER)]), control, degree)
 
 
-def draw_open(rng: Generator, kind: str | None, chord: float) -> Profile:
-    """An open profile of a type, its chord centred on the origin along x.
+def draw_open(rng: Generator, kind: str | None, chord: float) -> DrawnProfile:
+    """An open profile of a type of [Arivazhagan2020], its chord centred on the origin along x.
 
     kind  : 'C1', 'C2', 'C3', 'C4', 'C7', 'C8', 'C9', 'C10' or None for straight (a bow of 6 degrees at most)
     chord : mm
@@ -123,18 +123,18 @@ def draw_open(rng: Generator, kind: str | None, chord: float) -> Profile:
     control = (control + noise) * (1.0, rise)
     if kind == "C8":
         control = control[::-1] * (-1.0, 1.0) + (1.0, 0.0)
-    return Profile(kind, (control - (0.5, 0.0)) * chord)
+    return DrawnProfile(kind, (control - (0.5, 0.0)) * chord)
 
 
-def draw_hairpin(rng: Generator, chord: float) -> Profile:
+def draw_hairpin(rng: Generator, chord: float) -> DrawnProfile:
     """A single up bend of 150 to 175 degrees, legs down, its chord (mm) centred on the origin."""
     half = [(0, 0), (0.0, 0.25), (-0.01, 0.6), (0.06, 1.0), (0.3, 1.28)]
     control = np.array(_mirrored(half)) * (1.0, float(rng.uniform(0.85, 1.2)))
-    return Profile("C1", (control - (0.5, 0.0)) * chord)
+    return DrawnProfile("C1", (control - (0.5, 0.0)) * chord)
 
 
-def draw_closed(rng: Generator, kind: str, radius: float) -> Profile:
-    """A closed profile round the origin, counter-clockwise.
+def draw_closed(rng: Generator, kind: str, radius: float) -> DrawnProfile:
+    """A closed profile of a type of [Arivazhagan2020] around the origin, counter-clockwise.
 
     kind   : 'C5' five lobes, 'C6' two lobes of different size, 'oval' convex
     radius : mm, roughly half the size of the curve
@@ -148,7 +148,7 @@ def draw_closed(rng: Generator, kind: str, radius: float) -> Profile:
         control = control * (1.0 + 0.008 * rng.uniform(-1, 1, (POINTS, 2)))
     else:
         control = np.column_stack([np.cos(turn), np.sin(turn)]) * (1.0, float(rng.uniform(0.72, 1.0))) * 1.06
-    return Profile(kind, control * radius, closed=True).at((0.0, 0.0), float(rng.uniform(0, 2 * np.pi)))
+    return DrawnProfile(kind, control * radius, closed=True).at((0.0, 0.0), float(rng.uniform(0, 2 * np.pi)))
 
 
 def _mirrored(half: list[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -158,8 +158,10 @@ def _mirrored(half: list[tuple[float, float]]) -> list[tuple[float, float]]:
 def bends(points: F64, closed: bool = False) -> list[tuple[float, float]]:
     """Runs of one sign of curvature along a dense polyline.
 
-    points : (n, 2) float64, mm, evenly spaced, without the end point again where closed
-    Returns per run its turn in degrees (> 0 to the right: up) and the variation of its curvature, standard deviation
+    points : (n, 2) float64, mm, plan coordinates, evenly spaced; a closed line does not repeat the end point
+
+    Returns for each run its turn in degrees (> 0 to the right: up) and the variation of its curvature, standard
+    deviation
     over mean.
     """
     p = np.vstack([points[-1:], points, points[:1]]) if closed else points
@@ -176,9 +178,11 @@ def bends(points: F64, closed: bool = False) -> list[tuple[float, float]]:
 
 
 def skew(points: F64) -> float:
-    """How far the area between a curve and its chord has its centroid right of the middle, share of the chord.
+    """Asymmetry of the area between a curve and its chord.
 
-    points : (n, 2) float64, mm
+    points : (n, 2) float64, mm, coordinates in plan
+
+    Returns the distance of its centroid to the right of the middle, as a share of the chord.
     """
     e = points[-1] - points[0]
     chord = float(np.hypot(*e))
@@ -189,10 +193,10 @@ def skew(points: F64) -> float:
 
 
 def clear(kind: str | None, points: F64, closed: bool) -> bool:
-    """Whether a side curve shows the bends its type was drawn with, away from the borders of the class.
+    """Whether a side curve shows the bends of its type, away from the borders of the class.
 
     kind   : type of the side, or 'oval'
-    points : (n, 2) float64, mm, the side with the void on the left, evenly spaced
+    points : (n, 2) float64, mm, plan coordinates, the side with the free space on the left, evenly spaced
     """
     runs = [r for r in bends(points, closed) if abs(r[0]) > STRAY_TURN]
     if any(abs(turn) < WANTED_TURN for turn, _ in runs):

@@ -1,10 +1,12 @@
-"""What the tools of a setup can touch on a part, by a dense height field; knows nothing of the planner.
+"""Area that the tools of a setup can touch on a part, by a dense height field, independent of the planner.
 
 The part becomes the height of its mesh over a grid. Each tool assembly (cutting part, neck, shank, holder) is a stack
-of discs and one rounded end; its lowest free tip over every node is the height field dilated by that profile. A
-sample of the machinable area is touched when the tool, placed against it along its normal, has its tip there or
-above. Everything is done at a step and at twice that; the share is extended to a step of nothing, and the difference
-is the error bound that goes with it.
+of
+discs and one rounded end. Its lowest free tip over every node is the height field dilated by that profile. A sample of
+the machinable area is touched when the tool, placed against it along its normal, has its tip there or above. All of
+this
+is done at a step and at twice that step. The share is extrapolated to a step of zero, and the difference is its error
+bound.
 """
 
 from __future__ import annotations
@@ -70,7 +72,7 @@ def _touched(
 ) -> dict[str, np.ndarray]:
     low, high = triangles.reshape(-1, 3).min(axis=0)[:2], triangles.reshape(-1, 3).max(axis=0)[:2]
     margin = max(t["diameter_mm"] for t in tools) + 4 * step
-    # off the nodes by an odd share of the step, or walls along the axes would lie on them
+    # offset by an odd share of the step, or walls along the axes would lie on the nodes
     x0, y0 = low - margin - np.array([0.382, 0.618]) * step
     nx, ny = (np.ceil((high - low + 2 * margin) / step).astype(int) + 2).tolist()
     height = np.full((ny, nx), -np.inf)

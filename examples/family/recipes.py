@@ -1,8 +1,9 @@
-"""The public family of test parts: free-form walls, channels and internal connections, with truth.
+"""The public family of test parts: free-form walls, channels and internal connections, with known features.
 
-``make_part(seed)`` gives a random part, ``make_part(seed, recipe="leaning_pair")`` a
-named one. Every part stands on its seat at z = 0 and is cut from +Z. The truth is
-recorded from the generating curves, never measured on the finished shape.
+``make_part(seed)`` gives a random part, ``make_part(seed, recipe="leaning_pair")`` a named one. Every part stands on
+its
+seat at z = 0 and is cut from +Z. The truth is recorded from the generating curves, never measured on the finished
+shape.
 """
 
 from __future__ import annotations
@@ -25,12 +26,12 @@ from examples.family.freewall import FreeWall
 from examples.family.gaps import Gap
 from examples.family.impeller import impeller
 from examples.family.joins import ForkSpec, takes_fillets
-from examples.family.layout import Layout, LayoutError, WindowSpec, check
+from examples.family.layout import LayoutError, PartLayout, WindowSpec, check
 from examples.family.mixed import mixed, mixed_linear, mixed_radial
 from examples.family.walls import WallSpec
 from examples.setups import suggest_setup
 
-RECIPES: dict[str, Callable[..., Layout]] = {
+RECIPES: dict[str, Callable[..., PartLayout]] = {
     "random": linear.random,
     "demo": linear.demo,
     "narrow": linear.narrow,
@@ -46,10 +47,10 @@ RECIPES: dict[str, Callable[..., Layout]] = {
 
 NUMBERS = {"demo": 0, "impeller": 1, "leaning_pair": 2, "narrow": 3, "random": 4, "three_walls": 5, "wavy": 6,
            "mixed": 7, "mixed_linear": 8, "mixed_radial": 9}
-"""What each recipe adds to its seeds; a number stays with its recipe, so that new recipes change no part."""
+"""Offset of the seeds of each recipe; a number stays with its recipe, so that new recipes change no part."""
 DRAWS, BUILDS = 60, 6
 SEAM = 0.03
-"""mm; an edge this near to both a connection and a wall is where they meet."""
+"""mm; an edge as near as this to both a connection and a wall is their seam."""
 
 STEP_TIME = "1970-01-01T00:00:00"
 
@@ -62,19 +63,21 @@ class FamilyPart:
     shape  : cadquery Solid, valid and closed, mm, seat at z = 0
     truth  : plain data, see ``truth_of``
     setup  : a suggested setup in the form of the setup schema
-    layout : what the shape was made from
+    layout : the layout of the shape
     """
 
     name: str
     shape: Any
     truth: dict[str, Any]
     setup: dict[str, Any]
-    layout: Layout
+    layout: PartLayout
 
     def write(self, directory: str | Path, *, reach: bool = False) -> tuple[Path, Path, Path]:
         """Write NAME.step, NAME.truth.json and NAME.setup.json; the same part gives the same bytes.
 
-        reach : whether the truth also says what the setup can reach, see ``examples.family.reach`` (some seconds)
+        reach : whether the truth also has the area that the setup can reach, see ``examples.family.reach`` (some
+                seconds)
+
         Returns the three paths.
         """
         folder = Path(directory)
@@ -98,7 +101,8 @@ def make_part(seed: int = 0, recipe: str = "random", *, fillet: float = 0.0, **o
     recipe    : a key of RECIPES
     fillet    : mm, radius between walls and floor; 0 for sharp
     overrides : passed to the recipe; the random one takes walls, connections and gap
-    Raises LayoutError where 60 draws gave no layout that keeps the rules, or the union is no single valid solid.
+
+    A LayoutError says that 60 draws gave no valid layout, or that the union is not a single valid solid.
     """
     rng = _generator(seed, recipe)
     for attempt in range(BUILDS):
@@ -115,7 +119,7 @@ def make_part(seed: int = 0, recipe: str = "random", *, fillet: float = 0.0, **o
     return FamilyPart(name, shape, truth, suggest_setup(layout, truth), layout)
 
 
-def _built(layout: Layout) -> tuple[Layout, Any]:
+def _built(layout: PartLayout) -> tuple[PartLayout, Any]:
     """The layout and its solid; without fillets at the connections where the kernel cannot make them."""
     if layout.rounded > 0:
         try:
@@ -125,7 +129,7 @@ def _built(layout: Layout) -> tuple[Layout, Any]:
     return layout, build_solid(layout)
 
 
-def draw_layout(seed: int, recipe: str = "random", **overrides: Any) -> Layout:
+def draw_layout(seed: int, recipe: str = "random", **overrides: Any) -> PartLayout:
     """The layout of a part without building it; draws again, up to 60 times, until the rules hold."""
     return _draw(_generator(seed, recipe), seed, recipe, overrides)
 
@@ -136,21 +140,27 @@ def _generator(seed: int, recipe: str) -> np.random.Generator:
     return np.random.default_rng([seed, NUMBERS[recipe]])
 
 
-def _draw(rng: np.random.Generator, seed: int, recipe: str, overrides: dict[str, Any]) -> Layout:
+def _draw(rng: np.random.Generator, seed: int, recipe: str, overrides: dict[str, Any]) -> PartLayout:
     reason: Exception | None = None
     for _ in range(DRAWS):
         try:
             layout = RECIPES[recipe](rng, **overrides)
             check(layout)
-        except (LayoutError, GEOSException) as error:  # outlines that touch themselves are no layout either
+        except (LayoutError, GEOSException) as error:  # outlines that touch themselves are not a layout either
             reason = error
             continue
         return layout
     raise LayoutError(f"no {recipe} layout for seed {seed}: {reason}")
 
 
-def build_solid(layout: Layout) -> Any:
-    """Unite base, walls and connections into one cadquery Solid; raises LayoutError unless it is valid."""
+def build_solid(layout: PartLayout) -> Any:
+    """Unite base, walls and connections into one cadquery Solid.
+
+    Raises
+    ------
+    LayoutError
+        The solid is not valid.
+    """
     tools = [w.solid() for w in layout.walls] + [c.solid() for c in layout.connections]
     if not all(t.isValid() and _volume(t) > 0 for t in tools):
         raise LayoutError(f"a wall or connection of {layout.name} is no valid solid")
@@ -169,8 +179,8 @@ def build_solid(layout: Layout) -> Any:
     return _filleted(solid, layout) if layout.fillet > 0 else solid
 
 
-def _seams(solid: Any, layout: Layout) -> list[int]:
-    """Places among the edges of a solid where its first connection that takes fillets leaves its walls."""
+def _seams(solid: Any, layout: PartLayout) -> list[int]:
+    """Indices of the edges of a solid where its first connection with fillets meets its walls."""
     outlines = [(c.footprint().buffer(SEAM), c) for c in layout.connections if takes_fillets(c)][:1]
     out = []
     for number, edge in enumerate(solid.Edges()):
@@ -188,7 +198,7 @@ def _seams(solid: Any, layout: Layout) -> list[int]:
 def _with_fillets(solid: Any, radius: float, edges: list[Any]) -> Any:
     try:
         solids = solid.fillet(radius, edges).Solids() if edges else []
-    except Exception as error:  # the kernel's own classes, and what it raises through them
+    except Exception as error:  # the classes of the kernel, and errors that pass through them
         raise LayoutError(f"fillets of {radius} mm do not fit: {error}") from None
     if len(solids) != 1 or not solids[0].isValid() or _volume(solids[0]) <= 0:
         raise LayoutError(f"fillets of {radius} mm do not fit")
@@ -205,7 +215,7 @@ def _volume(solid: Any) -> float:
     return float(props.Mass())
 
 
-def _filleted(solid: Any, layout: Layout) -> Any:
+def _filleted(solid: Any, layout: PartLayout) -> Any:
     """Fillet every edge where a wall meets the floor."""
     z = layout.walls[0].z_floor
     feet = [e for e in solid.Edges() if all(abs(c - z) < 1e-6 for c in (e.BoundingBox().zmin, e.BoundingBox().zmax))]
@@ -219,13 +229,15 @@ def _on_rim(edge: Any, base: Any) -> bool:
     return min(p.x - box.xmin, box.xmax - p.x, p.y - box.ymin, box.ymax - p.y) < 1e-6
 
 
-def truth_of(layout: Layout, name: str = "") -> dict[str, Any]:
-    """What is true of a layout, as plain data.
+def truth_of(layout: PartLayout, name: str = "") -> dict[str, Any]:
+    """The known features of a layout, as plain data; all lengths mm.
 
-    Returns walls (index, kind, height, thickness, z range, a point on each side), connections (wall indices, kind,
-    z range outside the walls, floor contact, a point inside), channels (wall indices, gap_min within 0.5 %,
-    the point where, whether on the border of a side, facing area, and primary: at least a quarter of the smaller
-    side faces the other wall, not a glimpse past or over a wall between) and the seat; all lengths mm.
+    It has walls (index, kind, height, thickness, z range, a point on each side), connections (wall indices, kind, z
+    range
+    outside the walls, floor contact, a point inside), channels and the seat. A channel has wall indices, gap_min within
+    0.5 %, the place of it, whether that is on the border of a side, and facing area. It is primary where at least a
+    quarter
+    of the smaller side faces the other wall.
     """
     gaps = layout.gaps()
     free = any(isinstance(w, FreeWall) for w in layout.walls)
@@ -247,8 +259,8 @@ def truth_of(layout: Layout, name: str = "") -> dict[str, Any]:
     }
 
 
-def features_of(layout: Layout, gaps: list[Gap]) -> list[str]:
-    """What a part holds, as sorted words, so that a failure can be laid to a cause.
+def features_of(layout: PartLayout, gaps: list[Gap]) -> list[str]:
+    """Features of a part, as sorted words, so that a failure can be attributed to a cause.
 
     layout : with FreeWall walls
     gaps   : its true channels
@@ -272,12 +284,12 @@ def features_of(layout: Layout, gaps: list[Gap]) -> list[str]:
     return sorted(words)
 
 
-def _primary(layout: Layout, gap: Gap) -> bool:
+def _primary(layout: PartLayout, gap: Gap) -> bool:
     smaller = min(layout.walls[k].length * layout.walls[k].height for k in gap.walls)
     return bool(gap.area >= 2 * 0.25 * smaller)
 
 
-def _side_point(layout: Layout, wall: WallSpec, side: int) -> Any:
+def _side_point(layout: PartLayout, wall: WallSpec, side: int) -> Any:
     """A point of a side, (3,) float64, mm: in the middle, on a free wall where the solid has the side there."""
     tries = [(u, v) for v in (0.5, 0.65, 0.35, 0.8) for u in (0.5, 0.42, 0.58, 0.66, 0.34, 0.74, 0.26, 0.82, 0.18)]
     others = [w for w in layout.walls if w is not wall]
@@ -294,7 +306,7 @@ def _side_point(layout: Layout, wall: WallSpec, side: int) -> Any:
     return wall.side_point(side, np.array([0.5]), np.array([0.5]))[0]
 
 
-def _wall_truth(layout: Layout, index: int, wall: WallSpec) -> dict[str, Any]:
+def _wall_truth(layout: PartLayout, index: int, wall: WallSpec) -> dict[str, Any]:
     shape: dict[str, Any] = {}
     if isinstance(wall, FreeWall):
         p = wall.profile
@@ -336,7 +348,7 @@ def _connection_truth(index: int, c: ConnectionSpec | ForkSpec) -> dict[str, Any
 
 
 def step_bytes(shape: Any, name: str) -> bytes:
-    """The shape as STEP AP214 text whose header holds no date and no machine.
+    """The shape as STEP AP214 text whose header has no date and no machine.
 
     shape : cadquery Shape, mm
     name  : file and product name in the header

@@ -1,6 +1,6 @@
 """Shortest rays that begin or end on the border of a side: its foot, its top, its ends.
 
-Rays that begin there are looked for along the border; those that end there backwards, from the border point.
+Rays that begin there are searched along the border. Rays that end there are searched backwards, from the border point.
 """
 
 from __future__ import annotations
@@ -15,20 +15,22 @@ from examples.family.splines import F64
 from examples.family.walls import LEFT, RIGHT, WallSpec
 
 BORDER_PLACES = 161
-"""Places on each border of a side from which, and to which, rays are looked for first."""
+"""Start points on each border of a side, for rays from it and to it."""
 BACKWARDS = 1e-6
-"""mm; a ray found backwards may meet a side that much before the border it was found from."""
+"""mm; a ray found backwards may meet a side that much before its border point."""
 
 
 def on_borders(
     walls: Sequence[WallSpec], i: int, side: int, blocked: Blocked | None, j: int, uv: tuple[F64, F64], reach: F64,
     low: float, gap: float, near: set[int] | None,
 ) -> tuple[float, F64]:
-    """Shortest ray from a side of wall i to wall j that begins on the border of the one side or ends on the other's.
+    """Shortest ray from a side of wall i to wall j that begins or ends on the border of a side.
 
-    uv, reach : (n,) float64 each, 0..1 and mm, where rays to j begin and how long they are; the starts for rays found
-                backwards
-    Returns its length, inf where none is found, and its start.
+    uv, reach : (n,) float64 each, dimensionless 0..1 and mm, start parameters and lengths of rays to j; the start
+                values
+                for rays found backwards
+
+    Returns its length, inf where none is found, and its start, (2,) parameters.
     """
     wall, other = walls[i], walls[j]
 
@@ -41,7 +43,7 @@ def on_borders(
         best = min(best, _least_along(border, along), key=lambda b: b[0])
     begin = np.column_stack([wall.side_point(side, *uv), wall.side_normal(side, *uv)])
     feet, starts = cKDTree(begin[:, :3] + reach[:, None] * begin[:, 3:]), cKDTree(begin[:, :3])
-    apart = wall.length / 100 + wall.height / 4  # no place of the side that sees j is farther from a start
+    apart = wall.length / 100 + wall.height / 4  # no visible place of the side is farther from a start
     for facing in (LEFT, RIGHT):
         def backwards(border: tuple[F64, F64], facing: int = facing) -> tuple[F64, F64]:
             length, every = np.full(len(border[0]), np.inf), other.side_point(facing, *border)
@@ -81,7 +83,7 @@ def _borders(wall: WallSpec, low: float) -> list[Callable[[F64], tuple[F64, F64]
 
 def _least_along(border: Callable[[F64], tuple[F64, F64]],
                  rays: Callable[[tuple[F64, F64]], tuple[F64, F64]]) -> tuple[float, F64]:
-    """Least length along a border, looked at ever closer round the best few places: the length and its start."""
+    """Least length along a border, refined around the best few places: the length and its start."""
     t, pitch = np.linspace(0.0, 1.0, BORDER_PLACES), 1.0 / (BORDER_PLACES - 1)
     best: tuple[float, F64] = (np.inf, np.zeros(3))
     for _ in range(6):

@@ -1,7 +1,6 @@
 """Cubic B-splines that are the same curve for numpy and for the CAD kernel.
 
-The truth of a family part is computed on the very curves its faces are made
-of, so both sides share one set of poles and knots.
+The truth of a family part is computed on the curves of its faces, so both sides share one set of poles and knots.
 """
 
 from __future__ import annotations
@@ -16,20 +15,22 @@ F64 = NDArray[np.float64]
 
 
 def interpolate(parameters: F64, points: F64) -> BSpline:
-    """Cubic B-spline through points at given parameters.
+    """Cubic B-spline through points at given parameters [DeBoor1978].
 
-    parameters : (n,) float64, increasing, n >= 4 (fewer: the degree drops to n - 1)
+    parameters : (n,) float64, dimensionless, increasing, n >= 4 (fewer: the degree drops to n - 1)
     points     : (n, d) float64, mm
+
     Returns scipy BSpline of degree min(3, n - 1), not-a-knot end conditions.
     """
     return make_interp_spline(parameters, points, k=min(3, len(parameters) - 1))
 
 
 def interpolate_closed(parameters: F64, points: F64) -> BSpline:
-    """Closed cubic B-spline through points, with the clamped knots that the CAD kernel wants.
+    """Closed cubic B-spline through points [DeBoor1978], with the clamped knots that the CAD kernel needs.
 
-    parameters : (n,) float64, increasing
+    parameters : (n,) float64, dimensionless, increasing
     points     : (n, d) float64, mm, the last equal to the first
+
     Returns scipy BSpline, twice differentiable across the seam.
     """
     slope = CubicSpline(parameters, points, bc_type="periodic")(parameters[0], 1)

@@ -1,9 +1,8 @@
-"""The three test surfaces of Jain (2016), tables 4.2 to 4.4: 5 by 5 control points over 50 mm by 50 mm, order 4.
+"""The three test surfaces of [Jain2016], tables 4.2 to 4.4: 5 by 5 control points over 50 mm by 50 mm, order 4.
 
-Row 0 of the tables for the concave and the convex surface is printed with slips (x = 37 for 37.5, and points that
-belong elsewhere). The surfaces are symmetric, which says what was meant; mended, their facets have the areas the thesis
-prints. The freeform table has two rows that look misprinted as well, 0 and 3, but nothing says what they should be: it
-is used as printed.
+Row 0 of the tables for the concave and the convex surface has misprints (x = 37 for 37.5, and misplaced points). The
+surfaces are symmetric, which shows the right values; corrected, their facets have the areas in the thesis. The table of
+the freeform surface has two rows that look misprinted, 0 and 3. The right values are unknown, so it is used as printed.
 """
 
 from __future__ import annotations
@@ -18,8 +17,8 @@ from geometry.surfaces.nurbs import NurbsSurface
 STEP = 12.5
 
 
-class Kind(StrEnum):
-    """Which of the surfaces."""
+class ThesisSurface(StrEnum):
+    """The surfaces."""
 
     CONCAVE = "concave"
     CONVEX = "convex"
@@ -29,28 +28,32 @@ class Kind(StrEnum):
 # Heights of P_ij: row i at y = 12.5 i, column j at x = 12.5 j.
 _CONVEX = 15.0 + 2.5 * np.minimum(np.arange(5), 4 - np.arange(5))
 _HEIGHTS = {
-    Kind.CONVEX: np.add.outer(_CONVEX - 15.0, _CONVEX),
-    Kind.CONCAVE: 40.0 - np.add.outer(_CONVEX - 15.0, _CONVEX),
-    Kind.FREEFORM: np.add.outer(_CONVEX - 15.0, _CONVEX),
+    ThesisSurface.CONVEX: np.add.outer(_CONVEX - 15.0, _CONVEX),
+    ThesisSurface.CONCAVE: 40.0 - np.add.outer(_CONVEX - 15.0, _CONVEX),
+    ThesisSurface.FREEFORM: np.add.outer(_CONVEX - 15.0, _CONVEX),
 }
 # As printed: the third and fourth point of row 0, and the first of row 3, which is also the first of row 4.
 _PRINTED = {(0, 2): (37.5, 0.0, 17.5), (0, 3): (37.0, 0.0, 25.0), (3, 0): (0.0, 50.0, 15.0)}
 
 
-def surface(kind: Kind | str) -> NurbsSurface:
-    """One of the surfaces, its material below it.
+def surface(kind: ThesisSurface | str) -> NurbsSurface:
+    """One of the surfaces of [Jain2016], with its material below it.
 
-    kind : Kind or its value
+    kind : ThesisSurface or its value
+
     Returns NurbsSurface, mm; u runs along y and v along x, both from 0 to 2.
     """
-    return NurbsSurface.from_control_points(control_points(Kind(kind)), 4, side=-1)
+    return NurbsSurface.from_control_points(control_points(ThesisSurface(kind)), 4, side=-1)
 
 
-def control_points(kind: Kind) -> F64:
-    """The control points P_ij, (5, 5, 3) float64, mm, as the module says."""
+def control_points(kind: ThesisSurface) -> F64:
+    """The control points P_ij of [Jain2016], corrected as the module docstring says.
+
+    Returns (5, 5, 3) float64, mm, part frame.
+    """
     y, x = np.meshgrid(STEP * np.arange(5), STEP * np.arange(5), indexing="ij")
     points = np.stack([x, y, _HEIGHTS[kind]], axis=-1)
-    if kind is Kind.FREEFORM:
+    if kind is ThesisSurface.FREEFORM:
         for place, printed in _PRINTED.items():
             points[place] = printed
     return points

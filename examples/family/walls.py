@@ -1,9 +1,8 @@
 """Walls of the family: a centre line in plan, thickened, tapered and leaned.
 
-A point of a side is ``centre(u) + n(u) * (lean(u) * dz ± thickness(z) / 2)`` with n the
-plan normal to the left of the centre line and dz the height above the floor.
-Both sides are ruled surfaces between two cubic B-splines (floor and top), so a
-section at any height is again a B-spline with linearly mixed poles.
+A point of a side is ``centre(u) + n(u) * (lean(u) * dz ± thickness(z) / 2)``. Here n is the plan normal to the left of
+the centre line, and dz the height above the floor. Both sides are ruled surfaces between two cubic B-splines (floor and
+top), so a section at any height is again a B-spline with linearly mixed poles.
 """
 
 from __future__ import annotations
@@ -84,15 +83,16 @@ class WallSpec:
     def plan_normal(self, u: F64) -> F64:
         """Unit plan normals to the left of the centre line.
 
-        u : (n,) float64 parameters in 0..1
-        Returns (n, 2) float64.
+        u : (n,) float64, dimensionless, parameters in 0..1
+
+        Returns (n, 2) float64, dimensionless, plan coordinates.
         """
         d = np.atleast_2d(self.centre_line.derivative()(u))
         n = np.column_stack([-d[:, 1], d[:, 0]])
         return np.asarray(n / np.linalg.norm(n, axis=1)[:, None])
 
     def _nodes(self) -> F64:
-        # The rails ARE the truth, so they need no more knots than the shape asks for; every knot costs triangles later.
+        # The rails define the truth, so they have no more knots than the shape needs; every knot costs triangles later.
         return np.array([0.0, 1.0]) if self.kind == "straight" else np.linspace(0.0, 1.0, 13)
 
     def _rail(self, side: int, v: float) -> BSpline:
@@ -112,15 +112,16 @@ class WallSpec:
         return {key: rail.derivative() for key, rail in self._rails.items()}
 
     def with_ends(self) -> WallSpec:
-        """The wall whose sides are what a gap is measured between."""
+        """The wall whose sides bound the gaps."""
         return self
 
     def side_point(self, side: int, u: F64, v: F64) -> F64:
         """Points of a side surface.
 
         side : LEFT (+1) or RIGHT (-1) of the centre line
-        u, v : (n,) float64, along the wall and from floor (0) to top (1)
-        Returns (n, 3) float64, mm.
+        u, v : (n,) float64, dimensionless, parameters along the wall and from floor (0) to top (1)
+
+        Returns (n, 3) float64, mm, part frame.
         """
         lo, hi = self._rails[side, 0](u), self._rails[side, 1](u)
         w = np.asarray(v)[..., None]
@@ -130,7 +131,8 @@ class WallSpec:
         """Partial derivatives of a side surface by u and by v.
 
         side, u, v : as in ``side_point``
-        Returns two (n, 3) float64, mm.
+
+        Returns two (n, 3) float64, mm, part frame.
         """
         lo, hi = self._rails[side, 0], self._rails[side, 1]
         w = np.asarray(v)[..., None]
@@ -141,7 +143,8 @@ class WallSpec:
         """Unit normals of a side, out of the material.
 
         side, u, v : as in ``side_point``
-        Returns (n, 3) float64.
+
+        Returns (n, 3) float64, dimensionless, part frame.
         """
         du, dv = self.side_derivatives(side, u, v)
         n = -side * np.cross(du, dv)
@@ -154,7 +157,8 @@ class WallSpec:
         return {s: (self.side_point(s, u, low)[:, :2], self.side_point(s, u, high)[:, :2]) for s in (LEFT, RIGHT)}
 
     def trace(self, side: int, v: float) -> F64:
-        """A side cut at share v of the height by ``segments`` chords, (segments + 1, 2) float64, mm."""
+        """A side cut at share v of the height by ``segments`` chords: (segments + 1, 2) float64, mm, plan coordinates.
+        """
         low, high = self._coarse[side]
         return np.asarray(low + (high - low) * v)
 

@@ -1,4 +1,4 @@
-"""Programs in the words of each control, written from one workplan.
+"""Programs in the language of each control, written from one workplan.
 
-Nothing here reads a program back: that is the work of ``verify``.
+Nothing here reads a program back; ``verify`` does that.
 """

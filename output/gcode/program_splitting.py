@@ -1,7 +1,7 @@
-"""A plan in parts, each of which makes programs no larger than a control takes.
+"""Splits a plan into parts whose programs are small enough for the control.
 
-A part ends where the tool changes, if it can: a machinist changes the program where the machine stands anyway. Where
-one tool alone makes too much, a part ends between two of its steps. A step is never cut.
+A part ends at a tool change where possible, since the machine stands there anyway. Where one tool alone makes too much,
+a part ends between two of its steps. A step is never split.
 """
 
 from __future__ import annotations
@@ -20,13 +20,12 @@ def parts_of(plan: Workplan, dialects: Sequence[Dialect], limit: int) -> list[Wo
 
     limit : bytes of the largest program
 
-    Returns one plan or more; the steps of all of them are those of the plan, in order, and their names say 'part 2 of
-    3'.
+    Returns one or more plans. Together they have the steps of the plan, in order; their names end in 'part 2 of 3'.
 
     Raises
     ------
     OutputError
-        Code program_too_large: a step alone is larger; else as ``output.gcode.program_writer.write_program``.
+        program_too_large: one step alone is larger; else as ``output.gcode.program_writer.write_program``.
     """
     if _size(plan, dialects) <= limit:
         return [plan]
@@ -34,7 +33,7 @@ def parts_of(plan: Workplan, dialects: Sequence[Dialect], limit: int) -> list[Wo
     alone = [_size(replace(named, steps=(s,)), dialects) for s in plan.steps]
     if max(alone) > limit:
         step = plan.steps[alone.index(max(alone))]
-        raise OutputError(f"{step.id} alone makes a program of {max(alone)} bytes, allowed are {limit}",
+        raise OutputError(f"the program of {step.id} alone has {max(alone)} bytes, the limit is {limit}",
                           code="program_too_large", subjects=(step.id, "machine.max_program_kb"), measured=max(alone),
                           limit=limit, remedy="allow larger programs, or a coarser scallop height")
     ends, begun = [], 0
@@ -54,7 +53,10 @@ def _size(plan: Workplan, dialects: Sequence[Dialect]) -> int:
 
 
 def _reach(alone: Sequence[int], begun: int, limit: int) -> int:
-    """How far steps fit in, from one on: what each makes alone, its header counted, is never less than its share."""
+    """Number of the step after the last one that fits, from step ``begun`` on.
+
+    The size of a step alone, with its header, is never less than its share of a longer program.
+    """
     end, size = begun + 1, alone[begun]
     while end < len(alone) and size + alone[end] <= limit:
         size += alone[end]

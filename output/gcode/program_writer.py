@@ -1,22 +1,17 @@
-"""Programs for any control: the order of what is said and done, in the words of a dialect.
+"""Programs for any control: the order of comments, modes, tool changes and moves, in the language of a dialect.
 
-The shape of a program: header comments for the machinist, the modes, then
-per tool the change and per workingstep a comment and its moves. Nothing is
-added to a planned path and nothing is taken from it but points that are equal
-on the grid of ``output.program_grid``. Between steps that do not join, the writer goes
-up to the clearance plane, across, and down, one after the other.
+A program has header comments for the machinist and the modes. Each tool then has its change, and each workingstep a
+comment and its moves. The writer adds nothing to a planned path and drops only points that are equal on the grid of
+``output.program_grid``. Between steps that do not join it goes up to the clearance plane, across, and down, one after
+the other. The words are those of RS-274 [Kramer2000] where a dialect has no other.
 
-Rotary axes. A job of one clamping is one program: XYZ stay the tip in the setup
-frame, the control keeps it there from before the way down to the part until the
-tool is back above it, and rotary words stand in the rapids that turn. A control
-that cannot do that gets the linear joints instead, with the pivots they were
-computed from in the header; what turns in the cut is then timed block by block.
-Tools are changed with both rotary axes at zero.
+Rotary axes: a job of one clamping is one program. XYZ remain the tip in the setup frame, and rotary words stand in the
+rapids that turn. The control keeps the tip from before the first approach until after the last retract. A control
+without this function gets the linear joints, and the header states their pivots. Cutting blocks that turn are then
+timed one by one. Tools are changed with both rotary axes at zero.
 
-Restart points. Where the plan wants them every step begins as after a tool
-change: tool, length, zero, speed, coolant and the keeping of the tip are stated
-again behind a label, from above the clearance plane, or on a machine that turns
-from above the ball its parts lie in.
+Restart points: every step begins as after a tool change. Behind a label it states tool, length, zero, speed, coolant
+and tool centre point control again. It starts above the clearance plane, or above the ball on a machine that turns.
 """
 
 from __future__ import annotations
@@ -29,42 +24,44 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from output.clamping_sequence import Leg, Section, home_of, sections
+from output.clamping_sequence import ClampedStep, Leg, clamped_steps, home_of
 from output.gcode.dialects.base import Dialect
 from output.header_text import decimal, face_words, height_word, step_title, tool_name
 from output.program_grid import GRID, I64, GridArc, check_plan, grid_path, link, pieces, to_grid
 from output.workplan import FIRST_NUMBER, Clamping, Workplan
 from toolpath.workingsteps import ArcSpan, Trajectory, TrajectoryKind, Workingstep
 
-UPRIGHT = 1e-6  # rad off Z, for which no plane is tilted
-_PARTED = re.compile("S[0-9]+([b-z]*)")  # ids of steps, and of their parts for fresh cutters
-LEAST_BELOW = 0.01  # mm under the stock that nobody need be told of
+UPRIGHT_TOLERANCE = 1e-6  # rad from Z, up to which no plane is tilted
+_PARTED = re.compile("S[0-9]+([b-z]*)")  # ids of steps, and of their parts after a change to a fresh cutter
+MIN_DEPTH_BELOW_STOCK = 0.01  # mm below the stock; less is not mentioned in the header
 
 
 def write_program(plan: Workplan, dialect: Dialect) -> str:
     """The program of one access direction, or of one clamping.
 
-    plan    : lengths in mm, setup frame or those of its clamping; rapids move Z alone or XY alone there
+    plan    : lengths in mm, setup frame or frames of its clamping; rapids move either Z or XY there
     dialect : of the control
 
-    Returns the text, ASCII, no line longer than ``dialect.line``, newline at the end; every point reads back within
+    Returns ASCII text with a newline at the end and no line longer than ``dialect.line``. Every point reads back within
     0.00005 mm of the plan on each axis.
-    Raises OutputError for an empty plan, a work offset the control has not, a rapid that moves XY and Z together,
-    a path with a gap, a coordinate, feed or speed that is none, rotary axes that cannot stand as a step wants, a
-    turning cut of joints where the control has no inverse-time feed.
+
+    OutputErrors come from ``check_plan``, ``grid_path``, ``Dialect.zero``, ``each_clamped_step`` and ``Dialect.timed``:
+    an empty plan, a path with a gap, a rapid that moves XY and Z together, a missing work offset, rotary axes outside
+    their
+    limits, or a turning cut without inverse-time feed.
     """
     check_plan(plan)
     zero = dialect.zero(plan.work_offset)
     tolerance = decimal(path_tolerance(plan))
-    walked = [] if plan.clamping is None else sections(plan)
+    steps = [] if plan.clamping is None else clamped_steps(plan)
     low, high = plan.stock.lower.tolist(), plan.stock.upper.tolist()
-    head = [*dialect.opening(_called(plan), low, high), *dialect.numbered(plan.number, plan.number_words),
+    head = [*dialect.opening(_program_title(plan), low, high), *dialect.numbered(plan.number, plan.number_words),
             *_header(plan, dialect, zero, tolerance)]
     if plan.clamping is not None:
-        turning = _Turning(plan, dialect, zero, tolerance, plan.clamping)
-        turning.run(walked)
+        turning = _FiveAxisProgram(plan, dialect, zero, tolerance, plan.clamping)
+        turning.run(steps)
         return dialect.text([*head, *turning.lines])
-    program = _Upright(plan, dialect, zero, tolerance)
+    program = _ThreeAxisProgram(plan, dialect, zero, tolerance)
     for step in plan.steps:
         program.add_step(step)
     program.end()
@@ -72,13 +69,16 @@ def write_program(plan: Workplan, dialect: Dialect) -> str:
 
 
 def path_tolerance(plan: Workplan) -> float:
-    """How far a control may leave the path, mm: 0.001, less where half of the finest chordal tolerance is less."""
+    """Largest deviation that the program allows the control, mm.
+
+    It is 0.001, or half of the finest chordal tolerance where that is smaller.
+    """
     chords = [s.chordal_tolerance for s in plan.steps if s.chordal_tolerance > 0.0]
     return max(GRID, min([0.001, *(0.5 * c for c in chords)]))
 
 
-class _Walk:
-    """Lines so far and the modal state they leave the control in."""
+class _ProgramText:
+    """The lines so far, and the modal state of the control after them."""
 
     letters = "XYZ"
 
@@ -92,7 +92,7 @@ class _Walk:
         self.arcs = any(t.arcs for s in plan.steps for t in s.trajectories)
 
     def _put_in(self, step: Workingstep) -> None:
-        """The tool of a step, fresh from the magazine or in the place of a worn one."""
+        """Load the tool of a step from the magazine, or replace a worn cutter."""
         tool, d = step.tool, self.dialect
         self.lines += d.comment(tool_name(tool))
         if step.fresh:
@@ -107,33 +107,33 @@ class _Walk:
             self.speed = speed
 
     def _arrive(self, step: Workingstep, place: Sequence[int], tcp: bool) -> None:
-        """After a tool change only the control knows where the tool is: Z first, then across."""
+        """First moves after a tool change: Z first, then across, since only the control knows where the tool is."""
         height = self.letters[2] + self.dialect.number(place[2])
         self.lines += self.dialect.arrive(step.tool.number, height, tcp)
         self.rapid = True
-        self._say([" ".join(a + self.dialect.number(v) for a, v in zip("XY", place, strict=False))], True)
+        self._straight([" ".join(a + self.dialect.number(v) for a, v in zip("XY", place, strict=False))], True)
 
-    def _say(self, rows: list[str], rapid: bool, feed: float = 0.0) -> None:
-        """Straight blocks of one kind, with what changes."""
+    def _straight(self, rows: list[str], rapid: bool, feed: float = 0.0) -> None:
+        """Straight blocks of one kind, with the words that change."""
         word = "" if rapid else self._changed(feed)
         self.lines += self.dialect.straight(rows, rapid, rapid is not self.rapid, word)
         self.rapid = rapid
 
-    def _round(self, arc: GridArc, feed: float) -> None:
-        """The block or blocks of an arc; what follows states its kind again."""
+    def _arc(self, arc: GridArc, feed: float) -> None:
+        """The block or blocks of an arc; the next block states its kind again."""
         self.lines += self.dialect.arc(arc, self._changed(feed))
         self.rapid = None
 
-    def _wind(self, points: I64, arcs: Sequence[ArcSpan], feed: float) -> None:
+    def _path_with_arcs(self, points: I64, arcs: Sequence[ArcSpan], feed: float) -> None:
         """A path with arcs; points (n, k) on the grid, the first is where the tool stands."""
         for piece in pieces(points, arcs):
             if isinstance(piece, GridArc):
-                self._round(piece, feed)
+                self._arc(piece, feed)
             else:
-                self._say(self._rows(piece), False, feed)
+                self._straight(self._rows(piece), False, feed)
 
     def _changed(self, feed: float) -> str:
-        """A feed as it is written, where it is another than before, else ''."""
+        """The feed as text where it differs from the one before, else ''."""
         word = decimal(feed, 1 if feed >= 1.0 else 4)
         if word == self.feed:
             return ""
@@ -157,13 +157,13 @@ class _Walk:
             self.lines += self.dialect.label(step.id, label_number(self.plan, step))
 
 
-class _Upright(_Walk):
+class _ThreeAxisProgram(_ProgramText):
     """A program of three axes."""
 
     def __init__(self, plan: Workplan, dialect: Dialect, zero: str, tolerance: str) -> None:
         super().__init__(plan, dialect, zero, tolerance)
         self.clearance = int(to_grid(np.array([plan.clearance_plane]))[0])
-        if not plan.restart:  # else every step states them
+        if not plan.restart:  # with restart points every step states the modes
             self.lines += self._modes()
 
     def _modes(self) -> list[str]:
@@ -171,7 +171,7 @@ class _Upright(_Walk):
         return [*d.modes(self.tolerance, False), *(d.arc_modes() if self.arcs else []), *d.state_zero(self.zero)]
 
     def add_step(self, step: Workingstep) -> None:
-        """A step with the way to it."""
+        """A step, with the moves to it."""
         path = grid_path(step)
         start = path[0][1][0]
         self.lines.append("")
@@ -191,95 +191,95 @@ class _Upright(_Walk):
         self.position = path[-1][1][-1]
 
     def end(self) -> None:
-        """Up, and off."""
+        """Retract and end of the program."""
         self._retract()
-        self.lines += [*self.dialect.stop(), *self.dialect.closing(_called(self.plan))]
+        self.lines += [*self.dialect.stop(), *self.dialect.closing(_program_title(self.plan))]
 
     def _retract(self) -> None:
         """Up to the clearance plane; never down to it."""
         if self.position is not None and self.position[2] < self.clearance:
-            self._say([self.letters[2] + self.dialect.number(self.clearance)], True)
+            self._straight([self.letters[2] + self.dialect.number(self.clearance)], True)
             self.position = np.array([*self.position[:2], self.clearance])
 
     def _go_to(self, step: Workingstep, start: I64) -> None:
-        """To the first point of a step: Z to the clearance plane, XY, Z."""
+        """Rapids to the first point of a step: Z to the clearance plane, XY, Z."""
         if self.position is None:
             place = [int(start[0]), int(start[1]), max(self.clearance, int(start[2]))]
             self._arrive(step, place, False)
             self.position = np.array(place)
         points = link(self.position, start, self.clearance)
         if len(points) > 1:
-            self._say(self._rows(points), True)
+            self._straight(self._rows(points), True)
         self.position = start
 
     def _follow(self, trajectory: Trajectory, points: I64) -> None:
         """One line a point, with the words that change; the first point is where the tool stands."""
         if trajectory.arcs:
-            self._wind(to_grid(trajectory.points), trajectory.arcs, trajectory.feed)
+            self._path_with_arcs(to_grid(trajectory.points), trajectory.arcs, trajectory.feed)
         elif len(points) > 1:
-            self._say(self._rows(points), trajectory.motion is TrajectoryKind.RAPID, trajectory.feed)
+            self._straight(self._rows(points), trajectory.motion is TrajectoryKind.RAPID, trajectory.feed)
 
 
-class _Turning(_Walk):
-    """A program whose columns are X, Y, Z and the two rotary axes, grid units, 0.0001 mm and 0.0001 deg."""
+class _FiveAxisProgram(_ProgramText):
+    """A program with the columns X, Y, Z and two rotary axes, grid steps of 0.0001 mm and 0.0001 deg."""
 
     def __init__(self, plan: Workplan, dialect: Dialect, zero: str, tolerance: str, clamping: Clamping) -> None:
         super().__init__(plan, dialect, zero, tolerance)
         self.clamping, self.machine = clamping, clamping.machine
         self.letters = "XYZ" + self.machine.letters
         self.home = home_of(clamping)
-        self.plane: F64 | None = None  # columns are its axes in the setup frame
-        self.place = np.zeros(3, dtype=np.int64)  # in it
+        self.plane: F64 | None = None  # columns are the axes of the tilted plane in the setup frame
+        self.place = np.zeros(3, dtype=np.int64)  # tip in the tilted plane, grid steps
 
-    def run(self, walked: list[Section]) -> None:
+    def run(self, steps: list[ClampedStep]) -> None:
         """All lines after the header."""
         self.lines += self.dialect.comment("The spindle goes up to machine zero before the rotary axes turn to 0: Z0 "
                                            "there is taken to be the top of its travel")
         if not self.plan.restart:
             self.lines += self._modes()
-        for section in walked:
-            self._add(section)
-        self.lines += [*self.dialect.stop(), *self.dialect.closing(_called(self.plan))]
+        for clamped in steps:
+            self._add_step(clamped)
+        self.lines += [*self.dialect.stop(), *self.dialect.closing(_program_title(self.plan))]
 
     def _modes(self) -> list[str]:
         d = self.dialect
         return [*d.modes(self.tolerance, True), *(d.arc_modes() if self.arcs else []),
                 *(d.tcp_off() if self.machine.tcp else []), *d.state_zero(self.zero), *d.aloft(self.machine.letters)]
 
-    def _add(self, section: Section) -> None:
-        step = section.step
+    def _add_step(self, clamped: ClampedStep) -> None:
+        step = clamped.step
         self.lines.append("")
-        if section.fresh:
+        if clamped.fresh:
             if self.tool is not None:
                 self.lines += self.dialect.stop()
             if self.plan.restart:
                 self._label(step)
                 self.lines += self._modes()
-            elif self.tool == step.tool and not step.fresh:  # for its speed alone: not changed, it stays low by itself
+            elif self.tool == step.tool and not step.fresh:  # same tool, other speed: it is not raised
                 self.lines += self.dialect.rise()
             self._put_in(step)
         self.lines += self.dialect.comment(step_words(step))
         self._set_speed(step)
-        if section.fresh:
+        if clamped.fresh:
             at = to_grid(self.home).tolist()
             self._arrive(step, at, self.machine.tcp)
             if self.machine.tcp:
                 self.lines += self.dialect.tcp_on(step.tool.number, self.zero)
                 self.rapid = None
             self.position = np.array([*at, 0, 0], dtype=np.int64)
-        for leg in section.before:
-            self._leg(leg)
-        self._in_plane(section.legs)
-        for leg in section.after:
-            self._leg(leg)
-        if section.last and self.machine.tcp:
+        for leg in clamped.before:
+            self._write_leg(leg)
+        self._in_plane(clamped.legs)
+        for leg in clamped.after:
+            self._write_leg(leg)
+        if clamped.last and self.machine.tcp:
             self.lines += [*self.dialect.tcp_off(), *self.dialect.restated(self.zero)]
             self.rapid = None
 
     def _in_plane(self, legs: Sequence[Leg]) -> None:
-        """A step; in a plane square to its tool axis where the axis is fixed, leans and the control wants it so."""
+        """The moves of a step; in a tilted plane where its axis is fixed and tilted and the dialect wants it."""
         axis = legs[0].axes[0]
-        flat = not any(leg.is_turning for leg in legs) and float(np.hypot(*axis[:2])) > UPRIGHT
+        flat = not any(leg.is_turning for leg in legs) and float(np.hypot(*axis[:2])) > UPRIGHT_TOLERANCE
         if flat and self.dialect.planes and self.machine.tcp:
             first, second = to_grid(np.degrees(self.dialect.plane_angles(axis))).tolist()
             self.plane = self.dialect.plane_axes(np.radians(first * GRID), np.radians(second * GRID))
@@ -287,12 +287,12 @@ class _Turning(_Walk):
             self.lines += self.dialect.plane_on(first, second)
             self.rapid = None
         for leg in legs:
-            self._leg(leg)
+            self._write_leg(leg)
         if self.plane is not None:
             self.plane, self.rapid = None, None
             self.lines += self.dialect.plane_off()
 
-    def _leg(self, leg: Leg) -> None:
+    def _write_leg(self, leg: Leg) -> None:
         """The blocks of a leg; it begins where the tool stands."""
         turns = to_grid(self.machine.words(np.degrees(leg.turns)))
         gauge = 0.0 if self.tool is None else self.clamping.gauges[self.tool.number]
@@ -305,7 +305,7 @@ class _Turning(_Walk):
         in_time = not self.machine.tcp and not rapid and leg.is_turning
         self.position = points[-1]
         if leg.arcs:
-            self._wind(points, leg.arcs, leg.feed)
+            self._path_with_arcs(points, leg.arcs, leg.feed)
             return
         moved = (points[1:] != points[:-1]).any(axis=1)
         if self.plane is None:
@@ -319,13 +319,14 @@ class _Turning(_Walk):
             self.lines += self.dialect.timed(rows, (leg.feed / length).tolist())
             self.rapid, self.feed = None, ""
             return
-        self._say(rows, rapid, leg.feed)
+        self._straight(rows, rapid, leg.feed)
 
     def _planar(self, points: I64, places: F64) -> list[str]:
-        """Rows of points (m, 3) of the plane, grid steps, and the places they stand for, mm.
+        """Rows of points (m, 3) in the tilted plane, grid steps; ``places`` are the same points in mm.
 
-        A move of next to nothing may be none on this grid; it is stepped the way it goes then, so that a program has
-        the same blocks with planes and without.
+        A very short move may vanish on this grid. It then gets one step in its direction, so that a program has the
+        same
+        blocks with planes and without.
         """
         at = self.place
         for k in range(len(points)):
@@ -340,9 +341,9 @@ class _Turning(_Walk):
 
 
 def label_number(plan: Workplan, step: Workingstep) -> int:
-    """The N word a step can be started at: a hundred times the number in its id, and which part of a step it is.
+    """The N word of the restart point of a step: a hundred times the number in its id, plus the number of its part.
 
-    So it is in a program of some of the steps too, but for ids that are not of this form.
+    It is the same in a program of some of the steps, unless the ids have another form.
 
     >>> from types import SimpleNamespace as S
     >>> plan = S(steps=[S(id="S07"), S(id="S07b"), S(id="S08")])
@@ -359,8 +360,9 @@ def label_number(plan: Workplan, step: Workingstep) -> int:
     return own + same.index(step.id)
 
 
-def _called(plan: Workplan) -> str:
-    """What controls that know programs by names call it; they cut them short, so numbers of further ones are first."""
+def _program_title(plan: Workplan) -> str:
+    """The name for controls that know programs by names. They truncate names, so the number of a further one is first.
+    """
     return plan.name if plan.number == FIRST_NUMBER else f"{plan.number} {plan.name}"
 
 
@@ -400,7 +402,7 @@ def _only_at_zero(plan: Workplan) -> str:
 
 
 def _heights(plan: Workplan, d: Dialect) -> list[str]:
-    """Where rapids are free, how deep the tip goes, and what a machine with rotary axes has to know."""
+    """Header lines: where rapids are free, how deep the tip goes, and the clamping of a machine with rotary axes."""
     c = plan.clamping
     if c is None:
         return [f"Clearance plane Z {decimal(plan.clearance_plane, 3)}: above it rapids in XY are free", _lowest(plan)]
@@ -427,15 +429,16 @@ def lowest_tip(plan: Workplan) -> float:
 
 
 def _lowest(plan: Workplan) -> str:
-    """How deep the tip goes, for whoever sets the part on a table."""
+    """Header line: how deep the tip goes, for a part that is set on a table."""
     lowest = lowest_tip(plan)
     below = float(plan.stock.lower[2]) - lowest
-    more = f", {decimal(below, 3)} below the stock box: nothing may stand there" if below > LEAST_BELOW else ""
+    words = f", {decimal(below, 3)} below the stock box: nothing may stand there"
+    more = words if below > MIN_DEPTH_BELOW_STOCK else ""
     return f"Lowest Z of the tip {decimal(lowest, 3)}{more}"
 
 
 def _into_setup(plan: Workplan, access: str) -> F64:
-    """(3, 3): points (n, 3) of the frame of an access, times this, are in the setup frame."""
+    """(3, 3): points (n, 3) in the frame of an access, times this matrix, are in the setup frame."""
     return np.eye(3) if plan.clamping is None else plan.clamping.frames[access].rotation
 
 
@@ -444,7 +447,7 @@ def _tools_in_use(plan: Workplan) -> list[ToolBody]:
 
 
 def step_words(step: Workingstep) -> str:
-    """What the comment before a step says: its id, zone, strategy, tool, faces and heights."""
+    """The comment before a step: its id, zone, strategy, tool, faces and heights."""
     zone = step.zone or "several zones"
     faces = face_words(step) or "no faces"
     words = [

@@ -1,18 +1,16 @@
 """STEP-NC as AP238 (ISO 10303-238): a toolpath for every operation, streamed.
 
-Every parameter of the application model is a property with a representation;
-the strings are those of clause 5.1 of the standard. Units are written in the
-file: mm, mm/min, rev/min (negative: a right-hand cutter seen from the holder).
-Rapids are toolpaths of their operation with the speed profile 'rapid', those
-that lead to it and away from it too. Where a fresh cutter is due, a message and
-a program stop stand before the workingstep.
+Every parameter of the application model is a property with a representation; the strings are those of clause 5.1 of the
+standard. The file states its units: mm, mm/min, rev/min (negative: a right-hand cutter seen from the holder). Rapids
+are
+toolpaths of their operation with the speed profile 'rapid', also those to it and away from it. Before a fresh cutter
+there are a message and a program stop.
 
-What a file is for (``output.workplan.Ap238``): conformance class 1 has tool paths
-and no shape, one workplan, and, as clause 6.2 wants of explicit tool paths, no
-strategy, whose figures stand in the purpose of the operation. Class 2 has part
-and stock as shapes, the strategies and the instructions for the setup as well:
-blocks and cylinders by their sizes, all else as triangles, faces named as in
-the report. Readers of the first edition get class 1 under its schema name.
+The purpose of a file (``output.workplan.Ap238``) decides its content. Conformance class 1 has tool paths, one workplan
+and no shape. By clause 6.2 explicit tool paths have no strategy, so its figures are in the purpose of the operation.
+Class 2 adds part and stock as shapes, the strategies and the setup instructions. Blocks and cylinders have their sizes;
+other shapes are triangles, with faces named as in the report. Readers of the first edition get class 1 under its schema
+name.
 """
 
 from __future__ import annotations
@@ -35,14 +33,14 @@ from output.stepnc.common import (
     path_points,
     region_name,
     setup_words,
+    step_paths,
     stock_box,
     to_and_fro,
     trimmed_circle,
-    ways,
     written_feed,
     written_speed,
 )
-from output.stepnc.part21 import Part21, Write, quoted, real, reals, refs
+from output.stepnc.part21 import Part21Writer, Write, quoted, real, reals, refs
 from output.workplan import Ap238, Workplan
 from toolpath.workingsteps import Trajectory, TrajectoryKind, Workingstep
 
@@ -61,7 +59,7 @@ _SCHEMA = {
 
 
 def write_stepnc_aim(plan: Workplan) -> str:
-    """The text that ``stream_stepnc_aim`` writes, as a whole; errors as there."""
+    """The text that ``stream_stepnc_aim`` writes [ISO10303-238]; errors as there."""
     pieces: list[str] = []
     stream_stepnc_aim(plan, pieces.append)
     return "".join(pieces)
@@ -70,24 +68,30 @@ def write_stepnc_aim(plan: Workplan) -> str:
 def stream_stepnc_aim(plan: Workplan, write: Write) -> None:
     """Write the job as an AP238 Part 21 file, piece by piece.
 
-    plan  : lengths in mm, setup frame; ``plan.ap238`` says what the file is for
-    write : takes the text, ASCII; points read back within 0.00005 mm of the plan on each axis
-    Raises OutputError as ``output.program_grid.check_plan`` and ``grid_path`` do, and where the stock box is empty; what was
-    written until then is no file.
+    plan  : lengths in mm, setup frame; ``plan.ap238`` is the purpose of the file
+    write : receives ASCII text; points read back within 0.00005 mm of the plan on each axis
+
+    OutputErrors come from ``output.program_grid.check_plan``, ``grid_path`` and ``stock_box``. The text written until
+    then
+    is not a valid file.
+
+    Notes
+    -----
+    Entities, attributes and strings follow [ISO10303-238]; the numbers of the process follow [ISO14649-10].
     """
     check_plan(plan)
     _Ap238Writer(plan, write).run()
 
 
 class _Ap238Writer:
-    """One file being written; the small dictionaries keep equal instances single."""
+    """One file being written; the dictionaries keep equal instances single."""
 
     def __init__(self, plan: Workplan, write: Write) -> None:
         self.plan = plan
         self.shapes = plan.ap238 is Ap238.CC2
         self.schema = _SCHEMA[plan.ap238]
         words = f"AP238 freeform milling, conformance class {2 if self.shapes else 1}, cutter location paths"
-        self.file = Part21(write, description=header_words(plan, words), name=f"{plan.name}.stpnc",
+        self.file = Part21Writer(write, description=header_words(plan, words), name=f"{plan.name}.stpnc",
                            schema=(self.schema.upper(),), system=f"zonemill {plan.version}")
         self.symbols: dict[str, int] = {}
         self.technologies: dict[tuple[float, float], int] = {}
@@ -100,12 +104,12 @@ class _Ap238Writer:
         self._project()
         self._setup()
         self._functions()
-        for way in ways(self.plan):
-            if all(len(c.points) < 2 for c in way.path):
-                raise OutputError(f"{way.step.id} does not move", code="empty_step", subjects=(way.step.id,))
-            if way.step.fresh:
-                self._pause(way.step)
-            self._element(self._workingstep(way.step, [*way.before, *way.path, *way.after]))
+        for path in step_paths(self.plan):
+            if all(len(c.points) < 2 for c in path.path):
+                raise OutputError(f"{path.step.id} does not move", code="empty_step", subjects=(path.step.id,))
+            if path.step.fresh:
+                self._pause(path.step)
+            self._element(self._workingstep(path.step, [*path.before, *path.path, *path.after]))
         for number, tool, operations in self.tools.values():
             self._tool(number, tool, operations)
         self.file.close()
@@ -180,7 +184,7 @@ class _Ap238Writer:
         return self.file.add(f"PRODUCT_DEFINITION('','',#{formation},#{self.view})")
 
     def _stock_shape(self) -> int:
-        """The blank: a cylinder, triangles, or a block, which is a box round it where it is neither."""
+        """The blank: a cylinder, triangles, or a block. The block is the bounding box where the blank is neither."""
         add, cylinder = self.file.add, self.plan.cylinder
         if self.plan.stock_mesh is not None:
             return self._triangles("stock", self.plan.stock_mesh)
@@ -199,7 +203,7 @@ class _Ap238Writer:
         return add(f"BLOCK_SHAPE_REPRESENTATION('{name}',{refs(items)},#{self.space})")
 
     def _triangles(self, name: str, mesh: TriangleMesh) -> int:
-        """A mesh with a face for every face number, named as in the report."""
+        """A mesh with one face for every face number, named as in the report."""
         add = self.file.add
         rows = ",\n".join(reals(v, 6) for v in mesh.vertices.tolist())
         places = add(f"COORDINATES_LIST('',{len(mesh.vertices)},({rows}))")
@@ -214,7 +218,7 @@ class _Ap238Writer:
         return add(f"TESSELLATED_SHAPE_REPRESENTATION('{name}',(#{solid}),#{self.space})")
 
     def _setup(self) -> None:
-        """The setup with its security plane, and, beside shapes, what the machinist is told before all else."""
+        """The setup with its security plane and, in class 2, the setup instructions."""
         plan, add = self.plan, self.file.add
         name = quoted(f"setup {plan.work_offset} sha256 {plan.setup_sha256}")
         setup = self._definition(add(f"MACHINING_SETUP({name},{name},'',(#{self.product_context}))"))
@@ -226,13 +230,13 @@ class _Ap238Writer:
         process = add(f"PRODUCT_DEFINITION_PROCESS('setup','',#{self.workplan},'')")
         add(f"PROCESS_PRODUCT_ASSOCIATION('','',#{setup},#{process})")
         if self.shapes:
-            told = add("MACHINING_PROCESS_EXECUTABLE('setup instructions','setup instructions','','')")
+            instructions = add("MACHINING_PROCESS_EXECUTABLE('setup instructions','setup instructions','','')")
             kind = add("DOCUMENT_TYPE('setup instructions')")
-            sheet = add(f"DOCUMENT('setup','setup instructions','',#{kind})")  # one is due, though all is said here
+            sheet = add(f"DOCUMENT('setup','setup instructions','',#{kind})")  # the schema requires a document
             for place, words in enumerate(setup_words(plan), start=1):
                 note = add(f"MACHINING_OPERATOR_INSTRUCTION('',{quoted(words)},'','',(#{sheet}))")
-                add(f"MACHINING_OPERATOR_INSTRUCTION_RELATIONSHIP('','',#{told},#{note},{place}.)")
-            self._element(told)
+                add(f"MACHINING_OPERATOR_INSTRUCTION_RELATIONSHIP('','',#{instructions},#{note},{place}.)")
+            self._element(instructions)
 
     def _length(self, name: str, value: float) -> int:
         return self.file.add(f"(LENGTH_MEASURE_WITH_UNIT() MEASURE_REPRESENTATION_ITEM() "
@@ -244,7 +248,7 @@ class _Ap238Writer:
         self.file.add(f"ACTION_PROPERTY_REPRESENTATION('',{about},#{prop},#{representation})")
 
     def _symbol(self, value: str) -> int:
-        """The representation of a symbolic value such as 'approach'; one for the whole file."""
+        """The representation of a symbolic value such as 'approach', one for the whole file."""
         if value not in self.symbols:
             item = self.file.add(f"DESCRIPTIVE_REPRESENTATION_ITEM('constant','{value}')")
             self.symbols[value] = self.file.add(f"REPRESENTATION('constant',(#{item}),#{self.plain})")
@@ -260,13 +264,13 @@ class _Ap238Writer:
         self.rapid = self.file.add(f"MACHINING_TOOLPATH_SPEED_PROFILE_REPRESENTATION('',(#{item}),#{self.plain})")
 
     def _element(self, executable: int) -> None:
-        """The next of the workplan."""
+        """The next element of the workplan."""
         self.elements += 1
         self.file.add(f"MACHINING_PROCESS_SEQUENCE_RELATIONSHIP('','',#{self.workplan},#{executable},"
                       f"{self.elements}.)")
 
     def _pause(self, step: Workingstep) -> None:
-        """Ask for a fresh cutter and stop."""
+        """Message for a fresh cutter, and a stop."""
         add = self.file.add
         message = add(f"MACHINING_NC_FUNCTION({quoted(f'fresh cutter for {step.id}')},'display message','','')")
         text = add(f"DESCRIPTIVE_REPRESENTATION_ITEM('message text',{quoted(fresh_words(step))})")
@@ -321,7 +325,7 @@ class _Ap238Writer:
                 self.file.add(f"MACHINING_TECHNOLOGY_RELATIONSHIP('','',#{toolpath},#{technology})")
 
     def _line(self, parts: Sequence[I64 | GridArc], at: int) -> tuple[int, int]:
-        """The curve of some parts that join, ``at`` the number of their first point; and that of their last."""
+        """The curve of joined parts, and the number of its last point; ``at`` is the number of the first."""
         lines = []
         for part in parts:
             if isinstance(part, GridArc):
@@ -332,9 +336,9 @@ class _Ap238Writer:
                 at += len(part) - 1
         if len(lines) == 1:
             return lines[0], at
-        ways = [".CONTINUOUS."] * (len(lines) - 1) + [".DISCONTINUOUS."]
-        segments = [self.file.add(f"COMPOSITE_CURVE_SEGMENT({way},.T.,#{line})")
-                    for way, line in zip(ways, lines, strict=True)]
+        transitions = [".CONTINUOUS."] * (len(lines) - 1) + [".DISCONTINUOUS."]
+        segments = [self.file.add(f"COMPOSITE_CURVE_SEGMENT({transition},.T.,#{line})")
+                    for transition, line in zip(transitions, lines, strict=True)]
         return self.file.add(f"COMPOSITE_CURVE('',{refs(segments)},.U.)"), at
 
     def _toolpath(self, name: str, trajectory: Trajectory, line: int, axes: F64 | None) -> int:
@@ -365,7 +369,7 @@ class _Ap238Writer:
         return self.technologies[key]
 
     def _strategy(self, step: Workingstep) -> int:
-        """The planes or parameters the passes run along, tolerance, scallop and side step, in the setup frame."""
+        """Planes or parameters of the passes, tolerance, scallop and side step, setup frame."""
         add = self.file.add
         along_faces = step.strategy == "isoparametric"
         kind = "uv" if along_faces else "plane cutter location"
@@ -381,14 +385,14 @@ class _Ap238Writer:
         if step.side_step > 0.0:
             self._property("stepover length", f"'{kind}'", strategy, add(
                 f"REPRESENTATION('',(#{self._length('stepover length', step.side_step)}),#{self.plain})"))
-        ways = {"forward direction": (1.0, 0.0, 0.0), "sideward direction": (0.0, 1.0, 0.0)}
+        directions = {"forward direction": (1.0, 0.0, 0.0), "sideward direction": (0.0, 1.0, 0.0)}
         if not along_faces:
             normal, clamping = np.array(pass_plane_normal(step)), self.plan.clamping
-            ways = {"plane normal": tuple(
+            directions = {"plane normal": tuple(
                 (normal if clamping is None else normal @ clamping.frames[step.access].rotation).tolist())}
-        for name, way in ways.items():
+        for name, direction in directions.items():
             self._property(name, f"'{kind}'", strategy, add(
-                f"REPRESENTATION('',(#{add(f'DIRECTION({_NONE},{reals(way, 6)})')}),#{self.space})"))
+                f"REPRESENTATION('',(#{add(f'DIRECTION({_NONE},{reals(direction, 6)})')}),#{self.space})"))
         return strategy
 
     def _tool(self, number: int, tool: ToolBody, operations: list[int]) -> None:
@@ -414,7 +418,7 @@ class _Ap238Writer:
             self._edge(number, tool, operations, known.gauge_length, known.life)
 
     def _edge(self, tool: int, body: ToolBody, operations: list[int], gauge: float, life: float) -> None:
-        """The cutter of a tool and the minutes in cut it lasts."""
+        """The cutter of a tool and its life, min in cut."""
         add = self.file.add
         kind = add("ACTION_RESOURCE_TYPE('milling cutting edge')")
         edge = add(f"MACHINING_CUTTING_COMPONENT({quoted(f'cutter of T{body.number}')},'',{refs(operations)},#{kind},"
@@ -431,13 +435,13 @@ class _Ap238Writer:
 
 
 def _square_to(axis: F64) -> Sequence[float]:
-    """A unit vector square to one (3,)."""
+    """A unit vector perpendicular to ``axis`` (3,)."""
     aside = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
     return [float(v) for v in aside / np.linalg.norm(aside)]
 
 
 def _purpose(step: Workingstep) -> str:
-    """What the strategy was asked for: class 1 carries no strategy object."""
+    """The strategy in words, since class 1 has no strategy object."""
     direction = "climb or conventional" if step.cut_direction.both_ways else step.cut_direction.value
     return (f"{step.strategy}, {direction}, side step {decimal(step.side_step)} mm, "
             f"scallop {decimal(step.scallop_height)} mm, chordal tolerance {decimal(step.chordal_tolerance)} mm, "

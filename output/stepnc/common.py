@@ -1,4 +1,4 @@
-"""What both STEP-NC forms say in words and shapes: names, regions, the stock, the job as a whole."""
+"""Text and shapes that both STEP-NC forms share: names, regions, the stock, the job as a whole."""
 
 from __future__ import annotations
 
@@ -11,28 +11,34 @@ import numpy as np
 from geometry.errors import OutputError
 from geometry.mesh import F64
 from geometry.surfaces.nurbs import NurbsSurface
-from output.clamping_sequence import Leg, each_section
+from output.clamping_sequence import Leg, each_clamped_step
 from output.header_text import face_words
 from output.inverse_kinematics import RotaryMachine
 from output.program_grid import GRID, I64, GridArc, grid_path, link, pieces, to_grid, without_repeats
-from output.stepnc.part21 import Part21, real
+from output.stepnc.part21 import Part21Writer, real
 from output.workplan import Workplan
 from toolpath.workingsteps import Trajectory, TrajectoryKind, Workingstep
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A trajectory as it is written: (m, 3) int64 grid points in the setup frame, m is 1 where it is shorter than the
-    grid; axes (m, 3) float64, unit, None where they are Z."""
+    """A trajectory on the grid, setup frame.
+
+    points : (m, 3) int64, grid steps of 0.0001 mm; m is 1 where it is shorter than the grid
+    axes   : (m, 3) float64, unit, or None where they are Z
+    """
 
     trajectory: Trajectory
     points: I64
     axes: F64 | None = None
 
     def parts(self) -> list[I64 | GridArc]:
-        """What it is written as, in order: polylines (k, 3), k >= 2, and arcs; nothing where it does not move.
+        """The polylines and arcs of the curve, in order; nothing where it does not move.
 
-        With tool axes it is one polyline, for these are to have as many points; so are helices, for a circle is flat.
+        A curve with tool axes is one polyline, since both need the same number of points. So is a helix, as a circle is
+        flat.
+
+        Returns polylines (k, 3) int64, k >= 2, grid steps of 0.0001 mm, setup frame, and arcs.
         """
         t = self.trajectory
         if len(self.points) < 2:
@@ -44,10 +50,10 @@ class Curve:
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
-    """What is written of one step: the rapids that lead to it, itself, and the rapids to where its tool is put away.
+class StepPath:
+    """The curves of one step: rapids that lead to it, the step, rapids to where its tool is put away.
 
-    fresh : the tool is put in before it, and comes to the first point from where the control left it
+    fresh : the tool is loaded before it, and reaches the first point from where the control left it
     """
 
     step: Workingstep
@@ -57,15 +63,16 @@ class Way:
     after: tuple[Curve, ...]
 
 
-def ways(plan: Workplan) -> Iterator[Way]:
-    """All steps of a plan with the rapids between them, setup frame; errors as of ``grid_path`` and ``each_section``.
+def step_paths(plan: Workplan) -> Iterator[StepPath]:
+    """All steps of a plan with the rapids between them, setup frame; errors as of ``grid_path`` and
+    ``each_clamped_step``.
 
-    The rapids are those of the program: to a tool change from the clearance plane, and from there to it.
+    The rapids are those of the program. A tool change begins and ends at the clearance plane.
     """
     if plan.clamping is not None:
         machine = plan.clamping.machine
-        for s in each_section(plan):
-            yield Way(s.step, s.fresh, *(_curves(legs, machine) for legs in (s.before, s.legs, s.after)))
+        for s in each_clamped_step(plan):
+            yield StepPath(s.step, s.fresh, *(_curves(legs, machine) for legs in (s.before, s.legs, s.after)))
         return
     clearance = int(to_grid(np.array([plan.clearance_plane]))[0])
     here: I64 | None = None
@@ -84,20 +91,20 @@ def ways(plan: Workplan) -> Iterator[Way]:
         if follower is None or follower.tool != step.tool or follower.fresh or plan.restart:
             after = _rapid(without_repeats(np.array([end, [*end[:2], max(clearance, int(end[2]))]], dtype=np.int64)))
             here = None
-        yield Way(step, fresh, before, path, after)
+        yield StepPath(step, fresh, before, path, after)
 
 
 def _rapid(points: I64) -> tuple[Curve, ...]:
-    """A rapid through grid points; none where they are one."""
+    """A rapid through grid points; nothing for a single point."""
     if len(points) < 2:
         return ()
     return (Curve(Trajectory(TrajectoryKind.RAPID, np.asarray(points * GRID, np.float64), 0.0), points),)
 
 
 def _curves(legs: Sequence[Leg], machine: RotaryMachine | None = None) -> tuple[Curve, ...]:
-    """Legs on the grid, each from the point where the one before ended; C alone, round the tool, is no curve.
+    """Legs on the grid, each from the point where the one before ended. A turn of C about the tool is not a curve.
 
-    The axes are those of the angles the program says, which are on a grid too.
+    The axes are those of the angles in the program, which are on a grid too.
     """
     out: list[Curve] = []
     for leg in legs:
@@ -113,15 +120,18 @@ def _curves(legs: Sequence[Leg], machine: RotaryMachine | None = None) -> tuple[
 
 
 def path_points(path: Sequence[Curve]) -> I64:
-    """Where the parts of a path begin and end, and the points of its polylines, each once: (n, 3) int64, grid."""
+    """Ends of the parts of a path and points of its polylines, each once.
+
+    Returns (n, 3) int64, grid steps of 0.0001 mm, setup frame.
+    """
     rows = [path[0].points[:1]]
     for curve in path:
         rows += [np.array([p.end], np.int64) if isinstance(p, GridArc) else p[1:] for p in curve.parts()]
     return np.concatenate(rows)
 
 
-def trimmed_circle(file: Part21, arc: GridArc, start: int, up: int, along: int) -> int:
-    """The number of an arc between two CARTESIAN_POINTs, ``start`` and the one after it.
+def trimmed_circle(file: Part21Writer, arc: GridArc, start: int, up: int, along: int) -> int:
+    """Number of an arc between two CARTESIAN_POINTs, ``start`` and the one after it [ISO10303-21].
 
     up, along : numbers of DIRECTIONs Z and X
     """
@@ -134,10 +144,12 @@ def trimmed_circle(file: Part21, arc: GridArc, start: int, up: int, along: int) 
 
 
 def pass_plane_normal(step: Workingstep) -> tuple[float, float, float]:
-    """Unit normal of the planes the cutting passes lie in: Z for level passes, else across the main XY direction."""
+    """Unit normal of the planes of the cutting passes: Z for level passes, else horizontal and across their main
+    direction.
+    """
     if step.strategy not in ("zigzag", "one_way"):
         return (0.0, 0.0, 1.0)
-    double = 0.0 + 0.0j  # directions, not senses: angles are doubled, so that zig and zag add up
+    double = 0.0 + 0.0j  # angles are doubled, so that opposite passes add up
     for trajectory in step.trajectories:
         if trajectory.motion is TrajectoryKind.CUT:
             move = np.diff(trajectory.points[:, :2], axis=0)
@@ -149,19 +161,28 @@ def pass_plane_normal(step: Workingstep) -> tuple[float, float, float]:
 
 
 def to_and_fro(step: Workingstep) -> bool:
-    """Whether passes are walked to and fro: those along the borders of faces where most go against the one before, all
-    others where they may go either way."""
+    """Whether passes alternate in direction.
+
+    Passes along borders of faces alternate where most go against the one before; others where either direction is
+    allowed.
+    """
     if step.strategy != "isoparametric":
         return step.strategy == "zigzag" or step.cut_direction.both_ways
-    ways = np.array([t.points[-1] - t.points[0] for t in step.trajectories
-                     if t.motion is TrajectoryKind.CUT]).reshape(-1, 3)
-    return bool(len(ways) > 1 and ((ways[1:] * ways[:-1]).sum(axis=1) < 0.0).mean() > 0.5)
+    chords = np.array([t.points[-1] - t.points[0] for t in step.trajectories if t.motion is TrajectoryKind.CUT]).reshape(-1, 3)
+    return bool(len(chords) > 1 and ((chords[1:] * chords[:-1]).sum(axis=1) < 0.0).mean() > 0.5)
 
 
 def region_outline(step: Workingstep, rotation: F64 | None = None) -> I64:
-    """The outline of a step at its top, closed, three different points or more: (k, 3) int64, 0.0001 mm.
+    """The closed outline of a step at its top, with three different points or more.
 
-    rotation : (3, 3) float64, from the setup frame into that of the step; None: they are the same
+    rotation : (3, 3) float64, dimensionless, from the setup frame into that of the step; None: they are the same
+
+    Returns (k, 3) int64, grid steps of 0.0001 mm, setup frame.
+
+    Raises
+    ------
+    OutputError
+        bad_outline: the step has no outline.
     """
     outline = np.asarray(step.outline, dtype=np.float64)
     if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
@@ -173,7 +194,13 @@ def region_outline(step: Workingstep, rotation: F64 | None = None) -> I64:
 
 
 def stock_box(plan: Workplan) -> tuple[list[float], list[float]]:
-    """Lower corner and side lengths of the stock, mm."""
+    """Lower corner and side lengths of the stock, mm.
+
+    Raises
+    ------
+    OutputError
+        bad_stock: a side length is not positive.
+    """
     low = np.asarray(plan.stock.lower, dtype=np.float64)
     size = np.asarray(plan.stock.upper, dtype=np.float64) - low
     if low.shape != (3,) or not np.isfinite(low).all() or not (np.isfinite(size) & (size > GRID)).all():
@@ -187,7 +214,7 @@ def header_words(plan: Workplan, first: str) -> list[str]:
 
 
 def setup_words(plan: Workplan) -> list[str]:
-    """What belongs to the whole job: hashes, zero, clearance plane, labels, comments."""
+    """Lines on the whole job: hashes, zero, clearance plane, labels, comments."""
     return [
         f"part sha256 {plan.part_sha256}", f"setup sha256 {plan.setup_sha256}", f"material {plan.material}",
         *((f"stock {plan.stock_words}",) if plan.stock_words else ()),
@@ -197,24 +224,24 @@ def setup_words(plan: Workplan) -> list[str]:
 
 
 def written_feed(feed: float) -> float:
-    """A feed, mm/min, as programs say it: to a tenth, slow ones to four decimals."""
+    """A feed, mm/min, rounded as in programs: to a tenth, slow ones to four decimals."""
     return round(feed, 1 if feed >= 1.0 else 4)
 
 
 def written_speed(rpm: float) -> float:
-    """A spindle speed, 1/min, as programs say it: whole."""
+    """A spindle speed, 1/min, rounded as in programs: whole."""
     return float(round(rpm))
 
 
 def fresh_words(step: Workingstep) -> str:
-    """What the machinist is asked before a step that wants a fresh cutter."""
+    """Message for the machinist before a step that needs a fresh cutter."""
     return f"Fresh cutter in T{step.tool.number}: change it and set its length"
 
 
 def surfaces_of(plan: Workplan, step: Workingstep) -> list[tuple[int, NurbsSurface]]:
     """Numbers and exact surfaces of the faces of a step; empty where its strategy does not follow them.
 
-    All of its faces or none: a feature of some would be too small.
+    It is all of its faces or none, since a feature of some faces would be too small.
     """
     if step.strategy not in ("isoparametric", "flank", "curvature_matched", "inclined_axis"):
         return []
@@ -223,13 +250,16 @@ def surfaces_of(plan: Workplan, step: Workingstep) -> list[tuple[int, NurbsSurfa
 
 
 def knots_of(knots: F64) -> tuple[list[int], list[float]]:
-    """Multiplicities of a knot vector (n,), parameters, and its different values."""
+    """Multiplicities and distinct values of a knot vector.
+
+    knots : (n,) float64, dimensionless, ascending
+    """
     values, counts = np.unique(knots, return_counts=True)
     return counts.tolist(), values.tolist()
 
 
 def operation_words(step: Workingstep) -> str:
-    """'S07 finishing zlevel': the id of the operation."""
+    """'S07 finishing waterline': the id of the operation."""
     return f"{step.id} {step.operation} {step.strategy}"
 
 

@@ -1,16 +1,14 @@
 """STEP-NC as ISO 14649: project, nested workplans, one machining workingstep for each workingstep of the plan.
 
-The main workplan holds the rapid that brings the first tool and the workplan of the setup, this on a machine that
-turns one for each tool axis. Where a fresh cutter is due, a message and a program stop stand before the workingstep.
+The main workplan holds the rapid that brings the first tool and the workplan of the setup. On a machine with rotary
+axes the latter has one workplan for each tool axis. Before a fresh cutter there are a message and a program stop.
 
-Units are the defaults of ISO 14649-10 and are not written: mm, m/s for feeds,
-1/s for the spindle (negative: a right-hand cutter seen from the holder). Paths
-are in workpiece coordinates (no feature placement), the tool tip on the axis.
+Units are the defaults of ISO 14649-10 and are not written: mm, m/s for feeds, 1/s for the spindle (negative: a
+right-hand cutter seen from the holder). Paths are in workpiece coordinates (no feature placement), at the tool tip.
 
-A rapid inside an operation carries the speed ``SPEED_NAME(.RAPID.)``. That is
-what the schema asks for; the NIST toolkit knows only the bare ``.RAPID.`` and
-refuses it. Without the word a reader would take the rapid at cutting feed, so
-the right form stands here.
+A rapid inside an operation has the speed ``SPEED_NAME(.RAPID.)``, as the schema requires. The NIST toolkit accepts only
+the bare ``.RAPID.`` and refuses this form. Without the word a reader would take the rapid at cutting feed, so the form
+of the schema stands here.
 """
 
 from __future__ import annotations
@@ -35,15 +33,15 @@ from output.stepnc.common import (
     region_name,
     region_outline,
     setup_words,
+    step_paths,
     stock_box,
     surfaces_of,
     to_and_fro,
     trimmed_circle,
-    ways,
     written_feed,
     written_speed,
 )
-from output.stepnc.part21 import Part21, Write, quoted, real, reals, refs
+from output.stepnc.part21 import Part21Writer, Write, quoted, real, reals, refs
 from output.workplan import Workplan
 from toolpath.workingsteps import TrajectoryKind, Workingstep
 
@@ -52,11 +50,11 @@ _TYPE = {
     TrajectoryKind.CONNECT: ".CONNECT.", TrajectoryKind.LIFT: ".LIFT.",
 }
 _END = "''"
-_M_PER_S = 1.0 / 60_000.0  # of one mm/min
+_M_PER_S = 1.0 / 60_000.0  # m/s of one mm/min
 
 
 def write_stepnc_arm(plan: Workplan) -> str:
-    """The text that ``stream_stepnc_arm`` writes, as a whole; errors as there."""
+    """The text that ``stream_stepnc_arm`` writes [ISO14649-10]; errors as there."""
     pieces: list[str] = []
     stream_stepnc_arm(plan, pieces.append)
     return "".join(pieces)
@@ -66,23 +64,29 @@ def stream_stepnc_arm(plan: Workplan, write: Write) -> None:
     """Write the job as an ISO 14649 Part 21 file, schemas MACHINING_SCHEMA and MILLING_SCHEMA, piece by piece.
 
     plan  : lengths in mm, setup frame
-    write : takes the text, ASCII; points read back within 0.00005 mm of the plan on each axis
-    Raises OutputError as ``output.program_grid.check_plan`` and ``grid_path`` do, and where the stock box is empty; what was
-    written until then is no file.
+    write : receives ASCII text; points read back within 0.00005 mm of the plan on each axis
+
+    OutputErrors come from ``output.program_grid.check_plan``, ``grid_path`` and ``stock_box``. The text written until
+    then
+    is not a valid file.
+
+    Notes
+    -----
+    Entities follow [ISO14649-10], those of milling [ISO14649-11].
     """
     check_plan(plan)
     _Iso14649Writer(plan, write).run()
 
 
 class _Iso14649Writer:
-    """One file being written; the small dictionaries keep equal instances single."""
+    """One file being written; the dictionaries keep equal instances single."""
 
     def __init__(self, plan: Workplan, write: Write) -> None:
         self.plan = plan
-        self.file = Part21(write, description=header_words(plan, "ISO 14649-10/-11, freeform milling, cutter location "
-                                                                 "paths"),
-                           name=f"{plan.name}.arm.stpnc", schema=("MACHINING_SCHEMA", "MILLING_SCHEMA"),
-                           system=f"zonemill {plan.version}")
+        words = "ISO 14649-10/-11, freeform milling, cutter location paths"
+        self.file = Part21Writer(write, description=header_words(plan, words),
+                                 name=f"{plan.name}.arm.stpnc", schema=("MACHINING_SCHEMA", "MILLING_SCHEMA"),
+                                 system=f"zonemill {plan.version}")
         self.tools: dict[int, int] = {}
         self.technologies: dict[tuple[float, float], int] = {}
         self.groups: dict[str, int] = {}
@@ -126,7 +130,7 @@ class _Iso14649Writer:
         return add(f"SETUP({name},#{zero},#{self.secplane},(#{holding}))")
 
     def _stock(self) -> int:
-        """The blank: a cylinder, or a block, which is a box round it where it is none."""
+        """The blank: a cylinder or a block. The block is the bounding box where the blank is neither."""
         add, cylinder = self.file.add, self.plan.cylinder
         if cylinder is not None:
             base = add(f"CARTESIAN_POINT('',{reals(cylinder.base.tolist(), 9)})")
@@ -140,45 +144,45 @@ class _Iso14649Writer:
         return add(f"BLOCK('{name}',#{self._placement('stock corner', corner)},{sides})")
 
     def _elements(self, setup: int) -> list[int]:
-        """The main workplan: the rapid from wherever the tool is, and a workplan for the setup.
+        """The main workplan: the rapid from the present tool position, and a workplan for the setup.
 
-        On a machine that turns, that has one for each tool axis, in the order they come.
+        On a machine with rotary axes that contains one workplan for each tool axis, in order.
         """
         first: list[int] = []
         groups: list[tuple[str, list[int]]] = []
-        for way in ways(self.plan):
-            access = way.step.access if self.plan.clamping is not None else ""
+        for path in step_paths(self.plan):
+            access = path.step.access if self.plan.clamping is not None else ""
             if not groups or groups[-1][0] != access:
                 groups.append((access, []))
-            mine, name = groups[-1][1], f"rapid to {way.step.id}"
-            if way.step.fresh:
-                mine += self._pause(way.step)
-            if way.fresh:
-                arrive = self._rapid(f"rapid to above all for {way.step.id}" if way.before else name, ())
+            mine, name = groups[-1][1], f"rapid to {path.step.id}"
+            if path.step.fresh:
+                mine += self._pause(path.step)
+            if path.fresh:
+                arrive = self._rapid(f"rapid to above all for {path.step.id}" if path.before else name, ())
                 (mine if first else first).append(arrive)
-            if way.before:
-                mine.append(self._rapid(name, way.before))
-            mine.append(self._workingstep(way.step, way.path))
-            if way.after:
-                mine.append(self._rapid(f"away from {way.step.id}", way.after))
+            if path.before:
+                mine.append(self._rapid(name, path.before))
+            mine.append(self._workingstep(path.step, path.path))
+            if path.after:
+                mine.append(self._rapid(f"away from {path.step.id}", path.after))
         inner = groups[0][1] if self.plan.clamping is None else [self._group(a, members) for a, members in groups]
         name = quoted(f"setup {self.plan.work_offset}")
         return [*first, self.file.add(f"WORKPLAN({name},{refs(inner)},#{self.channel},#{setup},$)")]
 
     def _group(self, access: str, members: list[int]) -> int:
-        """The workplan of steps along one tool axis; where an axis comes again it has a number."""
+        """The workplan of steps along one tool axis; a repeated axis has a number."""
         again = self.groups[access] = self.groups.get(access, 0) + 1
         name = f"access {access}" if again == 1 else f"access {access} again {again}"
         return self.file.add(f"WORKPLAN({quoted(name)},{refs(members)},#{self.channel},$,$)")
 
     def _pause(self, step: Workingstep) -> list[int]:
-        """Ask for a fresh cutter and stop."""
+        """Message for a fresh cutter, and a stop."""
         add = self.file.add
         return [add(f"DISPLAY_MESSAGE({quoted(f'fresh cutter for {step.id}')},{quoted(fresh_words(step))})"),
                 add(f"PROGRAM_STOP({quoted(f'stop before {step.id}')})")]
 
     def _rapid(self, name: str, path: Sequence[Curve]) -> int:
-        """A rapid; one without a path comes from wherever the control left the tool."""
+        """A rapid; one without a path comes from where the control left the tool."""
         if not path:
             return self.file.add(f"RAPID_MOVEMENT({quoted(name)},#{self.secplane},$,$)")
         numbers = []
@@ -186,12 +190,12 @@ class _Iso14649Writer:
             first = self.file.points(curve.points)
             line = self.file.add(f"POLYLINE('',{refs(range(first, first + len(curve.points)))})")
             numbers.append(self.file.add(f"CUTTER_LOCATION_TRAJECTORY(.T.,.CONNECT.,$,$,$,$,#{line},"
-                                         f"{self._leaning(curve)},$)"))
+                                         f"{self._tool_axes(curve)},$)"))
         paths = self.file.add(f"TOOLPATH_LIST({refs(numbers)})")
         return self.file.add(f"RAPID_MOVEMENT({quoted(name)},#{self.secplane},#{paths},{self._direction()})")
 
-    def _leaning(self, curve: Curve) -> str:
-        """Reference to the tool axes of a curve, as many as it has points; '$' where they are Z."""
+    def _tool_axes(self, curve: Curve) -> str:
+        """Reference to the tool axes of a curve, one for each point; '$' where they are Z."""
         if curve.axes is None:
             return "$"
         line = f"POLYLINE('',{refs(self.file.vectors(curve.axes))})"
@@ -210,19 +214,19 @@ class _Iso14649Writer:
         return add(f"MACHINING_WORKINGSTEP({quoted(title)},#{self.secplane},#{feature},#{operation},$)")
 
     def _normal(self, step: Workingstep) -> list[float]:
-        """Of the planes of the passes, in the setup frame."""
+        """Normal of the planes of the passes, setup frame."""
         normal = np.array(pass_plane_normal(step))
         clamping = self.plan.clamping
         return (normal if clamping is None else normal @ clamping.frames[step.access].rotation).tolist()
 
     def _direction(self) -> str:
-        """Three axes along Z; left open where every trajectory has its own tool axis, which overrides it."""
+        """Three axes along Z; '$' where every trajectory has its own tool axis, which overrides it."""
         return f"#{self.three_axes}" if self.plan.clamping is None else "$"
 
     def _region(self, step: Workingstep, operation: int) -> int:
         """The exact faces, or the area in plan and its depth.
 
-        A flat one gets the depth of the grid, since the schema wants it positive.
+        A flat area has the depth of one grid step, since the schema requires a positive value.
         """
         if faces := surfaces_of(self.plan, step):
             surfaces = [self._surface(f"F{number}", surface) for number, surface in faces]
@@ -244,7 +248,7 @@ class _Iso14649Writer:
                              f"#{curve},#{down},#{depth})")
 
     def _surface(self, name: str, surface: NurbsSurface) -> int:
-        """A face as a B-spline surface; one without inner knots is a Bezier surface, which more readers know."""
+        """A face as a B-spline surface. One without inner knots is a Bezier surface, which more readers know."""
         add, (n, m) = self.file.add, surface.control.shape[:2]
         first = self.file.points(to_grid(surface.control.reshape(-1, 3)))
         net = "(" + ",\n".join(refs(range(first + i * m, first + (i + 1) * m)) for i in range(n)) + ")"
@@ -260,13 +264,13 @@ class _Iso14649Writer:
         if surface.weights is None:
             return add(f"B_SPLINE_SURFACE_WITH_KNOTS('{name}',{net},{knots})")
         rows = ",\n".join(reals(row, 9) for row in surface.weights.tolist())
-        # the underscore before the letters, as alphabetical order is mostly read
+        # most readers sort the underscore before the letters
         return add(f"(B_SPLINE_SURFACE({net}) B_SPLINE_SURFACE_WITH_KNOTS({knots}) BOUNDED_SURFACE() "
                    f"GEOMETRIC_REPRESENTATION_ITEM() RATIONAL_B_SPLINE_SURFACE(({rows})) "
                    f"REPRESENTATION_ITEM('{name}') SURFACE())")
 
     def _toolpaths(self, step: Workingstep, path: Sequence[Curve]) -> int:
-        """A trajectory for each of the planned ones; of one with arcs, one for each arc and each line between."""
+        """A trajectory for each planned one; a trajectory with arcs becomes one for each arc and each line."""
         at, numbers = self.file.points(path_points(path)), []
         for curve in path:
             trajectory = curve.trajectory
@@ -282,7 +286,7 @@ class _Iso14649Writer:
                 own = "$" if rapid or written_feed(trajectory.feed) == written_feed(step.feed) else \
                     f"#{self._technology(step.spindle_rpm, trajectory.feed)}"
                 numbers.append(self.file.add(f"CUTTER_LOCATION_TRAJECTORY(.T.,{_TYPE[trajectory.motion]},{speed},{own},"
-                                             f"$,$,#{line},{self._leaning(curve)},$)"))
+                                             f"$,$,#{line},{self._tool_axes(curve)},$)"))
         if not numbers:
             raise OutputError(f"{step.id} does not move", code="empty_step", subjects=(step.id,))
         return self.file.add(f"TOOLPATH_LIST({refs(numbers)})")
@@ -311,7 +315,7 @@ class _Iso14649Writer:
         return self.tools[tool.number]
 
     def _strategy(self, step: Workingstep) -> int:
-        """For information: the planes or parameters the passes run along, tolerance, scallop and side step."""
+        """For information: planes or parameters of the passes, tolerance, scallop and side step."""
         add = self.file.add
         tolerances = add(f"TOLERANCES({real(step.chordal_tolerance, 6)},{real(step.scallop_height, 6)})")
         mode = ".ZIGZAG." if to_and_fro(step) else ".FORWARD."

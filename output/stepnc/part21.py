@@ -1,8 +1,7 @@
-"""STEP Part 21 text: entity numbers, strings, reals, and many points at once.
+r"""STEP Part 21 text: entity numbers, strings, reals, and many points at once.
 
-Only the plain subset that every reader known to us takes: reals with a decimal
-point and without exponent or minus zero, non-ASCII as ``\\X2\\``, mandatory
-aggregates as ``()``.
+It uses only the plain subset that every known reader accepts: reals with a decimal point, without exponent and without
+minus zero; non-ASCII as ``\X2\``; mandatory aggregates as ``()``.
 """
 
 from __future__ import annotations
@@ -19,15 +18,15 @@ from output.program_grid import I64, PER_MM
 Write = Callable[[str], object]
 _LINES_A_PIECE = 4096
 _REFS_A_LINE = 12
-_TEXT_LIMIT = 256  # FILE_DESCRIPTION and FILE_NAME strings, ISO 10303-21 section 8.2
+_TEXT_LIMIT = 256  # characters of a string in FILE_DESCRIPTION and FILE_NAME, ISO 10303-21 section 8.2
 _RUNS = re.compile(r"['\\]|[^ -~\U00010000-\U0010ffff]+|[\U00010000-\U0010ffff]")
 
 
-class Part21:
-    """A file being written, instance by instance; every ``add`` returns the number of its instance.
+class Part21Writer:
+    """A file being written, one instance after the other; every ``add`` returns the number of its instance.
 
-    write : takes the text in pieces, in order, so that the file is never held as a whole
-    description, name, schema, system : words of the header
+    write : receives the text in pieces, in order, so that the whole file is never in memory
+    description, name, schema, system : text of the header
     """
 
     def __init__(self, write: Write, *, description: Sequence[str], name: str, schema: Sequence[str],
@@ -48,7 +47,7 @@ class Part21:
         return self._count
 
     def reserve(self) -> int:
-        """A number for an instance that is written later with ``fill``."""
+        """A number for an instance that ``fill`` writes later."""
         self._count += 1
         return self._count
 
@@ -59,7 +58,10 @@ class Part21:
             self._flush()
 
     def points(self, points: I64) -> int:
-        """Add CARTESIAN_POINTs of the (n, 3) grid points; returns the number of the first, the rest follow it."""
+        """Add CARTESIAN_POINTs; returns the number of the first, the others follow it.
+
+        points : (n, 3) int64, setup frame, grid steps of 0.0001 mm
+        """
         first = self._count + 1
         for low in range(0, len(points), _LINES_A_PIECE):
             rows = (points[low:low + _LINES_A_PIECE] / PER_MM + 0.0).tolist()
@@ -72,7 +74,10 @@ class Part21:
         return first
 
     def vectors(self, vectors: F64) -> list[int]:
-        """Numbers of CARTESIAN_POINTs that hold unit vectors (n, 3); what repeats the one before is written once."""
+        """Add CARTESIAN_POINTs for unit vectors and return their numbers; a repeated vector is written once.
+
+        vectors : (n, 3) float64, setup frame, dimensionless unit vectors
+        """
         out: list[int] = []
         before = ""
         for row in (vectors + 0.0).tolist():
@@ -83,7 +88,7 @@ class Part21:
         return out
 
     def close(self) -> None:
-        """Write what is left and the end of the file."""
+        """Write the rest and the end of the file."""
         self._lines += ["ENDSEC;", "END-ISO-10303-21;"]
         self._flush()
 
@@ -93,14 +98,14 @@ class Part21:
 
 
 def quoted(text: str) -> str:
-    """A Part 21 string: quotes and backslashes doubled, what is not printable ASCII as \\X2\\ or \\X4\\."""
+    r"""A Part 21 string [ISO10303-21]: quotes and backslashes doubled, other characters as \X2\ or \X4\."""
     if text.isascii() and text.isprintable():
         return "'" + text.replace("\\", "\\\\").replace("'", "''") + "'"
     return "'" + _RUNS.sub(_spelt, text) + "'"
 
 
 def _spelt(run: re.Match[str]) -> str:
-    """A sign that is doubled, or letters that are spelt by their codes: those of two bytes together, others alone."""
+    """A doubled character, or the codes of characters: those of two bytes in one group, others singly."""
     letters = run.group()
     if letters in ("'", "\\"):
         return 2 * letters
@@ -110,7 +115,13 @@ def _spelt(run: re.Match[str]) -> str:
 
 
 def real(value: float, digits: int = 4) -> str:
-    """A Part 21 real with at most ``digits`` decimals: '12.5', '0.', never '-0.', never an exponent."""
+    """A Part 21 real [ISO10303-21] with at most ``digits`` decimals: '12.5', '0.', never '-0.', never an exponent.
+
+    Raises
+    ------
+    OutputError
+        bad_number: the value is not finite.
+    """
     if not abs(value) < 1.0e12:
         raise OutputError("a number is not finite", code="bad_number", measured=repr(value))
     text = f"{value:.{digits}f}".rstrip("0")
@@ -123,15 +134,21 @@ def reals(values: Iterable[float], digits: int = 4) -> str:
 
 
 def refs(numbers: Iterable[int]) -> str:
-    """'(#4,#5)', broken into lines where it is long."""
+    """'(#4,#5)', with line breaks where it is long."""
     words = [f"#{n}" for n in numbers]
     rows = [",".join(words[i:i + _REFS_A_LINE]) for i in range(0, len(words), _REFS_A_LINE)]
     return "(" + ",\n".join(rows) + ")"
 
 
 def time_stamp() -> str:
-    """1970-01-01T00:00:00, or the time SOURCE_DATE_EPOCH (s) names, so that equal input gives equal bytes."""
+    """1970-01-01T00:00:00, or the time in SOURCE_DATE_EPOCH (s), so that equal input gives equal bytes.
+
+    Raises
+    ------
+    OutputError
+        bad_epoch: SOURCE_DATE_EPOCH is not a number of seconds.
+    """
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "0").strip() or "0"
     if not epoch.isdigit():
-        raise OutputError("SOURCE_DATE_EPOCH is no number of seconds", code="bad_epoch", subjects=(epoch,))
+        raise OutputError("SOURCE_DATE_EPOCH is not a number of seconds", code="bad_epoch", subjects=(epoch,))
     return datetime.fromtimestamp(int(epoch), tz=UTC).strftime("%Y-%m-%dT%H:%M:%S")

@@ -1,4 +1,4 @@
-"""The HTTP service: application, requests, problems, the OpenAPI document.
+"""The HTTP service: application, requests, problem documents, the OpenAPI document.
 
-Jobs are run by ``service.jobs``; nothing is computed here.
+``service.jobs`` runs the jobs; nothing is computed here.
 """

@@ -1,4 +1,4 @@
-"""The HTTP application: routes, errors and the life of the engine."""
+"""The HTTP application: routes, errors, and start and stop of the engine."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from service.jobs.engine import Engine
 from service.settings import Settings
 from service.version import VERSION
 
-DESCRIPTION = """From a STEP part of walls and internal connections to a milling job that a simulator has proved.
+DESCRIPTION = """Turns a STEP file and a list of tools into G-code and STEP-NC that a simulator has verified.
 
-POST a part with its setup, follow the events, fetch report and files. Lengths are mm; every number carries its unit
-in its name. Errors are application/problem+json."""
+POST a part with its setup, follow the events, fetch report and files. Lengths are mm; the name of every number ends
+in its unit. Errors are application/problem+json."""
 
 
 def create_app(settings: Settings | None = None, chain: str = "service.pipeline") -> FastAPI:
     """The application.
 
-    settings : taken from the environment when None
-    chain    : module a job's child calls; see ``service.jobs.attempt.WorkConfig``
+    settings : None takes them from the environment
+    chain    : module that a job process calls; see ``service.jobs.attempt.WorkConfig``
     """
     settings = settings or Settings()
 
@@ -52,7 +52,7 @@ def create_app(settings: Settings | None = None, chain: str = "service.pipeline"
             app.state.stopping.set()
             await run_in_threadpool(engine.close)
 
-    # The framework's pages about the contract run scripts of another host, which could read the key a tab keeps.
+    # The documentation pages of the framework load scripts from another host, which could read the API key of a tab.
     app = FastAPI(title="zonemill", version=VERSION, description=DESCRIPTION, lifespan=lifespan, docs_url=None,
                   redoc_url=None, separate_input_output_schemas=False, redirect_slashes=False)
     app.state.settings, app.state.engine, app.state.metrics = settings, Engine(settings, chain), Metrics()

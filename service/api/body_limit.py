@@ -1,8 +1,8 @@
-"""The limit on request bodies: refused by Content-Length before a byte is read, else counted while it streams.
+"""Limit on request bodies, by Content-Length before a byte is read, otherwise by counting during the transfer.
 
-Forms with files may be large and go to disk. Every other body is JSON, which the framework reads into memory and parses
-before it asks for a key, so it has a limit of its own. The framework's own limit answers in plain text; this one lets
-the error handlers answer as problem+json.
+Forms with files may be large and go to disk. Every other body is JSON. The framework reads it into memory before it
+checks the key, so JSON has a smaller limit. The framework's own limit answers in plain text; this one lets the error
+handlers answer as problem+json.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from service.api.problems import BODY_LIMIT, problem_response, too_large
 
 FORMS = ("/v1/jobs", "/v1/zones", "/v1/verifications")
-LARGEST_JSON = 1_000_000  # a tool with the finest profile takes a tenth of it
+LARGEST_JSON = 1_000_000  # bytes, ten times a tool with the finest profile
 
 
 class BodyLimitMiddleware:

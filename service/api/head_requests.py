@@ -1,6 +1,6 @@
-"""HEAD on every path that has GET, but for event streams, which never end.
+"""HEAD on every path that has GET, except event streams, which never end.
 
-The request is answered as a GET whose body is dropped, so the OpenAPI document needs no operation of its own.
+A HEAD request is answered like GET [RFC9110], without the body, so the OpenAPI document needs no operation for it.
 """
 
 from __future__ import annotations
@@ -9,12 +9,12 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 
 def is_stream(path: str) -> bool:
-    """Whether a path is a stream of events."""
+    """Whether a path is an event stream."""
     return path.endswith("/events")
 
 
 class HeadMiddleware:
-    """Turns HEAD into GET and sends the head of the answer alone."""
+    """Turns HEAD into GET and sends only the head of the answer."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -28,5 +28,6 @@ class HeadMiddleware:
         async def without_body(message: Message) -> None:
             await send({**message, "body": b""} if message["type"] == "http.response.body" else message)
 
-        headers = [(k, v) for k, v in scope["headers"] if k != b"range"]  # parts are for GET alone (RFC 9110, 14.2)
+        # Range is defined for GET only (RFC 9110, 14.2)
+        headers = [(k, v) for k, v in scope["headers"] if k != b"range"]
         await self.app({**scope, "method": "GET", "headers": headers}, receive, without_body)

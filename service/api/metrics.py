@@ -1,4 +1,4 @@
-"""Counters for Prometheus; one registry per application, so that tests do not share them."""
+"""Counters for Prometheus. Each application has its own registry, so that tests do not share them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STATES = ("queued", "running", *FINAL_STATES)
 
 
 class Metrics:
-    """What is counted."""
+    """The counters of the service."""
 
     def __init__(self) -> None:
         self.registry = CollectorRegistry()
@@ -25,8 +25,8 @@ class Metrics:
         self.jobs = Gauge("zonemill_jobs", "Jobs in the database by state.", ["state"], registry=self.registry)
         self.webhooks = Gauge("zonemill_webhooks", "Webhooks in the database by state.", ["state"],
                               registry=self.registry)
-        self.capacity = Gauge("zonemill_capacity", "Jobs that can run at a time.", registry=self.registry)
-        self.requests = Histogram("zonemill_request_seconds", "Time to the last byte of a response.",
+        self.capacity = Gauge("zonemill_capacity", "Jobs that can run at once.", registry=self.registry)
+        self.requests = Histogram("zonemill_request_seconds", "Time until the last byte of a response.",
                                   ["method", "route", "status"], registry=self.registry)
 
     def submitted(self, kind: str) -> None:
@@ -34,7 +34,7 @@ class Metrics:
         self.submissions.labels(kind).inc()
 
     def render(self, engine: Engine) -> bytes:
-        """The text format, with the database asked now."""
+        """The counters in text format, with current figures from the database."""
         counts = engine.jobs.counts()
         for state in STATES:
             self.jobs.labels(state).set(counts.get(state, 0))
@@ -45,8 +45,10 @@ class Metrics:
 
 
 class MetricsMiddleware:
-    """Times every request under the pattern of its route, never its path: ids would be labels without end, and so would
-    methods, for a client may call its own what it likes."""
+    """Times every request under the pattern of its route.
+
+    Paths would give a label for every id, and method names can be invented by clients; both would grow without end.
+    """
 
     def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
         self.app, self.metrics = app, metrics

@@ -1,4 +1,4 @@
-"""The OpenAPI document of the application, with the models that no route names by itself."""
+"""The OpenAPI document of the application, including models that no route names."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ def document(app: FastAPI) -> dict[str, Any]:
 
 
 def _plain(node: Any) -> None:
-    """Say things the way that generators of clients understand; the meaning stays.
+    """Rewrite schemas for generators of clients, with the same meaning.
 
-    Numbers name their precision, or Go gets 32 bits and 0.002 mm is no longer that. "X or null" is a list of two types,
-    or Java gets a class for each such field. A default that is a list of objects or stands beside a reference is told
-    in words, or Java gets code that does not compile.
+    Numbers state their precision; otherwise Go takes 32 bits, too few for 0.002 mm. "X or null" is a list of two types;
+    otherwise Java gets a class for each such field. A default that is a list of objects, or stands beside a reference,
+    moves into the description; otherwise Java gets code that does not compile.
     """
     if isinstance(node, dict):
         kinds = node.get("anyOf", ())
@@ -51,8 +51,8 @@ def _plain(node: Any) -> None:
         if "number" in (node.get("type"), *_listed(node.get("type"))):
             node.setdefault("format", "double")
         if node.get("default") and ("$ref" in node.get("items", ()) or any("$ref" in k for k in node.get("anyOf", ()))):
-            told = json.dumps(node.pop("default"))
-            node["description"] = f"{node.get('description', '').rstrip('. ')}. Default: {told}".removeprefix(". ")
+            default = json.dumps(node.pop("default"))
+            node["description"] = f"{node.get('description', '').rstrip('. ')}. Default: {default}".removeprefix(". ")
         for value in list(node.values()):
             _plain(value)
     elif isinstance(node, list):

@@ -1,6 +1,6 @@
-"""Examples for the OpenAPI document: an answer of every operation, and a problem of every class that is answered.
+"""Examples for the OpenAPI document: an answer of every operation and a problem of every class.
 
-They are made of the wire models, so none can be of another form than the schema; a test holds every one against it.
+They are built from the wire models, so that they fit the schema; a test validates each of them.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ JOB_ID = "j0660cde19ab0bbcba666faa426aeaf78"
 PATH = f"/v1/jobs/{JOB_ID}"
 SHA = "dc01fa7ef75416456e8cc2fba6c89ee20e2be4cc29f8436b92e0842cc27e1903"
 WHEN = "2026-01-31T12:00:00.000Z"
-NO_KEY = "zm_0a1b2c3d4e5f_" + "x" * 43  # the form alone
+NO_KEY = "zm_0a1b2c3d4e5f_" + "x" * 43  # only the form of a key
 
 
 def _job(state: str, stage: str, progress: float, **more: Any) -> Job:
@@ -95,23 +95,23 @@ ANSWERS: dict[str, Any] = {
                                                       progress=0.12).model_dump_json(exclude_none=True) + "\nid: 4\n\n",
     "metrics": 'zonemill_jobs{state="queued"} 3.0\n', "getFile": "%\nG21\nG90\nM2\n%\n",
 }
-"""What each operation answers when all is well, by its id; those that answer nothing (204) are left out."""
+"""Successful answer of each operation, by its id, except those without a body (204)."""
 
 
 def problem_samples() -> dict[str, dict[str, Any]]:
-    """A problem document of every class, by its slug; two classes of one slug differ in their status."""
+    """A problem document of every class, by its slug; two classes with one slug differ in their status."""
     found: dict[str, dict[str, Any]] = {}
     for kind, row in ERROR_TABLE.items():
-        error = kind(f"{row.title}; here stands what, in one sentence.", remedy="here stands what to do about it")
+        error = kind(f"{row.title}: one sentence with the details.", remedy="how to solve the problem")
         name = f"{row.slug}-{int(row.status)}" if row.slug in found else row.slug
         found.setdefault(name, problem_document(error, PATH, "3f2b8c1e5d6a4f7e9b0c1d2e3f4a5b6c"))
     return found
 
 
 def add_samples(document: dict[str, Any]) -> None:
-    """Put the examples into an OpenAPI document: problems once under components, referred to by the answers.
+    """Put the examples into an OpenAPI document: problems once under components, with references from the answers.
 
-    Those that no answer has stand there too: a job that failed has one of them as its error.
+    Problems that no answer uses are there too, since a failed job has one of them as its error.
     """
     problems = problem_samples()
     for item in document["paths"].values():

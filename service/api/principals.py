@@ -1,6 +1,6 @@
-"""Who is asking: the principal of the key, or 'local' on loopback before the first key is made.
+"""The principal of a request: the owner of the key, or 'local' on loopback before the first key exists.
 
-What belongs to a principal is found by its name alone, so a route that takes ``Principal`` sees nothing of others.
+Routes find data by the name of the principal, so a route that takes ``Principal`` sees no data of others.
 """
 
 from __future__ import annotations
@@ -22,39 +22,40 @@ from service.jobs.api_keys import ADMIN, METRICS, READ, SCOPES, SUBMIT, Identity
 from service.settings import Settings, is_loopback
 
 LOCAL = Identity("local", frozenset(SCOPES))
-bearer = HTTPBearer(auto_error=False, description="A key from zonemill keys create. Needed beyond loopback, and as "
-                                                  "soon as there is one.")
+bearer = HTTPBearer(auto_error=False, description="A key from zonemill keys create. Required beyond loopback, and on "
+                                                  "loopback once a key exists.")
 
 
 def keys_wanted(request: Request) -> bool:
-    """Whether this service asks for a key."""
+    """Whether this service requires a key."""
     settings: Settings = request.app.state.settings
     return settings.auth == "keys" or not is_loopback(settings.host) or request.app.state.engine.keys.any()
 
 
 def identity(request: Request, given: Annotated[HTTPAuthorizationCredentials | None, Depends(bearer)]) -> Identity:
-    """Who is asking.
+    """Identity of the sender of a request.
 
     Raises
     ------
     UnauthorizedError
-        A key is asked for and none was given, or one that is wrong, revoked or expired.
+        A key is required, and the request has none, or a wrong, revoked or expired one.
     ForbiddenError
-        No key is asked for, and the request comes from a page of another site (code 'foreign_page').
+        foreign_page: no key is required, and the request comes from a page of another site.
     """
     if not keys_wanted(request):
         _refuse_foreign_pages(request)
         return LOCAL
     if given is None:
-        raise UnauthorizedError("a key is needed", remedy="send Authorization: Bearer KEY")
+        raise UnauthorizedError("an API key is required", remedy="send Authorization: Bearer KEY")
     found: Identity = request.app.state.engine.keys.identify(given.credentials)
     return found
 
 
 def _refuse_foreign_pages(request: Request) -> None:
-    """Without keys, whoever reaches the port is trusted, and a browser on this machine lends its reach to every page.
+    """Refuse requests from pages of other sites while no key is required.
 
-    A name that was made to point to this machine shows in Host, a page of another site in Origin.
+    Without keys everyone who reaches the port is trusted, and a browser on this machine can send requests for any page.
+    Host shows a name that was made to point to this machine, Origin shows a page of another site.
     """
     for header in ("host", "origin"):
         text = request.headers.get(header)
@@ -67,35 +68,35 @@ def _refuse_foreign_pages(request: Request) -> None:
         if not is_loopback(name):
             raise ForbiddenError(f"the {header.capitalize()} of the request is not this machine", code="foreign_page",
                                  subjects=(header,), measured=ascii(text)[:200], limit="127.0.0.1, ::1 or localhost",
-                                 remedy="call the service by 127.0.0.1, or make a key: zonemill keys create")
+                                 remedy="use the address 127.0.0.1, or create a key: zonemill keys create")
 
 
-def require(who: Identity, *scopes: str) -> None:
-    """Refuse who has none of these scopes.
+def require(caller: Identity, *scopes: str) -> None:
+    """Refuse a caller without any of these scopes.
 
     Raises
     ------
     ForbiddenError
         Code 'scope_missing'.
     """
-    if not who.scopes & set(scopes):
-        raise ForbiddenError(f"the key {who.key_id} has not the scope {' or '.join(scopes)}", code="scope_missing",
-                             subjects=(str(who.key_id),), measured=sorted(who.scopes), limit=list(scopes),
-                             remedy=f"ask for a key with the scope {scopes[0]}")
+    if not caller.scopes & set(scopes):
+        raise ForbiddenError(f"the key {caller.key_id} lacks the scope {' or '.join(scopes)}", code="scope_missing",
+                             subjects=(str(caller.key_id),), measured=sorted(caller.scopes), limit=list(scopes),
+                             remedy=f"use a key with the scope {scopes[0]}")
 
 
 def _needs(*scopes: str) -> Callable[[Identity], Awaitable[str]]:
-    """Dependency that wants one of these scopes and gives the name of the principal."""
+    """Dependency that requires one of these scopes and returns the name of the principal."""
 
-    async def check(who: Annotated[Identity, Depends(identity)]) -> str:  # waits for nothing, so it needs no thread
+    async def check(caller: Annotated[Identity, Depends(identity)]) -> str:  # does not block, so it needs no thread
         if scopes:
-            require(who, *scopes)
-        return who.principal
+            require(caller, *scopes)
+        return caller.principal
 
     return check
 
 
-Who = Annotated[Identity, Depends(identity)]
+Caller = Annotated[Identity, Depends(identity)]
 Principal = Annotated[str, Depends(_needs(READ))]
 Submitter = Annotated[str, Depends(_needs(SUBMIT))]
 Admin = Annotated[str, Depends(_needs(ADMIN))]
@@ -104,9 +105,9 @@ Anybody = Annotated[str, Depends(_needs())]
 
 
 class PostRate:
-    """Counts the submissions of each principal, in this process, by a clock that nobody sets.
+    """Counts the submissions of each principal, in this process, by a monotonic clock.
 
-    A window by the time of the day refuses everything for an hour when that is set back by an hour.
+    With the time of day, setting the clock back by an hour would refuse everything for an hour.
     """
 
     def __init__(self, rate: str) -> None:
@@ -120,7 +121,7 @@ class PostRate:
         Raises
         ------
         RateError
-            There were too many; it says when the next will be taken.
+            There were too many; the error says when the next one is accepted.
         """
         now, window = time.monotonic(), self.rate.get_expiry()
         with self._lock:
@@ -131,8 +132,8 @@ class PostRate:
                 taken.append(now)
                 return
             wait = taken[0] + window - now
-        raise RateError(f"more than {self.rate} submissions", limit=str(self.rate), remedy="wait a little",
-                        retry_after_s=max(1, math.ceil(wait)))
+        raise RateError(f"more than {self.rate} submissions", limit=str(self.rate),
+                        remedy="wait before the next submission", retry_after_s=max(1, math.ceil(wait)))
 
 
 def submission_rate(request: Request, name: Submitter) -> None:

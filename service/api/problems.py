@@ -1,4 +1,4 @@
-"""Every error leaves as application/problem+json: ours, the framework's and the ones nobody expected."""
+"""Turns every error into application/problem+json [RFC9457]: our errors, those of the framework, and bugs."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ from service.errors import (
     UnavailableError,
     problem_document,
 )
-from service.from_wire import MOST_TOLD, sentence
+from service.from_wire import MAX_PROBLEMS_LISTED, sentence
 from service.jobs.database import AWAY
 from service.jobs.disk_space import STORAGE_FULL, is_full
 
 log = structlog.get_logger(__name__)
-BODY_LIMIT = "zonemill.body_limit"  # where a request keeps how many bytes its body may have
+BODY_LIMIT = "zonemill.body_limit"  # key of a request for the limit of its body, bytes
 
 
 def too_large(limit: int) -> TooLargeError:
-    """The error for a body over the limit, bytes."""
+    """The error for a body above the limit, bytes."""
     return TooLargeError(f"the request body is larger than {limit / 1e6:g} MB", limit=limit,
-                         remedy="send a smaller file, or where it is one raise ZONEMILL_MAX_BODY_MB")
+                         remedy="send a smaller file, or raise ZONEMILL_MAX_BODY_MB for large files")
 
 
 def problem_response(request: Request, error: CamError, headers: dict[str, str] | None = None) -> JSONResponse:
-    """The response that an error becomes."""
+    """The response for an error, as a problem document [RFC9457]."""
     body = problem_document(error, request.url.path, correlation_id.get())
     extra = dict(headers or {})
     if isinstance(error, UnauthorizedError):
@@ -79,15 +79,15 @@ async def _framework(request: Request, error: Exception) -> JSONResponse:
     text = str(error.detail)
     named: dict[int, CamError] = {
         401: UnauthorizedError(text, remedy="send Authorization: Bearer KEY"),
-        404: NotFoundError(f"there is nothing at {request.url.path}", code="no_such_path",
+        404: NotFoundError(f"there is no resource at {request.url.path}", code="no_such_path",
                            remedy="GET /openapi.json lists the paths"),
-        405: MethodError(f"{request.method} is not offered at {request.url.path}",
-                         remedy="the Allow header names the methods that are"),
+        405: MethodError(f"{request.method} is not allowed at {request.url.path}",
+                         remedy="the Allow header lists the allowed methods"),
         413: too_large(request.scope[BODY_LIMIT]),
     }
-    # 400 is the framework's word for a body that it cannot decode; any other bad body is 422
+    # the framework answers 400 for a body that it cannot decode, 422 for any other bad body
     fallback = (RequestError(text, remedy="see the schema in /openapi.json") if error.status_code in (400, 422)
-                else ServiceError(text, remedy="see /openapi.json for what this path takes"))
+                else ServiceError(text, remedy="see the operations of this path in /openapi.json"))
     headers = dict(error.headers or {})
     if error.status_code == 405:
         headers["Allow"] = ", ".join(_offered(request))
@@ -95,7 +95,7 @@ async def _framework(request: Request, error: Exception) -> JSONResponse:
 
 
 def _offered(request: Request) -> list[str]:
-    """Methods that some route offers at this path; the router itself names only those of the first that matches."""
+    """Methods of all routes at this path; the router itself lists only those of the first route that matches."""
     paths = request.app.openapi()["paths"]
     found = {method.upper() for template, item in paths.items() for method in item
              if compile_path(template)[0].match(request.url.path)}
@@ -105,7 +105,7 @@ def _offered(request: Request) -> list[str]:
 async def _validation(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
     problems = [{"at": ".".join(str(p) for p in e["loc"]), "problem": sentence(e["type"], e["msg"])}
-                for e in error.errors()[:MOST_TOLD]]
+                for e in error.errors()[:MAX_PROBLEMS_LISTED]]
     first = problems[0]
     return problem_response(request, RequestError(f"{first['at']}: {first['problem']}", measured=problems,
                                                   subjects=tuple(p["at"] for p in problems),
@@ -113,40 +113,41 @@ async def _validation(request: Request, error: Exception) -> JSONResponse:
 
 
 async def _database(request: Request, error: Exception) -> JSONResponse:
-    """The database is away, or full: nobody's bug, and worth trying again. What it said may name hosts and users."""
+    """The database does not answer, or a disk is full: not a bug, and worth another try. The message may name hosts."""
     if isinstance(error, DBAPIError) and not isinstance(error, OperationalError | InterfaceError):
         return await _unexpected(request, error)
     log.error("the database does not answer", path=request.url.path, exc_info=error)
     return problem_response(request, UnavailableError("the database does not answer", code="database_unavailable",
-                                                      retry_after_s=10, remedy="try again; /readyz tells when"))
+                                                      retry_after_s=10, remedy="try again when /readyz reports ok"))
 
 
 async def _disk(request: Request, error: Exception) -> JSONResponse:
     if not is_full(error):
         return await _unexpected(request, error)
     log.error("the disk is full", path=request.url.path)
-    return problem_response(request, UnavailableError("there is no room left on a disk of the service",
+    return problem_response(request, UnavailableError("a disk of the service is full",
                                                       code=STORAGE_FULL, retry_after_s=60,
-                                                      remedy="try again when there is room"))
+                                                      remedy="try again when there is space"))
 
 
 async def _half_a_character(request: Request, error: Exception) -> JSONResponse:
-    """JSON can write half a character, and the validator has no error of its own for it."""
-    return problem_response(request, RequestError("the request holds half a character (a lone surrogate), which no "
-                                                  "text may", code="bad_text", remedy="write texts as UTF-8"))
+    """JSON can contain a lone surrogate, for which the validator has no error of its own."""
+    return problem_response(request, RequestError("the request contains a lone surrogate, which is not a valid "
+                                                  "character", code="bad_text", remedy="send text as UTF-8"))
 
 
 async def _unexpected(request: Request, error: Exception) -> JSONResponse:
     log.exception("bug in a route", path=request.url.path, exc_info=error)
-    return problem_response(request, InternalError("a bug in the service; the log has the details under this request "
+    return problem_response(request, InternalError("this is a bug in the service; the log has the details under this "
+                                                   "request "
                                                    "id", code="bug", remedy="please report it with the request id"),
-                            {"Connection": "close"})  # the server closes it when a route broke
+                            {"Connection": "close"})  # the server closes the connection after an error in a route
 
 
 def responses(*kinds: type[CamError]) -> dict[int | str, dict[str, Any]]:
     """The ``responses=`` of a route that may raise these errors, for the OpenAPI document.
 
-    Where a key is asked for, one without the scope is refused too, and the database that knows it may be away.
+    A route that requires a key can also answer that a scope is missing, or that the database is not available.
     """
     found: dict[int | str, dict[str, Any]] = {}
     behind_a_key = (ForbiddenError, UnavailableError) if UnauthorizedError in kinds else ()

@@ -1,4 +1,4 @@
-"""Runs the application under uvicorn: in the foreground, or in a thread for the demo."""
+"""Runs the application under uvicorn, in the foreground or in a thread for the demo."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ log = structlog.get_logger(__name__)
 
 
 def settings_with(given: dict[str, Any]) -> Settings:
-    """Settings from the environment with some given in code; those that are None count as not given.
+    """Settings from the environment, overridden by those given in code; None is not given.
 
     Raises
     ------
     SetupError
-        A setting has a value that makes no sense.
+        A setting has an invalid value.
     """
     try:
         return Settings(**{k: v for k, v in given.items() if v is not None})
     except SettingsError as error:
-        raise SetupError(f"the environment: {error}; it is to be JSON", code="bad_setting",
+        raise SetupError(f"the environment: {error}; the value must be JSON", code="bad_setting",
                          remedy="docs/settings.md lists every setting") from None
     except ValidationError as error:
         problems = problems_of(error, "settings")
@@ -49,8 +49,8 @@ def settings_with(given: dict[str, Any]) -> Settings:
 
 def _listen(host: str, port: int) -> socket.socket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    # The protocol is named, for asyncio sends small answers at once (TCP_NODELAY) only where it sees that it is TCP;
-    # without that an answer on a connection kept alive waits 40 ms for the other side's delayed acknowledgement.
+    # asyncio sends small answers at once (TCP_NODELAY) only where the socket states the protocol TCP;
+    # otherwise an answer on a kept-alive connection waits 40 ms for the delayed acknowledgement of the other side.
     listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
@@ -58,12 +58,12 @@ def _listen(host: str, port: int) -> socket.socket:
     except OSError as error:
         listener.close()
         raise SetupError(f"cannot listen on {host}:{port}: {error.strerror}", code="cannot_listen",
-                         remedy="take another --port; 0 takes a free one") from None
+                         remedy="use another --port; 0 is any free port") from None
     return listener
 
 
 class _Server(uvicorn.Server):
-    """Tells open event streams to end as soon as the server is asked to stop."""
+    """Ends open event streams as soon as the server has to stop."""
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """SIGINT or SIGTERM came."""
@@ -71,7 +71,7 @@ class _Server(uvicorn.Server):
         super().handle_exit(sig, frame)
 
     def startup_error(self) -> CamError:
-        """Why it did not start."""
+        """The reason why it did not start."""
         known: CamError | None = self.config.app.state.startup_error  # type: ignore[union-attr]
         return known or UnavailableError("the service did not start; the log says why", code="did_not_start")
 
@@ -82,14 +82,14 @@ def _server(settings: Settings, chain: str = "service.pipeline") -> _Server:
 
 
 def run_server(settings: Settings, chain: str = "service.pipeline") -> None:
-    """Serve until SIGINT or SIGTERM; running jobs go back to the queue.
+    """Serve until SIGINT or SIGTERM; running jobs return to the queue.
 
     chain : see ``create_app``
 
     Raises
     ------
     SetupError
-        Port in use, data folder in use, or exposed without keys.
+        The port or the data folder is in use, or the service is exposed without keys.
     """
     configure(settings.log_level, settings.log_format)
     listener = _listen(settings.host, settings.port)
@@ -99,16 +99,16 @@ def run_server(settings: Settings, chain: str = "service.pipeline") -> None:
     try:
         server.run(sockets=[listener])
     except KeyboardInterrupt:
-        log.info("stopped")  # uvicorn raises the signal again when all is closed
+        log.info("stopped")  # uvicorn raises the signal again after the shutdown
     except SystemExit:
-        raise server.startup_error() from None  # uvicorn's way to say that the application did not start
+        raise server.startup_error() from None  # uvicorn does this when the application did not start
 
 
 def _run_quietly(server: _Server, listener: socket.socket) -> None:
     try:
         server.run(sockets=[listener])
     except SystemExit:
-        pass  # told to the caller by ``startup_error``
+        pass  # ``startup_error`` gives the reason to the caller
 
 
 @contextmanager

@@ -18,7 +18,7 @@ from geometry.errors import InputError, ProgramError, SetupError
 from geometry.step_import.text_checks import check_text
 from schemas.setup import Setup, canonical_json, setup_sha256
 from service.errors import RequestError
-from service.from_wire import check_plannable, check_spindle_tool, no_stock_file, of_blank, parse_setup
+from service.from_wire import blank_error, check_plannable, check_spindle_tool, no_stock_file, parse_setup
 from service.jobs.artifacts import Artifacts
 from service.jobs.engine import Engine
 from service.jobs.job_store import NewJob
@@ -33,7 +33,7 @@ DEADLINE_S = (1, 604800)  # a week
 
 
 @dataclass(frozen=True)
-class Form:
+class SubmissionForm:
     """The parts of a multipart request, as sent."""
 
     part: UploadFile
@@ -45,13 +45,13 @@ class Form:
     webhook_url: str | None = None
 
 
-async def read_form(request: Request, *, with_program: bool) -> Form:
-    """Read a multipart form, spooling files to disk; the body limit of the app holds.
+async def read_form(request: Request, *, with_program: bool) -> SubmissionForm:
+    """Read a multipart form and spool its files to disk, within the body limit of the application.
 
     Raises
     ------
     RequestError
-        A part is missing or stands there twice, one is not known, or a field is not what it should be.
+        A part is missing, repeated or unknown, or a field has a wrong value.
     """
     wanted = {"part", "setup"} | ({"program"} if with_program else set())
     if not request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
@@ -70,8 +70,8 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
     optional = {STOCK, DEADLINE, WEBHOOK} | ({SPINDLE_TOOL} if with_program else set())
     for name in sorted(set(names) - wanted - optional):
         raise RequestError(f"the form has an unknown part '{name}'", subjects=(name,), code="unknown_part",
-                           remedy=f"send {' and '.join(sorted(wanted))}, each once, and of "
-                                  f"{', '.join(sorted(optional))} what is wanted")
+                           remedy=f"send {' and '.join(sorted(wanted))}, each once; optional: "
+                                  + ", ".join(sorted(optional)))
     for name in sorted(wanted | (optional & set(names))):
         if (count := names.count(name)) != 1:
             raise RequestError(f"the form needs exactly one part '{name}', there are {count or 'none'}",
@@ -83,7 +83,7 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
             raise RequestError(f"'{name}' must be sent as a file, with a file name", code="not_a_file",
                                subjects=(name,), remedy=f"curl -F {name}=@FILE")
     assert isinstance(part, UploadFile)
-    return Form(part, await _bytes_of(form["setup"]), program if isinstance(program, UploadFile) else None,
+    return SubmissionForm(part, await _bytes_of(form["setup"]), program if isinstance(program, UploadFile) else None,
                 _tool_number(await _bytes_of(form[SPINDLE_TOOL])) if SPINDLE_TOOL in names else 0,
                 stock if isinstance(stock, UploadFile) else None,
                 _deadline(await _bytes_of(form[DEADLINE])) if DEADLINE in names else None,
@@ -91,17 +91,21 @@ async def read_form(request: Request, *, with_program: bool) -> Form:
 
 
 def _check_charset(content_type: str) -> None:
-    """Texts are UTF-8. The framework would decode them by any codec of Python that the header names, and of those some
-    take hours for a megabyte (punycode, idna) and one raises whatever it is given (undefined)."""
+    """Refuse any charset but UTF-8.
+
+    The framework would decode text with any codec of Python that the header names. Some of them take hours for a
+    megabyte
+    (punycode, idna), and one raises an error for any input (undefined).
+    """
     charset = parse_options_header(content_type)[1].get(b"charset", b"utf-8")  # as the framework reads it
     if charset.lower() not in (b"utf-8", b"utf8", b"us-ascii"):
-        raise RequestError("the texts of a form are to be UTF-8", code="bad_multipart", subjects=("content-type",),
-                           measured=ascii(charset)[:80], limit="utf-8", remedy="leave charset out of Content-Type")
+        raise RequestError("the text of a form must be UTF-8", code="bad_multipart", subjects=("content-type",),
+                           measured=ascii(charset)[:80], limit="utf-8", remedy="leave out charset in Content-Type")
 
 
 def _tool_number(data: bytes) -> int:
     if not data.isdigit() or len(data) > TOOL_DIGITS:
-        raise RequestError(f"{SPINDLE_TOOL} is to be a T number, digits only", code="bad_spindle_tool",
+        raise RequestError(f"{SPINDLE_TOOL} must be a T number, digits only", code="bad_spindle_tool",
                            subjects=(SPINDLE_TOOL,), measured=ascii(data[:20]),
                            remedy="send the number of the tool in the spindle, or leave the field out")
     return int(data)
@@ -113,7 +117,7 @@ def _deadline(data: bytes) -> float:
     except ValueError:
         value = math.nan
     if not DEADLINE_S[0] <= value <= DEADLINE_S[1]:
-        raise RequestError(f"{DEADLINE} is to be a number of seconds", code="bad_deadline", subjects=(DEADLINE,),
+        raise RequestError(f"{DEADLINE} must be a number of seconds", code="bad_deadline", subjects=(DEADLINE,),
                            measured=ascii(data[:20]), limit=list(DEADLINE_S),
                            remedy="send seconds from now, up to a week, or leave the field out")
     return value
@@ -125,23 +129,23 @@ async def _bytes_of(field: Any) -> bytes:
     data = await field.read(MAX_SETUP_BYTES + 1)
     if len(data) > MAX_SETUP_BYTES:
         raise SetupError("the setup is larger than 4 MB", code="setup_too_large", limit=MAX_SETUP_BYTES,
-                         remedy="leave out what the job does not need; 200 tools take less than 1 MB")
+                         remedy="leave out data that the job does not need; 200 tools are less than 1 MB")
     return data
 
 
-def new_job(engine: Engine, kind: str, principal: str, key: str | None, form: Form) -> NewJob:
-    """Check and store what was sent, and describe the job; runs in a thread, since it reads and writes files.
+def new_job(engine: Engine, kind: str, principal: str, key: str | None, form: SubmissionForm) -> NewJob:
+    """Check and store the upload, and describe the job. It runs in a thread, since it reads and writes files.
 
     Raises
     ------
     StepError, SetupError, ProgramError
-        What was sent is wrong by itself; nothing is queued.
+        An uploaded file is wrong; nothing is queued.
     RequestError
-        The Idempotency-Key is empty or too long, or no webhook may go there.
+        The Idempotency-Key is empty or too long, or the webhook URL is not allowed.
     """
     if key is not None and not 1 <= len(key) <= KEY_LIMIT:
         raise RequestError(f"an Idempotency-Key has 1 to {KEY_LIMIT} characters", code="bad_idempotency_key",
-                           measured=len(key), limit=KEY_LIMIT, remedy="a UUID will do")
+                           measured=len(key), limit=KEY_LIMIT, remedy="use a UUID, for example")
     webhook = registered(form.webhook_url, engine.settings) if form.webhook_url is not None else None
     library = engine.library.view(principal)
     setup = parse_setup(form.setup, library)
@@ -160,12 +164,12 @@ def new_job(engine: Engine, kind: str, principal: str, key: str | None, form: Fo
 
 
 def store_part(artifacts: Artifacts, file: BinaryIO) -> str:
-    """Store a STEP file and return its hash. Its text is checked first: others may have a use for the same bytes.
+    """Store a STEP file and return its hash. Its text is checked first, since other jobs may use the same bytes.
 
     Raises
     ------
     StepError
-        Empty, no STEP file, cut off, or with references that lead nowhere.
+        The file is empty, truncated or not a STEP file, or has dangling references.
     """
     def check(path: Path) -> None:
         try:
@@ -182,13 +186,13 @@ def _store_stock(artifacts: Artifacts, file: BinaryIO) -> str:
     try:
         return store_part(artifacts, file)
     except InputError as error:
-        raise of_blank(error) from None
+        raise blank_error(error) from None
 
 
 def _stock_not_asked(kind: str) -> SetupError:
-    return SetupError(f"a file of the blank was sent, and the blank of the setup is of kind '{kind}'",
+    return SetupError(f"the form has a file of the blank, but the setup has stock.kind '{kind}'",
                       code="stock_not_asked", subjects=(STOCK, "stock.kind"), measured=kind, limit="step",
-                      remedy="say stock.kind 'step' in the setup, or leave the part 'stock' out of the form")
+                      remedy="set stock.kind 'step' in the setup, or leave out the part 'stock' of the form")
 
 
 def _store_program(artifacts: Artifacts, file: BinaryIO) -> str:
@@ -207,7 +211,7 @@ def _chunks(file: BinaryIO) -> Iterator[bytes]:
 
 def content_of(part_sha256: str, setup_sha: str, program_sha256: str | None = None,
                spindle_tool: int = 0, stock_sha256: str | None = None) -> str:
-    """The content hash of ``schemas.setup.content_hash``, from hashes; a program and the tool before it count too."""
+    """The content hash of ``schemas.setup.content_hash``, from hashes; a program and its ``spindle_tool`` count too."""
     text = f"{part_sha256}:{setup_sha}" + (f":stock {stock_sha256}" if stock_sha256 else "")
     text += f":{program_sha256}" if program_sha256 else ""
     text += f":T{spindle_tool}" if spindle_tool else ""

@@ -1,4 +1,4 @@
-"""The commands of the command line that need more than a call into the pipeline.
+"""Commands of the command line that need more than a call into the pipeline.
 
-No planning and no HTTP route stands here.
+Planning and HTTP routes do not live here.
 """

@@ -1,4 +1,4 @@
-"""What the command line is given, and its errors. Heavy imports stand inside, as in ``service.cli``."""
+"""Arguments of the command line, and their errors. Heavy imports are inside the functions, as in ``service.cli``."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from service.stages.machined_mesh import MeshWish
 
 
-def mesh_wish(step: float | None, box: str | None) -> MeshWish | None:
-    """The mesh of the machined part that is asked for; none where ``step`` is None.
+def requested_mesh(step: float | None, box: str | None) -> MeshWish | None:
+    """The requested mesh of the machined part; None where ``step`` is None.
 
     Raises
     ------
@@ -27,18 +27,18 @@ def mesh_wish(step: float | None, box: str | None) -> MeshWish | None:
     if step is not None:
         return MeshWish.of(step, box)
     if box is not None:
-        raise InputError("a window of a mesh that is not asked for", code="box_without_step", measured=box,
-                         remedy="give --mesh-step too, or leave --mesh-box out")
+        raise InputError("--mesh-box is given without --mesh-step", code="box_without_step", measured=box,
+                         remedy="add --mesh-step, or leave out --mesh-box")
     return None
 
 
 def make_folder(out: Path, *, verification: bool = False) -> None:
-    """Make the folder for the files, without those of an earlier job, or of an earlier verification.
+    """Make the folder for the files, and remove the files of an earlier job or verification from it.
 
     Raises
     ------
     InputError
-        It cannot be made or written to; ``out_holds_a_job`` as ``artifacts.clear_verification``.
+        The folder cannot be made or written; ``out_holds_a_job`` as ``artifacts.clear_verification``.
     """
     from geometry.errors import InputError
     from service.stages.result_files import clear_results, clear_verification
@@ -55,18 +55,18 @@ def make_folder(out: Path, *, verification: bool = False) -> None:
 
 
 def blank_file(setup_path: Path, setup: Setup) -> Path | None:
-    """The STEP file of a blank, named from the folder of the setup; None where the blank is none.
+    """The STEP file of the blank, relative to the folder of the setup; None where the blank needs no file.
 
     Raises
     ------
     SetupError
         ``no_stock_file``: the setup does not name it.
     StepError
-        The file cannot be read, or its text is no STEP file.
+        The file cannot be read, or is not a STEP file.
     """
     from geometry.errors import InputError
     from geometry.step_import.text_checks import check_text
-    from service.from_wire import no_stock_file, of_blank
+    from service.from_wire import blank_error, no_stock_file
 
     if setup.stock.kind != "step":
         return None
@@ -76,12 +76,12 @@ def blank_file(setup_path: Path, setup: Setup) -> Path | None:
     try:
         check_text(path)
     except InputError as error:
-        raise of_blank(error) from None
+        raise blank_error(error) from None
     return path
 
 
 def known_dialect(name: str | None) -> str | None:
-    """A control by its name, as it was given.
+    """The name of a control, checked.
 
     Raises
     ------
@@ -92,8 +92,8 @@ def known_dialect(name: str | None) -> str | None:
     from schemas.machine import DIALECT_ENDINGS
 
     if name is not None and name not in DIALECT_ENDINGS:
-        raise InputError(f"no reader knows the dialect '{name}'", code="unknown_dialect", measured=name,
-                         limit=sorted(DIALECT_ENDINGS), remedy="name one of them, or leave it out")
+        raise InputError(f"unknown dialect '{name}'", code="unknown_dialect", measured=name,
+                         limit=sorted(DIALECT_ENDINGS), remedy="use one of them, or leave it out")
     return name
 
 
@@ -111,16 +111,22 @@ def read_program(path: Path) -> str:
         text = path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
         raise ProgramError(f"the program {path.name} cannot be read: {error.strerror}",
-                           code="program_unreadable", remedy="name an NC program this user may read") from None
+                           code="program_unreadable", remedy="give an NC program that this user may read") from None
     if not text.strip():
         raise ProgramError(f"the program {path.name} is empty", code="empty_program", measured=0, limit=1,
-                           remedy="name the NC program that is to be proved")
+                           remedy="give the NC program to be proved")
     return text
 
 
 @contextmanager
-def reported(as_json: bool) -> Iterator[None]:
-    """Turn errors into a block or a problem document and the exit code of their class."""
+def error_reporting(as_json: bool) -> Iterator[None]:
+    """Turn errors into a block or a problem document, and exit with the exit code of their class.
+
+    Raises
+    ------
+    Exit
+        With the exit code of an error, or after Ctrl-C.
+    """
     import typer
 
     from geometry.errors import CamError, CancelledError, InternalError
@@ -139,5 +145,5 @@ def reported(as_json: bool) -> Iterator[None]:
 
         traceback.print_exc()
         bug = InternalError(f"{type(error).__name__}: {error}", code="bug",
-                            remedy="please report it with part and setup")
+                            remedy="please report this bug with part and setup")
         raise typer.Exit(report_error(bug, as_json=as_json)) from None

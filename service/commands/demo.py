@@ -1,4 +1,4 @@
-"""``zonemill demo``: what a first user does by hand, done once from end to end over HTTP; and ``zonemill warm``."""
+"""``zonemill demo`` runs the first steps of a user over HTTP; ``zonemill warm`` compiles the kernels."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from service.stages.result_files import clear_results
 def run_demo(out: Path, *, keep: bool, chain: str = "service.pipeline") -> int:
     """Make the sample part, serve, post, follow, fetch; returns 0 only when the job is proved.
 
-    out  : folder the files are fetched into
-    keep : go on serving until Ctrl-C
+    out  : folder for the fetched files
+    keep : continue to serve until Ctrl-C
     """
     from examples.demo import write_demo
 
@@ -44,7 +44,7 @@ def run_demo(out: Path, *, keep: bool, chain: str = "service.pipeline") -> int:
                         "links": {k: url + v for k, v in job["links"].items() if v},
                         "files": [str(out / n) for n in names], "error": job["error"]})
             if names:
-                say(f"to look at it: zonemill view {out}")
+                say(f"to see the result: zonemill view {out}")
             if keep:
                 say(f"serving on {url} until Ctrl-C; the page is {url}/")
                 wait_for_interrupt()
@@ -52,14 +52,14 @@ def run_demo(out: Path, *, keep: bool, chain: str = "service.pipeline") -> int:
 
 
 def run_warm() -> None:
-    """Compile every kernel by planning and proving a small part, so that no job waits for it.
+    """Compile every kernel by planning and proving a small part.
 
-    What other versions of the kernels left compiled is removed a week after its last use.
+    Compiled code of other versions is removed a week after its last use.
 
     Raises
     ------
     InternalError
-        The small part was not proved: this machine must not plan others.
+        The small part was not proved, so this machine must not plan other parts.
     """
     from examples.demo import write_small
     from geometry.kernels.cache import remove_stale
@@ -71,14 +71,14 @@ def run_warm() -> None:
         step, setup = write_small(folder)
         report = plan(step, read_setup(setup), Path(folder, "out"), lambda _stage, _share: None)
     if report["state"] != "proved":
-        raise InternalError("the small part that is known to be proved was not", code="not_as_installed",
+        raise InternalError("the small test part was not proved, although it should be", code="not_as_installed",
                             subjects=tuple(f["message"] for f in report["findings"][:5]),
                             measured=report["state"], limit="proved",
-                            remedy="install again; please report it if it stays")
+                            remedy="install again; please report the error if it remains")
 
 
 def exit_code(job: dict[str, Any]) -> int:
-    """Exit code of a job resource that has ended."""
+    """Exit code of a job that has ended."""
     if job["state"] == "proved":
         return EXIT_PROVED
     if job["state"] == "unproved":
@@ -124,7 +124,7 @@ def _data_lines(stream: http.client.HTTPResponse) -> Iterator[dict[str, Any]]:
 
 
 def _fetch(url: str, job: dict[str, Any], out: Path) -> list[str]:
-    """Fetch every file of the job; returns their names, none when the job left no result."""
+    """Fetch every file of the job and return their names; none where the job has no result."""
     if job["state"] not in ("proved", "unproved"):
         return []
     out.mkdir(parents=True, exist_ok=True)
@@ -137,7 +137,7 @@ def _fetch(url: str, job: dict[str, Any], out: Path) -> list[str]:
 
 
 def _open(request: urllib.request.Request) -> http.client.HTTPResponse:
-    opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # loopback needs no proxy
+    opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # no proxy for loopback
     try:
         return opener.open(request, timeout=3600)  # type: ignore[no-any-return]
     except urllib.error.HTTPError as error:

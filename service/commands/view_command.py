@@ -1,8 +1,8 @@
-"""``zonemill view DIR``: the page of a job for a folder of results, served to this machine alone.
+"""``zonemill view DIR``: the web page of a job for a folder of results, for this machine only.
 
-The few paths of the interface that the page of one job asks for, answered from the files of the folder. There is no
-job table, no engine and no key: only the loopback interface is listened on, and a request that names another host, as
-one does that a foreign page was made to send here, is refused.
+It answers the few paths that the page of one job uses, from the files of the folder. There is no job table, no engine
+and no key. It listens on the loopback interface only and refuses requests that name another host, such as those that a
+page of another site sends.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ def folder_app(folder: Path) -> Starlette:
     Raises
     ------
     SetupError
-        The folder holds no report and no view (``no_results``).
+        no_results: the folder has no report or no view.
     """
     files = {p.name: p for p in sorted(folder.glob("*")) if p.is_file() and not p.name.endswith(".part")}
     if VIEW_NAME not in files or "report.json" not in files:
         missing = [n for n in (VIEW_NAME, "report.json") if n not in files]
-        raise SetupError(f"{folder} holds no {' and no '.join(missing)}", code="no_results", subjects=tuple(missing),
-                         remedy="give the folder of zonemill plan --out, or of zonemill verify --out; one that an "
-                                "earlier version wrote has to be made again")
+        raise SetupError(f"{folder} has no {' and no '.join(missing)}", code="no_results", subjects=tuple(missing),
+                         remedy="give a folder that zonemill plan --out or zonemill verify --out has written; an "
+                                "earlier version wrote other files, so run the command again")
     report = json.loads(files["report.json"].read_bytes())
     names = {f["name"] for f in report["files"]} | {"report.json", VIEW_NAME}
     shown = {n: p for n, p in files.items() if n in names and (report["state"] == "proved" or not is_program(n))}
@@ -60,7 +60,8 @@ def folder_app(folder: Path) -> Starlette:
     def one(request: Request) -> Response:
         path = shown.get(request.path_params["name"])
         if path is None:
-            return JSONResponse({"title": "No such file", "status": 404, "detail": "the folder has no such file"}, 404)
+            return JSONResponse({"title": "No such file", "status": 404,
+                                 "detail": "there is no such file in the folder"}, 404)
         return FileResponse(path, media_type=media_type(path.name), filename=path.name,
                             headers={"ETag": f'"{file_sha256(path)}"', "X-Content-Type-Options": "nosniff",
                                      "Cache-Control": "no-cache"})
@@ -82,7 +83,7 @@ def _asset(request: Request) -> Response:
 
 
 class _ThisMachine:
-    """Lets requests through whose Host is this machine."""
+    """Passes only requests whose Host is this machine."""
 
     def __init__(self, app: Any) -> None:
         self.app = app
@@ -92,7 +93,7 @@ class _ThisMachine:
         if scope["type"] == "http":
             host = Request(scope).url.hostname or ""
             if not is_loopback(host):
-                await JSONResponse({"title": "Not for other hosts", "status": 403, "detail": "call 127.0.0.1"},
+                await JSONResponse({"title": "Only for this machine", "status": 403, "detail": "call 127.0.0.1"},
                                    403)(scope, receive, send)
                 return
         await self.app(scope, receive, send)
@@ -112,12 +113,12 @@ def _job(folder: Path, report: dict[str, Any], path: Path) -> Job:
 def show_folder(folder: Path, port: int, *, open_browser: bool) -> None:
     """Serve the page of a folder on 127.0.0.1 until Ctrl-C.
 
-    port : 0 takes a free one
+    port : 0 for any free port
 
     Raises
     ------
     SetupError
-        The folder holds no results (``no_results``), or the port is taken (``cannot_listen``).
+        no_results: the folder has no results; cannot_listen: the port is in use.
     """
     app = folder_app(folder)
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
@@ -127,7 +128,7 @@ def show_folder(folder: Path, port: int, *, open_browser: bool) -> None:
     except OSError as error:
         listener.close()
         raise SetupError(f"cannot listen on 127.0.0.1:{port}: {error.strerror}", code="cannot_listen",
-                         remedy="take another --port; 0 takes a free one") from None
+                         remedy="use another --port; 0 is any free port") from None
     url = f"http://127.0.0.1:{listener.getsockname()[1]}{HERE}/view"
     say(f"{url} until Ctrl-C")
     if open_browser:

@@ -1,4 +1,4 @@
-"""The job table, artifacts, workers and child processes that run jobs.
+"""The job table, artifacts, workers, and the child processes that run jobs.
 
-What a job computes stands in ``service.pipeline`` and ``service.stages``.
+``service.pipeline`` and ``service.stages`` compute the results of a job; nothing is planned here.
 """

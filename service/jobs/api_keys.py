@@ -1,8 +1,8 @@
-"""API keys: what a request shows to prove whose it is.
+"""API keys, which identify the sender of a request.
 
-A key is ``zm_<id>_<secret>``. The id names the row, the secret is 256 random bits, and the row holds its SHA-256 only:
-a secret nobody can guess needs no slow hash, and a copy of the database opens nothing. Rows are never deleted, so that
-the service cannot fall open because the last key was revoked.
+A key is ``zm_<id>_<secret>``. The id names the row. The secret is 256 random bits, and the row has only its SHA-256: a
+random secret needs no slow hash, and a copy of the database opens nothing. Rows are never deleted, so the service does
+not become open when the last key is revoked.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _NOBODY = hashlib.sha256(b"").hexdigest()
 
 @dataclass(frozen=True)
 class Identity:
-    """Who is asking, and what they may do. key_id : None where no key is asked for."""
+    """Owner of a request, and the allowed scopes. key_id : None where no key is required."""
 
     principal: str
     scopes: frozenset[str]
@@ -39,7 +39,7 @@ class Identity:
 
 
 def digest(secret: str) -> str:
-    """What the database holds of a secret: SHA-256, hex."""
+    """SHA-256 of a secret, hex, as stored in the database."""
     return hashlib.sha256(secret.encode()).hexdigest()
 
 
@@ -51,22 +51,22 @@ class KeyStore:
         self._exist = False
 
     def any(self) -> bool:
-        """Whether a key was ever made; revoked and expired ones count."""
+        """Whether a key was ever made; revoked and expired keys count."""
         if not self._exist:
             with self.engine.connect() as c:
                 self._exist = c.execute(sa.select(api_keys.c.id).limit(1)).first() is not None
         return self._exist
 
     def usable(self) -> bool:
-        """Whether some key would let its holder in now."""
+        """Whether some key is valid now."""
         with self.engine.connect() as c:
             return c.execute(sa.select(api_keys.c.id).where(_live(time.time())).limit(1)).first() is not None
 
     def make(self, principal: str, scopes: Iterable[str], days: float | None = None,
              note: str = "") -> tuple[str, RowMapping]:
-        """Make a key; returns its text, which is told this once, and its row.
+        """Make a key; returns its text, which is not stored, and its row.
 
-        days : until it expires; None for never
+        days : days until it expires; None: never
 
         Raises
         ------
@@ -75,15 +75,15 @@ class KeyStore:
         """
         wanted = sorted(set(scopes), key=lambda s: SCOPES.index(s) if s in SCOPES else -1)
         if not re.fullmatch(PRINCIPAL_PATTERN, principal):
-            raise RequestError("a principal is named by 1 to 64 letters, digits, '.', '_', '@' and '-'",
+            raise RequestError("the name of a principal has 1 to 64 letters, digits, '.', '_', '@' and '-'",
                                code="bad_principal", measured=ascii(principal[:80]), limit=PRINCIPAL_PATTERN,
-                               remedy="take a short name such as mes or ada@shop")
+                               remedy="use a short name such as mes or ada@shop")
         if not wanted or any(s not in SCOPES for s in wanted):
-            raise RequestError("a key has one scope or more of submit, read, admin, metrics", code="bad_scope",
-                               measured=wanted, limit=list(SCOPES), remedy="--scopes submit,read is what an MES needs")
+            raise RequestError("a key has one or more of the scopes submit, read, admin, metrics", code="bad_scope",
+                               measured=wanted, limit=list(SCOPES), remedy="for an MES use --scopes submit,read")
         if days is not None and not 0 < days <= 36500:
             raise RequestError("a key expires after more than 0 and at most 36500 days", code="bad_expiry",
-                               measured=days, limit=36500, remedy="give a number of days, or no end at all")
+                               measured=days, limit=36500, remedy="give a number of days, or 0 for no end")
         now, secret = time.time(), secrets.token_urlsafe(32)
         values = {"id": secrets.token_hex(6), "principal": principal, "scopes": ",".join(wanted),
                   "secret_sha256": digest(secret), "note": note[:200], "created": now,
@@ -98,56 +98,55 @@ class KeyStore:
             return list(c.execute(sa.select(api_keys).order_by(api_keys.c.created, api_keys.c.id)).mappings())
 
     def revoke(self, key_id: str) -> None:
-        """End a key now; one that was revoked before stays so.
+        """End a key now; a key that is already revoked stays so.
 
         Raises
         ------
         NotFoundError
-            There is none of that id.
+            There is no key with that id.
         """
         change = api_keys.update().where(api_keys.c.id == key_id).values(
             revoked=sa.func.coalesce(api_keys.c.revoked, time.time()))
         with self.engine.begin() as c:
             if c.execute(change).rowcount != 1:
-                raise NotFoundError(f"there is no key {ascii(key_id)}", code="no_such_key", subjects=(key_id,),
+                raise NotFoundError(f"unknown key {ascii(key_id)}", code="no_such_key", subjects=(key_id,),
                                     remedy="zonemill keys list shows the ids")
 
     def is_live(self, key_id: str) -> bool:
-        """Whether a key would still be taken."""
+        """Whether a key is still valid."""
         query = sa.select(api_keys.c.id).where(api_keys.c.id == key_id, _live(time.time()))
         with self.engine.connect() as c:
             return c.execute(query).first() is not None
 
     def identify(self, text: str) -> Identity:
-        """Whose key a text is.
+        """Identity of a key.
 
         Raises
         ------
         UnauthorizedError
-            ``unauthorized``: no key of this service. Only who holds the secret is told ``key_revoked`` or
-            ``key_expired``.
+            ``unauthorized``: not a key of this service. ``key_revoked``, ``key_expired``: only with the right secret.
         """
         found = _KEY.fullmatch(text)
         key_id, secret = found.groups() if found else ("", "")
         with self.engine.connect() as c:
             row = c.execute(sa.select(api_keys).where(api_keys.c.id == key_id)).mappings().one_or_none()
-        # A digest is compared whether there is a row or not, so that the time taken says nothing about ids.
+        # Compare a digest in any case, so that the response time does not reveal which ids exist.
         same = hmac.compare_digest(row["secret_sha256"] if row else _NOBODY, digest(secret))
         if row is None or not same:
-            raise UnauthorizedError("the bearer token is no key of this service",
+            raise UnauthorizedError("the bearer token is not a key of this service",
                                     remedy="send Authorization: Bearer with a key from zonemill keys create")
         now = time.time()
         if row["revoked"] is not None:
             raise UnauthorizedError(f"the key {key_id} was revoked", code="key_revoked", subjects=(key_id,),
-                                    remedy="ask whoever runs the service for a new key")
+                                    remedy="ask the operator of the service for a new key")
         if row["expires"] is not None and row["expires"] <= now:
             raise UnauthorizedError(f"the key {key_id} has expired", code="key_expired", subjects=(key_id,),
-                                    remedy="ask whoever runs the service for a new key")
+                                    remedy="ask the operator of the service for a new key")
         self._seen(row, now)
         return Identity(row["principal"], frozenset(row["scopes"].split(",")), key_id)
 
     def _seen(self, row: RowMapping, now: float) -> None:
-        """Note the use of a key, once an hour at most: a read should not become a write."""
+        """Record the use of a key, at most once an hour, so that most reads need no write."""
         if row["last_used"] is not None and now - row["last_used"] < SEEN_EVERY_S:
             return
         with self.engine.begin() as c:

@@ -1,9 +1,9 @@
-"""Files by content: uploads as blobs, results as folders, all written as temporary, fsync, rename.
+"""Files by content: uploads as blobs, results as folders, all written as a temporary file, fsync, rename.
 
-    data/blobs/ab/abcdef....bin     an upload, named by the SHA-256 of its bytes
-    data/artifacts/ab/abcdef.../    a result, named by the hash of code version, kind and inputs
-    data/kept/ab/abcdef.../         what attempts at that result keep for the next one, until it is there
-    data/tmp/                       what is being written; worthless after a crash
+data/blobs/ab/abcdef....bin     an upload, named by the SHA-256 of its bytes
+data/artifacts/ab/abcdef.../    a result, named by the hash of code version, kind and inputs
+data/kept/ab/abcdef.../         checkpoints for that result, until it exists
+data/tmp/                       files being written; worthless after a crash
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from service.version import code_version
 
 def artifact_key(kind: str, part_sha256: str, setup_sha256: str, program_sha256: str | None = None,
                  spindle_tool: int = 0, stock_sha256: str | None = None) -> str:
-    """Name of a result: same code, kind, part, setup, program, tool in the spindle and blank give the same key."""
+    """Name of a result: equal code, kind, part, setup, program, spindle tool and blank give the same key."""
     text = "\n".join((code_version(), kind, part_sha256, setup_sha256, program_sha256 or "", str(spindle_tool),
                       stock_sha256 or ""))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def key_of(row: Mapping[Any, Any]) -> str:
-    """Name of the result of a job, by its row."""
+    """Name of the result of a job, from its row."""
     return artifact_key(row["kind"], row["part_sha256"], row["setup_sha256"], row["program_sha256"],
                         row["spindle_tool"], row["stock_sha256"])
 
@@ -43,7 +43,7 @@ def _drop(path: Path) -> None:
 
 
 class Artifacts:
-    """Blobs and results below one data folder."""
+    """Blobs and results in one data folder."""
 
     def __init__(self, root: Path) -> None:
         self.root = root.resolve()
@@ -52,18 +52,18 @@ class Artifacts:
         self.tmp.mkdir(exist_ok=True)
 
     def blob(self, sha256: str) -> Path:
-        """Where the blob of that hash lies."""
+        """Path of the blob with that hash."""
         return self.root / "blobs" / sha256[:2] / f"{sha256}.bin"
 
     def missing(self, row: Mapping[Any, Any]) -> list[str]:
-        """Hashes of the uploads of a job that are not there."""
+        """Hashes of the uploads of a job that do not exist."""
         named = (row["part_sha256"], row["stock_sha256"], row["program_sha256"])
         return [sha for sha in named if sha and not self.blob(sha).is_file()]
 
     def put_blob(self, chunks: Iterable[bytes], check: Callable[[Path], object] | None = None) -> tuple[str, int]:
-        """Store bytes; returns their SHA-256 and their number. What is there already is left alone.
+        """Store bytes; returns their SHA-256 and their number. An existing blob stays unchanged.
 
-        check : looks at the file before it gets its place, and raises where it is not to have one
+        check : called with the temporary file; it raises where the file must not be stored
         """
         digest, size = hashlib.sha256(), 0
         temporary = self.tmp / f"blob-{uuid.uuid4().hex}"
@@ -86,21 +86,21 @@ class Artifacts:
         return digest.hexdigest(), size
 
     def result(self, key: str) -> Path:
-        """Where the result of that key lies, once it is there."""
+        """Path of the result with that key."""
         return self.root / "artifacts" / key[:2] / key
 
     def has_result(self, key: str) -> bool:
-        """Whether the result is there; a result appears by one rename, so it is whole."""
+        """Whether the result exists; it appears by one rename, so it is complete."""
         return self.result(key).is_dir()
 
     def workspace(self) -> Path:
-        """A fresh empty folder to write a result into."""
+        """A new empty folder into which a result is written."""
         folder = self.tmp / f"result-{uuid.uuid4().hex}"
         folder.mkdir()
         return folder
 
     def commit(self, workspace: Path, key: str) -> None:
-        """Make a workspace the result of ``key``; if that exists already, the workspace is dropped."""
+        """Turn a workspace into the result of ``key``; where that exists already, the workspace is deleted."""
         sync_tree(workspace)
         target = self.result(key)
         make_folder(target.parent)
@@ -113,7 +113,7 @@ class Artifacts:
         sync_folder(target.parent)
 
     def take(self, key: str) -> bool:
-        """Whether the result is there; if so it counts as used now, and is not removed for a while."""
+        """Whether the result exists. If so, it counts as used now, and is not removed for a while."""
         try:
             os.utime(self.result(key))
         except FileNotFoundError:
@@ -121,11 +121,11 @@ class Artifacts:
         return True
 
     def kept(self, key: str) -> Path:
-        """Where attempts at the result of that key keep what the next one takes over (``service.checkpoint_store``)."""
+        """Folder of the checkpoints for the result of that key (``service.checkpoint_store``)."""
         return self.root / "kept" / key[:2] / key
 
     def drop_kept(self, key: str) -> None:
-        """Remove what is kept for the result of that key."""
+        """Delete the checkpoints for the result of that key."""
         trash = self.tmp / f"trash-{uuid.uuid4().hex}"
         try:
             os.rename(self.kept(key), trash)
@@ -134,7 +134,7 @@ class Artifacts:
         _drop(trash)
 
     def all_kept(self) -> Iterator[Path]:
-        """Every folder of what is kept; its name is the key of the result."""
+        """Every folder of checkpoints; its name is the key of the result."""
         yield from self.root.glob("kept/*/*")
 
     def stored(self) -> Iterator[Path]:
@@ -143,10 +143,11 @@ class Artifacts:
         yield from self.root.glob("artifacts/*/*")
 
     def remove(self, path: Path, before: float) -> bool:
-        """Remove an upload, a result or what is kept for one that was last used before a time (s).
+        """Remove an upload, a result or checkpoints that were last used before a time (s).
 
-        Returns False when it was used after all.
-        It is moved away first and looked at again there, so that nobody who takes it up meanwhile finds half of it.
+        Returns False when it was used after all. It is moved away first and checked again, so that no other user finds
+        half
+        of it.
         """
         trash = self.tmp / f"trash-{uuid.uuid4().hex}"
         try:
@@ -162,7 +163,7 @@ class Artifacts:
         return True
 
     def sweep(self, before: float = math.inf) -> int:
-        """Drop what a crash left half written before a time (s); without one only for the sole owner of the folder."""
+        """Delete files that a crash left half written before a time (s); without a time, for the sole owner only."""
         count = 0
         for path in self.tmp.iterdir():
             try:

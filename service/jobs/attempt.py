@@ -1,6 +1,6 @@
-"""One job on a worker: take the attempt, use the result that exists or make it, write the end into the database.
+"""One job on a worker: start the attempt, use an existing result or make one, write the end into the database.
 
-``run_job`` is what Dask runs, in a thread; its arguments are plain data, so any worker can run it again.
+Dask runs ``run_job`` in a thread. Its arguments are plain data, so that any worker can run it again.
 """
 
 from __future__ import annotations
@@ -24,34 +24,34 @@ from service.jobs.artifacts import Artifacts, key_of
 from service.jobs.database import AWAY, connect
 from service.jobs.disk_space import STORAGE_FULL, check_writable, is_full, storage_full
 from service.jobs.job_store import WORKER, JobStore
-from service.jobs.supervisor import Limits, supervise
+from service.jobs.supervisor import ProcessLimits, supervise
 from service.logs import configure_once
 
 log = structlog.get_logger(__name__)
 
-PATIENCE_S = 120.0  # beyond it another attempt finds the result that is there
-SHORT_OF = frozenset((errno.EMFILE, errno.ENFILE, errno.EAGAIN, errno.ENOMEM))  # what starting a process runs out of
-AGAIN_S = 1.0  # until a process that could not be started is tried again
+PATIENCE_S = 120.0  # after that another attempt finds the existing result
+OUT_OF_RESOURCES = frozenset((errno.EMFILE, errno.ENFILE, errno.EAGAIN, errno.ENOMEM))  # errors of a process start
+RETRY_S = 1.0  # s between two tries to start a process
 
 ending = threading.Event()
-"""Set when the process of this worker is told to end: attempts under way stop and do not count."""
+"""Set when the process of this worker must end: running attempts stop and do not count."""
 under_way: set[str] = set()
 """Holders of the attempts that run in this process."""
 
 
 @dataclass(frozen=True)
 class WorkConfig:
-    """What a worker must know; travels with every task.
+    """Configuration of a worker; it is part of every task.
 
     url, data_dir : database and data folder, as the worker sees them
     chain         : module with ``plan``, ``zones_only`` and ``verify_program``
-    max_attempts  : after so many a job that found the disk full fails
-    log_level, log_format : how a worker logs that has not been told otherwise
+    max_attempts  : number of attempts after which a job fails that found the disk full
+    log_level, log_format : logging of a worker that is not configured otherwise
     """
 
     url: str
     data_dir: str
-    limits: Limits
+    limits: ProcessLimits
     lease_s: float
     chain: str = "service.pipeline"
     max_attempts: int = 3
@@ -59,20 +59,20 @@ class WorkConfig:
     log_format: str = "console"
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data; Dask writes the arguments of a task that failed into its log, and the URL holds a password."""
-        return {**asdict(self), "url": Unshown(self.url)}
+        """Plain data. Dask logs the arguments of failed tasks, and the URL contains a password, so it is hidden."""
+        return {**asdict(self), "url": HiddenText(self.url)}
 
 
-class Unshown(str):
-    """Text that does not show itself in logs."""
+class HiddenText(str):
+    """Text that does not appear in logs."""
 
     def __repr__(self) -> str:
         return "'(not shown)'"
 
 
 def run_job(job_id: str, claim: int, data: dict[str, Any]) -> str:
-    """Run one attempt of a claimed job to its end; returns what became of it, for the log only."""
-    config = WorkConfig(**{**data, "limits": Limits(**data["limits"])})
+    """Run one attempt of a claimed job to its end; returns the outcome, for the log only."""
+    config = WorkConfig(**{**data, "limits": ProcessLimits(**data["limits"])})
     configure_once(config.log_level, config.log_format)
     store, owner = JobStore(connect(config.url)), f"{WORKER}{uuid.uuid4().hex}"
     artifacts = _data_folder(config, store.get(job_id))
@@ -88,7 +88,7 @@ def run_job(job_id: str, claim: int, data: dict[str, Any]) -> str:
 
 
 def _attempted(store: JobStore, artifacts: Artifacts, config: WorkConfig, owner: str, job_id: str) -> str:
-    """Run an attempt that was begun to its end; returns what became of it."""
+    """Run a started attempt to its end; returns the outcome."""
     row, key, summary = store.get(job_id), None, None
     attempt = row["attempt"]
     failure: CamError | None = None
@@ -106,7 +106,7 @@ def _attempted(store: JobStore, artifacts: Artifacts, config: WorkConfig, owner:
     if failure is not None:
         log.warning("job failed", job=job_id, attempt=attempt, error=failure.as_dict())
         if failure.code == STORAGE_FULL:
-            artifacts.drop_kept(key_of(row))  # it may be what takes the room
+            artifacts.drop_kept(key_of(row))  # checkpoints may fill the disk
         if failure.code == STORAGE_FULL and attempt < config.max_attempts:
             return "put back" if _record(lambda: store.put_back(job_id, owner), config.lease_s) else "superseded"
         state = "failed"
@@ -117,10 +117,11 @@ def _attempted(store: JobStore, artifacts: Artifacts, config: WorkConfig, owner:
 
 
 def _data_folder(config: WorkConfig, row: RowMapping) -> Artifacts | None:
-    """The data folder, if this worker can use it and sees there what the job needs.
+    """The data folder, if this worker can use it and it has the uploads of the job.
 
-    Of a host whose share is not mounted every job would fail at once, as a part that is no STEP file. Such a worker
-    takes none up; the claim runs out and costs no attempt.
+    Without this check every job would fail at once on a host whose share is not mounted. Such a worker takes no job;
+    the
+    claim expires and costs no attempt.
     """
     try:
         artifacts = Artifacts(Path(config.data_dir))
@@ -130,13 +131,13 @@ def _data_folder(config: WorkConfig, row: RowMapping) -> Artifacts | None:
         log.error("this worker cannot write to the data folder", job=row["id"], error=str(error))
         return None
     if lost:
-        log.error("this worker does not see the uploads of a job: is it the data folder of the service?", job=row["id"],
-                  data=config.data_dir, missing=lost)
+        log.error("this worker does not find the uploads of a job: check that its data folder is that of the service",
+                  job=row["id"], data=config.data_dir, missing=lost)
     return None if lost else artifacts
 
 
 def summary_of(folder: Path) -> dict[str, Any] | None:
-    """The figures of a report that a release gate looks at; None where there is no report."""
+    """Figures of a report for a release gate; None where there is no report."""
     path = folder / "report.json"
     if not path.exists():
         return None
@@ -152,7 +153,7 @@ def _bug(error: Exception, job_id: str, attempt: int) -> InternalError:
 
 
 def _record(write: Callable[[], bool], patience_s: float) -> bool:
-    """Write the end of a job, again and again while the database is away; whoever claims it later finds the result."""
+    """Write the end of a job, and repeat it while the database does not answer. A later claim finds the result."""
     until = time.monotonic() + max(patience_s, PATIENCE_S)
     while True:
         try:
@@ -165,7 +166,7 @@ def _record(write: Callable[[], bool], patience_s: float) -> bool:
 
 
 class _Attempt:
-    """One attempt: the child, its heartbeat and its progress."""
+    """One attempt: the child process, its heartbeat and its progress."""
 
     def __init__(self, store: JobStore, artifacts: Artifacts, config: WorkConfig, row: RowMapping,
                  owner: str) -> None:
@@ -208,22 +209,23 @@ class _Attempt:
             shutil.rmtree(workspace, ignore_errors=True)
 
     def _supervised(self, request: dict[str, Any]) -> str:
-        """The state a child ends with; where none can be started, for want of handles or processes, it is waited."""
+        """Final state of a child process; where none can be started for lack of handles or processes, it tries again.
+        """
         until = time.monotonic() + PATIENCE_S
         while True:
             try:
                 return supervise(request, self.config.limits, self.artifacts.tmp, on_progress=self._progress,
                                  on_resumed=self._resumed, keep=self._keep)
             except OSError as error:
-                if error.errno not in SHORT_OF:
+                if error.errno not in OUT_OF_RESOURCES:
                     raise
                 if time.monotonic() > until:
                     raise ResourceError(f"the worker could not start a process for {PATIENCE_S:.0f} s "
                                         f"({error.strerror})", code="worker_exhausted", measured=error.strerror,
-                                        remedy="post it again; who runs the service should look at its limits of open "
+                                        remedy="post the job again; the operator should check the limits of open "
                                                "files, processes and memory") from None
                 log.warning("no process can be started for a job, once more", job=self.row["id"], error=str(error))
-            time.sleep(AGAIN_S)
+            time.sleep(RETRY_S)
             if not self._keep():
                 raise CancelledError("the job was cancelled")
 
@@ -241,7 +243,7 @@ class _Attempt:
             log.warning("what was taken over is not recorded", job=self.row["id"], error=type(error).__name__)
 
     def _keep(self) -> bool:
-        """Whether to go on; renews the lease in good time. A database that does not answer is no reason to stop."""
+        """Whether to continue; renews the lease in time. A database that does not answer is no reason to stop."""
         if ending.is_set():
             return False
         try:

@@ -1,4 +1,4 @@
-"""Tables, connections and migrations. The database alone is the truth about jobs."""
+"""Tables, connections and migrations. The database is the only source of the state of jobs."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from service.files import make_private
 
 AWAY = (DBAPIError, PoolTimeoutError)
-"""What is raised while the database does not answer: by itself, or to who waits for one of its connections."""
+"""Errors while the database does not answer, or while all its connections are in use."""
 
-# A server that fell silent is given up after seconds; the defaults of the system are minutes to hours.
+# A silent server is given up after seconds; the defaults of the system are minutes to hours.
 POSTGRES = {"connect_timeout": 10, "keepalives_idle": 5, "keepalives_interval": 3, "keepalives_count": 3,
             "tcp_user_timeout": 15_000}
-MIGRATION_LOCK = 0x7A6F6E65  # a number of our own among PostgreSQL's advisory locks
+MIGRATION_LOCK = 0x7A6F6E65  # our number of a PostgreSQL advisory lock
 
 metadata = sa.MetaData()
 
@@ -108,8 +108,9 @@ api_keys = sa.Table(
 def connect(url: str) -> Engine:
     """An engine for a database URL; SQLite runs in WAL mode with full synchronisation.
 
-    What it raises holds no values: they are setups, webhooks and digests of keys, and errors go into the log.
-    One engine per URL and process: Dask tasks call this again and again.
+    Its errors contain no values, since these are setups, webhooks and digests of keys, and errors are logged. There is
+    one
+    engine for each URL and process, since Dask tasks call this repeatedly.
     """
     return _connect(url)
 
@@ -117,9 +118,9 @@ def connect(url: str) -> Engine:
 @lru_cache(maxsize=16)
 def _connect(url: str) -> Engine:
     if not url.startswith("sqlite"):
-        asked = sa.make_url(url)
-        given = POSTGRES if asked.drivername == "postgresql+psycopg" else {}
-        options = {k: v for k, v in given.items() if k not in asked.query}
+        target = sa.make_url(url)
+        given = POSTGRES if target.drivername == "postgresql+psycopg" else {}
+        options = {k: v for k, v in given.items() if k not in target.query}
         return sa.create_engine(url, pool_pre_ping=True, pool_size=10, max_overflow=20, hide_parameters=True,
                                 connect_args=options)
     engine = sa.create_engine(url, hide_parameters=True, connect_args={"timeout": 30, "check_same_thread": False})
@@ -135,7 +136,7 @@ def _pragmas(connection: Any, _record: Any) -> None:
 
 
 def migrate(url: str) -> None:
-    """Bring the database to the newest schema (Alembic), making it first where it does not exist."""
+    """Bring the database to the newest schema (Alembic), and create it first where it does not exist."""
     from alembic import command
     from alembic.config import Config
 
@@ -150,7 +151,7 @@ def migrate(url: str) -> None:
 
 @contextmanager
 def _alone(connection: sa.Connection) -> Iterator[None]:
-    """Only one process at a time brings a database up to date; others wait. ``zonemill keys`` does so too."""
+    """Only one process at a time migrates a database; others wait. ``zonemill keys`` does so too."""
     if connection.dialect.name != "postgresql":
         path = connection.engine.url.database
         with Path(f"{path}.migrating" if path else os.devnull).open("w") as lock:

@@ -1,4 +1,4 @@
-"""A full disk, told from a bug: nothing is accepted or started while there is no room, and what waits stays."""
+"""A full disk is not a bug: nothing is accepted or started while the disk is full, and waiting jobs stay."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 def is_full(error: BaseException | None) -> bool:
-    """Whether an error, or the one it came from, says that there is no room on a disk."""
+    """Whether an error, or its cause, is a full disk."""
     while error is not None:
         if isinstance(error, OSError) and error.errno in _FULL:
             return True
@@ -25,9 +25,9 @@ def is_full(error: BaseException | None) -> bool:
 
 
 def storage_full() -> ResourceError:
-    """The error of a job that found the disk full."""
-    return ResourceError("there is no room left on the disk of the data folder", code=STORAGE_FULL,
-                         remedy="make room or set ZONEMILL_RETENTION_DAYS, then post it again")
+    """Error of a job that found the disk full."""
+    return ResourceError("the disk of the data folder is full", code=STORAGE_FULL,
+                         remedy="free disk space or set ZONEMILL_RETENTION_DAYS, then post the job again")
 
 
 def check_free(folder: Path, least_mb: int) -> None:
@@ -40,13 +40,13 @@ def check_free(folder: Path, least_mb: int) -> None:
     """
     free = shutil.disk_usage(folder).free / 1e6
     if free < least_mb:
-        raise UnavailableError(f"{free:.0f} MB are free on the disk of the data folder", code=STORAGE_FULL,
+        raise UnavailableError(f"the disk of the data folder has only {free:.0f} MB free", code=STORAGE_FULL,
                                measured=round(free), limit=least_mb, retry_after_s=60,
-                               remedy="make room, or lower ZONEMILL_MIN_FREE_MB")
+                               remedy="free disk space, or lower ZONEMILL_MIN_FREE_MB")
 
 
 def check_writable(folder: Path) -> None:
-    """Write a few bytes to the disk, through to the medium, and take them away again; OSError where that fails."""
+    """Write a few bytes to the disk, flush them and delete them; OSError where that fails."""
     path = folder / f"probe-{uuid.uuid4().hex}"
     try:
         with path.open("wb") as out:

@@ -1,6 +1,6 @@
-"""Hands queued jobs to Dask, never more than it has room for; holds nothing that the database does not know.
+"""Hands queued jobs to Dask, no more than it has slots for. Only the database has the state of jobs.
 
-Embedded, the cluster is a thread pool inside this process and the data folder belongs to this process alone. With a
+Embedded, the cluster is a thread pool inside this process, and the data folder belongs to this process alone. With a
 scheduler address it is a real cluster, and several services may share database and data folder.
 """
 
@@ -27,18 +27,18 @@ from service.jobs.database import AWAY, connect, migrate
 from service.jobs.disk_space import check_free, check_writable
 from service.jobs.job_store import JobStore, NewJob, Room
 from service.jobs.library import LibraryStore
-from service.jobs.retention import Janitor
-from service.jobs.supervisor import Limits
-from service.jobs.webhooks import Courier
+from service.jobs.retention import RetentionSweeper
+from service.jobs.supervisor import ProcessLimits
+from service.jobs.webhooks import WebhookSender
 from service.settings import Settings, is_loopback
 
 log = structlog.get_logger(__name__)
 
 SHORTEST_WAIT_S, LONGEST_WAIT_S = 5.0, 600.0
 READY_EVERY_S, CHORES_EVERY_S = 1.0, 1.0
-MERCY_S = 1e9  # no lease counts as run out
-STEP_S = 1.0  # how far the clock has to jump to have been set
-CLAIMS_IN_VAIN = 10  # so often a job is claimed before it is asked why no worker takes it up
+ENDLESS_GRACE_S = 1e9  # no lease counts as expired
+STEP_S = 1.0  # a larger jump means that the clock was set
+MAX_UNSTARTED_CLAIMS = 10  # claims without a start, after which the reason is checked
 SCHEDULER_WAIT_S, SLOTS_KNOWN_S = 8.0, 10.0
 
 
@@ -54,13 +54,13 @@ class Engine:
         self.owner = f"service-{uuid.uuid4().hex}"
         self.work = WorkConfig(
             settings.url, str(settings.data_dir.resolve()),
-            Limits(settings.job_time_limit_s, settings.job_memory_limit_mb * 1_000_000, settings.threads,
+            ProcessLimits(settings.job_time_limit_s, settings.job_memory_limit_mb * 1_000_000, settings.threads,
                    settings.poll_s),
             settings.lease_s, chain, settings.max_attempts, settings.log_level, settings.log_format)
         self.room = Room(settings.max_queued, settings.max_queued_each)
         self._wake, self._stop = threading.Event(), threading.Event()
         self._lock: IO[str] | None = None
-        self._courier: Courier | None = None
+        self._courier: WebhookSender | None = None
         self._client: Any = None
         self._loop: Any = None
         self._cluster: Any = None
@@ -78,8 +78,9 @@ class Engine:
         Raises
         ------
         SetupError
-            Another service uses this data folder (code 'data_dir_in_use'), or the address can be reached from other
-            machines and there is no key that would have to be shown (code 'exposed_without_key').
+            data_dir_in_use: another service uses this data folder; exposed_without_key: other machines can reach the
+            address,
+            and no key is required.
         """
         self.artifacts = Artifacts(self.settings.data_dir)
         embedded = self.settings.scheduler is None
@@ -93,21 +94,21 @@ class Engine:
         if embedded:
             self.artifacts.sweep()
             if left := self.jobs.release():
-                log.info("jobs of an earlier run taken up again", jobs=left)
+                log.info("jobs of an earlier run continue", jobs=left)
         if embedded:
             self._look()
         self._thread = threading.Thread(target=self._dispatch, name="dispatcher", daemon=True)
         self._thread.start()
         if self.settings.webhooks_on:
-            self._courier = Courier(self.settings, self.jobs)
+            self._courier = WebhookSender(self.settings, self.jobs)
             self._courier.start()
-        self.janitor = Janitor(self.settings, self.jobs, self.artifacts)
+        self.janitor = RetentionSweeper(self.settings, self.jobs, self.artifacts)
         self.janitor.start()
 
     def close(self) -> None:
-        """Stop dispatching and end the embedded cluster; its running jobs are left to the next start.
+        """Stop dispatching and end the embedded cluster; the next start continues its running jobs.
 
-        Of a real cluster they go on, and what no worker has begun is another service's to claim at once.
+        Jobs of a real cluster continue. Another service can at once claim those that no worker has started.
         """
         self._stop.set()
         self._wake.set()
@@ -122,7 +123,7 @@ class Engine:
             else:
                 self.jobs.hand_back(self.owner)
         except AWAY:
-            log.exception("the database is away; running jobs are taken up when their leases have run out")
+            log.exception("the database does not answer; running jobs continue when their leases have expired")
         if self._cluster is not None:
             self._await_idle()
         for part in (self._client, self._cluster):
@@ -135,13 +136,13 @@ class Engine:
         log.info("engine closed")
 
     def _await_idle(self, patience_s: float = 5.0) -> None:
-        """Wait until the worker threads have seen that their jobs were taken away and have killed the children."""
+        """Wait until the worker threads have noticed the loss of their jobs and have killed the child processes."""
         deadline = time.monotonic() + patience_s
         while time.monotonic() < deadline and not all(f.done() for f in self._futures.values()):
             time.sleep(0.05)
 
     def wake(self) -> None:
-        """Look for queued jobs now rather than at the next round."""
+        """Look for queued jobs now rather than in the next round."""
         self._wake.set()
 
     def check_room(self, principal: str, key: str | None) -> None:
@@ -150,25 +151,26 @@ class Engine:
         Raises
         ------
         RateError
-            Too many jobs wait; it says when to come again.
+            Too many jobs wait; the error says when to try again.
         UnavailableError
-            The disk is nearly full (code 'storage_full').
+            storage_full: the disk is nearly full.
         """
         check_free(self.settings.data_dir, self.settings.min_free_mb)
-        with self.told_when():
+        with self.with_retry_time():
             self.jobs.check_room(principal, key, self.room)
 
     def create(self, new: NewJob) -> tuple[RowMapping, bool]:
         """Queue a job; see ``JobStore.create``."""
-        with self.told_when():
+        with self.with_retry_time():
             row, fresh = self.jobs.create(new, self.room)
         if fresh:
             self.wake()
         return row, fresh
 
     @contextmanager
-    def told_when(self) -> Iterator[None]:
-        """Say in an error about a full queue when the next place is likely to be free: a job's time over the slots."""
+    def with_retry_time(self) -> Iterator[None]:
+        """Add to an error about a full queue the time until the next place is likely to be free: run time over slots.
+        """
         try:
             yield
         except RateError as error:
@@ -177,9 +179,11 @@ class Engine:
             raise
 
     def ready(self) -> dict[str, str]:
-        """What the engine needs, each 'ok' or why not; looked at once a second at most, for anybody may ask.
+        """State of each part of the engine: 'ok' or the reason.
 
-        What a failing part said goes into the log: it may name hosts, users and paths.
+        It is checked at most once a second, since anybody may ask. Details of a failure go into the log only, since
+        they may
+        contain hosts, users and paths.
         """
         with self._ready_lock:
             if time.monotonic() - self._ready_at > READY_EVERY_S:
@@ -196,7 +200,7 @@ class Engine:
             return dict(self._ready)
 
     def capacity(self) -> int:
-        """Jobs that can run at a time, as the dispatcher last saw; 0 when it has not seen the scheduler for a while."""
+        """Number of jobs that can run at once, as the dispatcher last saw; 0 when the scheduler has been silent."""
         return self._slots if time.monotonic() - self._slots_at < SLOTS_KNOWN_S else 0
 
     def _check_engine(self) -> None:
@@ -206,17 +210,18 @@ class Engine:
             raise RuntimeError("no worker is connected")
 
     def _check_exposure(self) -> None:
-        """Refuse to be reached from elsewhere while no key was ever made, unless told that keys will come."""
+        """Refuse an address that other machines can reach while no key was ever made, unless the settings require keys.
+        """
         if is_loopback(self.settings.host) or self.keys.usable():
             return
         if self.settings.auth == "keys":
-            log.warning("there is no usable key: nobody gets in; zonemill keys create makes one")
+            log.warning("there is no valid key, so every request is refused; create one with zonemill keys create")
             return
         if self._lock is not None:
             self._lock.close()
-        raise SetupError(f"{self.settings.host} can be reached from other machines, and no usable key was made",
+        raise SetupError(f"{self.settings.host} can be reached from other machines, and there is no valid key",
                          code="exposed_without_key", subjects=(self.settings.host,),
-                         remedy="make a key with zonemill keys create, or listen on 127.0.0.1")
+                         remedy="create a key with zonemill keys create, or listen on 127.0.0.1")
 
     def _lock_data_dir(self) -> None:
         self._lock = (self.settings.data_dir / "lock").open("w")
@@ -225,7 +230,7 @@ class Engine:
         except OSError:
             self._lock.close()
             raise SetupError(f"another service uses the data folder {self.settings.data_dir}", code="data_dir_in_use",
-                             remedy="stop it, or give this one its own --data") from None
+                             remedy="stop the other service, or use another --data folder") from None
 
     def _open_client(self) -> None:
         """Connect to the scheduler, or start the embedded cluster.
@@ -237,14 +242,14 @@ class Engine:
         """
         import dask
 
-        # Before the import: distributed sets up its own logging by this key when it is imported.
+        # Before the import, since distributed configures its logging by this key at import time.
         dask.config.set({"distributed.scheduler.allowed-failures": 2, "logging": {"distributed": "error"},
-                         "distributed.worker.profile.enabled": False})  # it looks a hundred times a second
+                         "distributed.worker.profile.enabled": False})  # it would run a hundred times a second
         from distributed import Client, LocalCluster
         from distributed.utils import LoopRunner
 
         if self.settings.scheduler is not None:
-            if self._loop is None:  # one for all clients: each that got no answer would leave the thread of its own
+            if self._loop is None:  # one loop for all clients; otherwise each failed client would leave a thread
                 self._loop = LoopRunner()
                 self._loop.start()
             self._client = Client(self.settings.scheduler, set_as_default=False, timeout=SCHEDULER_WAIT_S,
@@ -258,24 +263,26 @@ class Engine:
         self._client = Client(self._cluster, set_as_default=False)
 
     def _tell_workers(self) -> None:
-        """Tell workers what to do with their jobs when they end; one of an older release may not know how."""
-        from service.jobs.worker_shutdown import OrderlyEnd
+        """Register the shutdown plugin on the workers; workers of an older release may lack it."""
+        from service.jobs.worker_shutdown import WorkerShutdown
 
         try:
-            self._client.register_plugin(OrderlyEnd())
-        except Exception as error:  # jobs run all the same
-            log.warning("workers were not told how to end in order", error=f"{type(error).__name__}: {error}")
+            self._client.register_plugin(WorkerShutdown())
+        except Exception as error:  # jobs run without it
+            log.warning("the shutdown plugin could not be registered on the workers",
+                        error=f"{type(error).__name__}: {error}")
 
     def _look(self) -> int:
-        """Ask the scheduler how many jobs can run at a time.
+        """Number of jobs that can run at once, from the scheduler.
 
-        A client that lost its scheduler gives up for good after a while, so one that gets no answer is thrown away and
-        the next look makes another. What its tasks do they write into the database themselves.
+        A client that lost its scheduler stops trying after a while. So a client without an answer is dropped, and the
+        next call
+        makes a new one. Its tasks write their results into the database themselves.
 
         Raises
         ------
         UnavailableError
-            It does not answer.
+            The scheduler does not answer.
         """
         try:
             if self._client is None:
@@ -304,47 +311,48 @@ class Engine:
                 self._reap()
                 if time.monotonic() >= chores:
                     chores = time.monotonic() + CHORES_EVERY_S
-                    self.jobs.give_up(self.settings.max_attempts, self.settings.lease_s, self._mercy_s())
+                    self.jobs.give_up(self.settings.max_attempts, self.settings.lease_s, self._lease_grace_s())
                     self.jobs.miss_deadlines()
-                check_free(self.settings.data_dir, self.settings.min_free_mb)  # what waits is not started to fail
+                check_free(self.settings.data_dir, self.settings.min_free_mb)  # a job started now would fail
                 while self._look() > self._running() and self._submit():
                     pass
                 idle = ""
             except UnavailableError as error:
-                if error.message != idle:  # said once, for it may last all night
+                if error.message != idle:  # logged once, since it may last for hours
                     log.warning("nothing is started", reason=error.message)
                 idle = error.message
                 self._stop.wait(timeout=1.0)
             except Exception:
-                log.exception("dispatcher stumbled")  # database or scheduler away: the next round tries again
+                log.exception("dispatcher round failed")  # no database or scheduler: the next round tries again
                 self._stumbled = time.monotonic()
             self._wake.wait(timeout=self.settings.poll_s)
             self._wake.clear()
 
-    def _mercy_s(self) -> float:
-        """For how long leases that have run out still count, s.
+    def _lease_grace_s(self) -> float:
+        """Time, s, for which expired leases still count as valid.
 
-        Holders could not renew while the database was away, and leases are times of the day: for one lease after it
-        came back, and after the clock was set, none counts as run out, so that holders that live can renew.
+        Holders cannot renew leases while the database does not answer, and leases are times of the day. For one lease
+        after it
+        answers again, and after the clock was set, no lease counts as expired, so that living holders can renew theirs.
         """
         clock = time.time() - time.monotonic()
         if abs(clock - self._clock) > STEP_S:
             log.warning("the clock was set", by_s=round(clock - self._clock, 1))
             self._clock, self._stumbled = clock, time.monotonic()
-        return MERCY_S if time.monotonic() - self._stumbled < self.settings.lease_s else 0.0
+        return ENDLESS_GRACE_S if time.monotonic() - self._stumbled < self.settings.lease_s else 0.0
 
     def _running(self) -> int:
-        return self.jobs.running(self.settings.lease_s, self._mercy_s())
+        return self.jobs.running(self.settings.lease_s, self._lease_grace_s())
 
     def _submit(self) -> bool:
-        row = self.jobs.claim(self.owner, self.settings.lease_s, self.settings.max_attempts, self._mercy_s(),
+        row = self.jobs.claim(self.owner, self.settings.lease_s, self.settings.max_attempts, self._lease_grace_s(),
                               self._slots)
         if row is None:
             return False
-        if row["claims"] > CLAIMS_IN_VAIN and (lost := self.artifacts.missing(row)):
-            error = ResourceError("what was uploaded for the job is gone from the data folder", code="upload_lost",
-                                  measured=lost, remedy="post it again; who runs the service should look at its disk")
-            log.error("uploads are gone", job=row["id"], missing=lost)
+        if row["claims"] > MAX_UNSTARTED_CLAIMS and (lost := self.artifacts.missing(row)):
+            error = ResourceError("the data folder has lost the uploads of the job", code="upload_lost",
+                                  measured=lost, remedy="post the job again; the operator should check the disk")
+            log.error("uploads are missing", job=row["id"], missing=lost)
             self.jobs.finish(row["id"], self.owner, "failed", error=error)
             return True
         key = f"{row['id']}-{row['claims']}"
@@ -361,10 +369,10 @@ class Engine:
                 continue
             job_id, _, claim = key.rpartition("-")
             if isinstance(future.exception(), AWAY):
-                log.warning("the database was away; the job is taken up again", job=job_id, claim=claim)
-                continue  # its lease runs out
+                log.warning("the database did not answer; the job continues", job=job_id, claim=claim)
+                continue  # its lease expires
             error = ResourceError(f"the workers that ran the job were lost ({type(future.exception()).__name__})",
-                                  code="worker_lost", remedy="look into the log of the workers")
+                                  code="worker_lost", remedy="see the log of the workers")
             log.error("task lost", job=job_id, claim=claim, error=str(future.exception()))
             if self.jobs.take_over(job_id, int(claim), self.owner, self.settings.lease_s):
                 self.jobs.finish(job_id, self.owner, "failed", error=error)
@@ -374,7 +382,7 @@ def _close_quietly(client: Any) -> None:
     try:
         client.close(timeout=10)
     except Exception as error:
-        log.info("a client of the scheduler did not close in order", error=type(error).__name__)
+        log.info("a client of the scheduler did not close properly", error=type(error).__name__)
 
 
 def _outcome(name: str, check: Callable[[], Any], otherwise: str) -> str:

@@ -1,14 +1,14 @@
-# The process in which one job is computed. Nothing is imported at the top: a child starts by reading this file.
+# The process in which one job is computed. It imports nothing at the top, so that it starts quickly.
 """``python -m service.jobs.job_process REQUEST.json FD``: run one job, send progress lines to the pipe FD.
 
 The request is {"kind", "part", "setup", "program", "stock", "spindle_tool", "out", "kept", "chain", "address_bytes"}.
-Lines on the pipe are JSON: {"stage", "progress"} while it runs, {"resumed"} when it takes something over from an
-attempt before (``service.checkpoint_store``), then {"state"} or {"error"} once. Exit code 0 with a state, 3 with an error.
+Lines on the pipe are JSON: {"stage", "progress"} while it runs, {"resumed"} when it uses a checkpoint of an earlier
+attempt (``service.checkpoint_store``), then {"state"} or {"error"} once. Exit code 0 with a state, 3 with an error.
 """
 
 
 def guard(parent, address_bytes):
-    """Die with the parent, leave no core file, and keep a soft limit on the address space."""
+    """End with the parent, leave no core file, and set a soft limit on the address space."""
     import ctypes
     import os
     import resource
@@ -21,7 +21,7 @@ def guard(parent, address_bytes):
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     hard = resource.getrlimit(resource.RLIMIT_AS)[1]
     soft = address_bytes if hard == resource.RLIM_INFINITY else min(address_bytes, hard)
-    # The hard limit stays: the STEP reader, a child of this one, sets its own.
+    # The hard limit stays, since the STEP reader, a child of this process, sets its own.
     resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
@@ -44,9 +44,9 @@ def reporter(send, interval=0.2):
 
 
 def compute(request, progress, resumed):
-    """Run the chain as the request says, leave its files in the out folder, and return the final state.
+    """Run the requested pipeline, leave its files in the out folder, and return the final state.
 
-    resumed : called with what was taken over from attempts before, by kind
+    resumed : called with the number of checkpoints used, by kind
     """
     import importlib
     import json
@@ -78,7 +78,7 @@ def compute(request, progress, resumed):
 
 
 def main(argv):
-    """Entry; see the module."""
+    """Entry point; see the module."""
     import json
     import os
     import traceback

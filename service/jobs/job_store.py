@@ -1,8 +1,8 @@
-"""Jobs in the database: every change is one guarded statement, so two writers cannot both win.
+"""Jobs in the database. Every change is one guarded statement, so of two writers only one succeeds.
 
 States: queued -> running -> proved | unproved | done | failed, and cancelled from queued or running. A running job
-belongs to the holder of its lease; a job whose lease has run out may be claimed again while attempts are left. A claim
-hands it to the workers; an attempt counts from the moment a worker starts it, so that waiting for one costs none.
+belongs to the holder of its lease. A job whose lease has expired may be claimed again while attempts are left. A claim
+hands it to the workers. An attempt counts from its start on a worker, so waiting for one costs none.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from schemas.jobs import FINAL_STATES
 from service.errors import KeyConflictError, NotFoundError, RateError
 from service.jobs.database import jobs, labels
 
-FAR_LEASES = 10  # no holder asks for so many at once
-WORKER = "worker-"  # how the names of holders begin that have started an attempt
-CLAIM_LOCK = 0x7A6F6E66  # a number of our own among PostgreSQL's advisory locks
+MAX_LEASES_AHEAD = 10  # a lease that ends later means that the clock was set back
+WORKER = "worker-"  # prefix of the holders that have started an attempt
+CLAIM_LOCK = 0x7A6F6E66  # our number of a PostgreSQL advisory lock
 
 
 @dataclass(frozen=True)
 class NewJob:
-    """What a client asked for."""
+    """The data of a submission."""
 
     kind: str
     principal: str
@@ -51,7 +51,7 @@ class NewJob:
 
 @dataclass(frozen=True)
 class Room:
-    """How many jobs may wait: in all, and of one principal."""
+    """Largest number of waiting jobs: in total, and of one principal."""
 
     total: int
     each: int
@@ -69,7 +69,7 @@ class JobStore:
         self.engine = engine
 
     def create(self, new: NewJob, room: Room | None = None) -> tuple[RowMapping, bool]:
-        """Queue a job, or find the one this Idempotency-Key already made.
+        """Queue a job, or find the one that this Idempotency-Key already made.
 
         Returns the row and whether it is new.
 
@@ -78,12 +78,12 @@ class JobStore:
         KeyConflictError
             The principal used the key before for other content or another kind of job.
         RateError
-            There is no room in the queue (codes 'queue_full', 'your_queue_full').
+            The queue is full (codes 'queue_full', 'your_queue_full').
 
         Notes
         -----
-        Room is looked for by the statement that inserts. SQLite runs one such statement at a time, so the bound holds
-        to the job; PostgreSQL may let in one more for every other that posts in the same instant.
+        The inserting statement itself checks for room. SQLite runs one such statement at a time, so the limit is exact.
+        PostgreSQL may accept one more job for every other that is posted at the same instant.
         """
         now = time.time()
         values = {
@@ -115,23 +115,23 @@ class JobStore:
                 found = self._by_key(new.principal, new.idempotency_key)
                 if found is None and new.idempotency_key is None:
                     raise
-                # None: the files of the job that had the key were let go of just now, so the key is free again
+                # None: the job with this key has just expired, so the key is free again
         if found["kind"] != new.kind:
             raise KeyConflictError(
-                f"the Idempotency-Key belongs to job {found['id']}, which is of kind {found['kind']}, not {new.kind}",
+                f"the Idempotency-Key belongs to job {found['id']} of kind {found['kind']}, not {new.kind}",
                 subjects=(found["id"],), measured=new.kind, limit=found["kind"],
-                remedy="take a new key for each kind of job")
+                remedy="use a new key for each kind of job")
         if found["content_sha256"] != new.content_sha256:
             raise KeyConflictError(
                 f"the Idempotency-Key belongs to job {found['id']}, which has other content",
                 subjects=(found["id"],), measured=new.content_sha256, limit=found["content_sha256"],
-                remedy="take a new key for new content")
+                remedy="use a new key for new content")
         return found, False
 
     def check_room(self, principal: str, key: str | None, room: Room) -> None:
         """Refuse early what ``create`` would refuse, so that no file is read in vain.
 
-        A key that made a job before passes: its repeat is answered whether there is room or not.
+        A known key passes, since its repeat is answered whether there is room or not.
 
         Raises
         ------
@@ -144,18 +144,18 @@ class JobStore:
             raise self.no_room(principal, room)
 
     def no_room(self, principal: str, room: Room | None) -> RateError:
-        """The error for a full queue; it names the one that is full."""
+        """The error for a full queue; it names the limit that is reached."""
         assert room is not None
         with self.engine.connect() as c:
             own = c.execute(sa.select(_waiting(principal))).scalar_one()
         if own >= room.each:
-            return RateError(f"{own} of your jobs are waiting already", code="your_queue_full", measured=own,
+            return RateError(f"{own} of your jobs are already waiting", code="your_queue_full", measured=own,
                              limit=room.each, remedy="wait until some have ended, or cancel some")
-        return RateError(f"{room.total} jobs are waiting already", code="queue_full", limit=room.total,
+        return RateError(f"{room.total} jobs are already waiting", code="queue_full", limit=room.total,
                          remedy="wait until some have ended")
 
     def mean_run_s(self, of: int = 20) -> float | None:
-        """How long the jobs that ended last ran, s; None before any has."""
+        """Mean run time of the jobs that ended last, s; None before any has ended."""
         took = (sa.select((jobs.c.finished - jobs.c.started).label("s"))
                 .where(jobs.c.finished.is_not(None), jobs.c.started.is_not(None), jobs.c.artifact.is_not(None))
                 .order_by(jobs.c.id.desc()).limit(of).subquery())
@@ -171,22 +171,22 @@ class JobStore:
             return c.execute(query).mappings().one_or_none()
 
     def get(self, job_id: str, principal: str | None = None) -> RowMapping:
-        """One job; of that principal where one is given.
+        """One job; only of that principal where one is given.
 
         Raises
         ------
         NotFoundError
-            There is none.
+            There is no such job.
         """
         query = sa.select(jobs).where(jobs.c.id == job_id)
         if principal is not None:
             query = query.where(jobs.c.principal == principal)
         row = None
-        if len(job_id) <= 40 and job_id.isascii() and job_id.isalnum():  # PostgreSQL takes no NUL in a text
+        if len(job_id) <= 40 and job_id.isascii() and job_id.isalnum():  # PostgreSQL refuses NUL in text
             with self.engine.connect() as c:
                 row = c.execute(query).mappings().one_or_none()
         if row is None:
-            raise NotFoundError(f"there is no job {job_id[:80]}", code="no_such_job", subjects=(job_id,),
+            raise NotFoundError(f"unknown job {job_id[:80]}", code="no_such_job", subjects=(job_id,),
                                 remedy="GET /v1/jobs lists your jobs")
         return row
 
@@ -195,7 +195,7 @@ class JobStore:
              until: float | None = None) -> list[RowMapping]:
         """Up to ``limit`` jobs of a principal, newest first, older than the job ``before``.
 
-        labelled     : labels a job has all of;  since, until : when it was posted, s; the second not included
+        labelled     : labels that must all match;  since, until : time of posting, s; ``until`` is excluded
         """
         query = sa.select(jobs).where(jobs.c.principal == principal).order_by(jobs.c.id.desc()).limit(limit)
         for column, value in ((jobs.c.state, state), (jobs.c.kind, kind)):
@@ -213,18 +213,18 @@ class JobStore:
         with self.engine.connect() as c:
             return list(c.execute(query).mappings())
 
-    def claim(self, owner: str, lease_s: float, max_attempts: int, mercy_s: float = 0.0,
+    def claim(self, owner: str, lease_s: float, max_attempts: int, lease_grace_s: float = 0.0,
               slots: int | None = None) -> RowMapping | None:
-        """Take the oldest job that waits, or whose holder went silent; None when there is none.
+        """Take the oldest job that waits, or whose holder is silent; None when there is none.
 
-        mercy_s : how long a lease must have run out, s: while the database was away nobody could renew his
-        slots : none is taken when so many run already; services that claim at the same time wait for each other
+        lease_grace_s : s that a lease must have been expired; holders could not renew while the database did not answer
+        slots : no job is taken when so many run already; services that claim at the same time wait for each other
         """
         now = time.time()
-        expired = sa.and_(jobs.c.state == "running", _silent(now, lease_s, mercy_s))
+        expired = sa.and_(jobs.c.state == "running", _silent(now, lease_s, lease_grace_s))
         oldest = (sa.select(jobs.c.id).where(sa.or_(jobs.c.state == "queued", expired), jobs.c.attempt < max_attempts)
                   .order_by(jobs.c.id).limit(1).with_for_update(skip_locked=True).scalar_subquery())
-        room = sa.true() if slots is None else _count_running(now, lease_s, mercy_s).scalar_subquery() < slots
+        room = sa.true() if slots is None else _count_running(now, lease_s, lease_grace_s).scalar_subquery() < slots
         change = (jobs.update().where(jobs.c.id == oldest, sa.or_(jobs.c.state == "queued", expired), room)
                   .values(state="running", stage="starting", progress=0.0, claims=jobs.c.claims + 1,
                           event_seq=jobs.c.event_seq + 1, lease_owner=owner, lease_until=now + lease_s)
@@ -235,9 +235,9 @@ class JobStore:
             return c.execute(change).mappings().one_or_none()
 
     def start(self, job_id: str, claim: int, owner: str, lease_s: float, max_attempts: int) -> bool:
-        """Begin an attempt of what was claimed; False when it was claimed again since, ended, or has none left.
+        """Begin an attempt of a claimed job. False when it was claimed again, has ended, or has no attempt left.
 
-        claim : which claim it was, as ``row["claims"]`` says. The same one may start again: that of a worker that died.
+        claim : number of the claim, ``row["claims"]``. The same claim may start again after its worker died.
         """
         now = time.time()
         return self._change(
@@ -246,7 +246,7 @@ class JobStore:
             attempt=jobs.c.attempt + 1, lease_owner=owner, lease_until=now + lease_s, started=now, resumed_json=None)
 
     def take_over(self, job_id: str, claim: int, owner: str, lease_s: float) -> bool:
-        """Make ``owner`` the holder of that claim; False when it was claimed again since, or ended."""
+        """Make ``owner`` the holder of that claim; False when the job was claimed again or has ended."""
         return self._change(
             sa.and_(jobs.c.id == job_id, jobs.c.claims == claim, jobs.c.state == "running"),
             lease_owner=owner, lease_until=time.time() + lease_s)
@@ -256,17 +256,17 @@ class JobStore:
         return self._change(self._held(job_id, owner), lease_until=time.time() + lease_s)
 
     def is_held(self, job_id: str, owner: str) -> bool:
-        """Whether the job still runs and still belongs to ``owner``."""
+        """Whether the job still runs and belongs to ``owner``."""
         with self.engine.connect() as c:
             return c.execute(sa.select(jobs.c.id).where(self._held(job_id, owner))).first() is not None
 
     def progress(self, job_id: str, owner: str, stage: str, fraction: float) -> bool:
-        """Record what the holder is doing; also a heartbeat's worth of proof that it lives."""
+        """Record stage and progress of the holder; this also counts as a heartbeat."""
         return self._change(self._held(job_id, owner), stage=stage[:200], progress=min(max(fraction, 0.0), 1.0),
                             event_seq=jobs.c.event_seq + 1)
 
     def resumed(self, job_id: str, owner: str, taken: Mapping[str, int]) -> bool:
-        """Record what the newest attempt took over from those before, by kind: it goes with the next event."""
+        """Record the checkpoints that the newest attempt used, by kind; the next event contains them."""
         return self._change(self._held(job_id, owner), resumed_json=json.dumps(dict(taken)),
                             event_seq=jobs.c.event_seq + 1)
 
@@ -280,20 +280,20 @@ class JobStore:
                             event_seq=jobs.c.event_seq + 1, lease_owner=None, lease_until=None, **values)
 
     def cancel(self, job_id: str) -> bool:
-        """Cancel a job that has not ended; whoever runs it sees that at its next look."""
+        """Cancel a job that has not ended; its holder notices at the next check."""
         return self._change(sa.and_(jobs.c.id == job_id, jobs.c.state.in_(("queued", "running"))),
                             state="cancelled", stage="cancelled", finished=time.time(), lease_owner=None,
                             lease_until=None, event_seq=jobs.c.event_seq + 1)
 
     def release(self) -> int:
-        """Let every lease run out now; only for the sole owner of the database, after a restart."""
+        """Let every lease expire now; only for the sole owner of the database, after a restart."""
         with self.engine.begin() as c:
             return c.execute(jobs.update().where(jobs.c.state == "running").values(lease_until=0.0)).rowcount
 
     def disown(self) -> int:
-        """Put every running job back into the queue without counting the attempt: an orderly stop is no failure.
+        """Put every running job back into the queue without counting the attempt, for an orderly stop.
 
-        Only for the sole owner of the database. Holders see that they lost the job and stop their children.
+        Only for the sole owner of the database. Holders notice the loss of the job and stop their child processes.
         """
         begun = sa.case((jobs.c.lease_owner.startswith(WORKER), 1), else_=0)
         with self.engine.begin() as c:
@@ -302,38 +302,39 @@ class JobStore:
                 lease_until=None, event_seq=jobs.c.event_seq + 1)).rowcount
 
     def hand_back(self, owner: str) -> int:
-        """Put into the queue what ``owner`` claimed and no worker has begun; returns how many."""
+        """Put the jobs back into the queue that ``owner`` claimed and no worker has started; returns their number."""
         with self.engine.begin() as c:
             return c.execute(jobs.update().where(jobs.c.state == "running", jobs.c.lease_owner == owner).values(
                 state="queued", stage="queued", progress=0.0, lease_owner=None, lease_until=None,
                 event_seq=jobs.c.event_seq + 1)).rowcount
 
     def put_back(self, job_id: str, owner: str, counts: bool = True) -> bool:
-        """Let a job that ``owner`` holds wait again; counts : whether that was an attempt."""
+        """Put a job that ``owner`` holds back into the queue; counts : whether that was an attempt."""
         return self._change(self._held(job_id, owner), state="queued", stage="queued", progress=0.0, lease_owner=None,
                             lease_until=None, attempt=jobs.c.attempt - (0 if counts else 1),
                             event_seq=jobs.c.event_seq + 1)
 
     def miss_deadlines(self) -> int:
-        """Fail the jobs that should have ended by now; holders see that they lost them and stop their children."""
+        """Fail the jobs whose deadline has passed; holders notice the loss and stop their child processes."""
         now = time.time()
         error = ResourceError("the job did not end before its deadline and was stopped", code="deadline_exceeded",
-                              remedy="give it a longer deadline_s, or post it when less is waiting")
+                              remedy="set a longer deadline_s, or post the job when fewer jobs wait")
         late = sa.and_(jobs.c.state.in_(("queued", "running")), jobs.c.deadline < now)
         with self.engine.begin() as c:
             return c.execute(jobs.update().where(late).values(
                 state="failed", stage="failed", finished=now, error_json=json.dumps(error.as_dict()),
                 lease_owner=None, lease_until=None, event_seq=jobs.c.event_seq + 1)).rowcount
 
-    def give_up(self, max_attempts: int, lease_s: float, mercy_s: float = 0.0) -> int:
-        """Fail the jobs whose holder went silent in their last attempt; lease_s and mercy_s as for ``claim``.
+    def give_up(self, max_attempts: int, lease_s: float, lease_grace_s: float = 0.0) -> int:
+        """Fail the jobs whose holder is silent in their last attempt; lease_s and lease_grace_s as for ``claim``.
 
-        Also those that wait and have no attempt left, as after ``max_attempts`` was lowered: nobody would claim them.
+        It also fails waiting jobs without an attempt left, as after ``max_attempts`` was lowered: nobody would claim
+        them.
         """
         error = ResourceError(f"the job was started {max_attempts} times and its process was lost each time",
                               code="attempts_exhausted", measured=max_attempts, limit=max_attempts,
-                              remedy="look into the log of the service; the job may need more memory than there is")
-        silent = sa.and_(jobs.c.state == "running", _silent(time.time(), lease_s, mercy_s))
+                              remedy="see the log of the service; the job may need more memory than the machine has")
+        silent = sa.and_(jobs.c.state == "running", _silent(time.time(), lease_s, lease_grace_s))
         gone = sa.and_(sa.or_(jobs.c.state == "queued", silent), jobs.c.attempt >= max_attempts)
         with self.engine.begin() as c:
             return c.execute(jobs.update().where(gone).values(
@@ -341,7 +342,7 @@ class JobStore:
                 lease_owner=None, lease_until=None, event_seq=jobs.c.event_seq + 1)).rowcount
 
     def claim_webhook(self, lease_s: float) -> RowMapping | None:
-        """Take the webhook of an ended job that is due, for one attempt; unsettled, it is due again after the lease."""
+        """Take a due webhook of an ended job for one attempt; if it is not settled, it is due again after the lease."""
         now = time.time()
         due = sa.and_(jobs.c.webhook_state == "pending", jobs.c.webhook_due <= now, jobs.c.state.in_(FINAL_STATES))
         first = (sa.select(jobs.c.id).where(due).order_by(jobs.c.webhook_due, jobs.c.id).limit(1)
@@ -353,21 +354,22 @@ class JobStore:
 
     def settle_webhook(self, job_id: str, attempt: int, state: str, problem: str | None = None,
                        due: float | None = None) -> bool:
-        """Record what came of an attempt; False when a later one has begun."""
+        """Record the outcome of an attempt; False when a later attempt has begun."""
         return self._change(sa.and_(jobs.c.id == job_id, jobs.c.webhook_attempts == attempt), webhook_state=state,
                             webhook_due=due, webhook_problem=problem and problem[:200])
 
     def expire(self, job_id: str) -> bool:
-        """Let go of the files of a job that has ended; its Idempotency-Key is free again."""
-        return self._change(sa.and_(jobs.c.id == job_id, _ended()), **_let_go())
+        """Give up the files of an ended job; its Idempotency-Key is free again."""
+        return self._change(sa.and_(jobs.c.id == job_id, _ended()), **_expired_values())
 
     def expire_before(self, ended: float) -> int:
-        """The same for every job that ended before a time, s; returns how many."""
+        """The same for every job that ended before a time, s; returns their number."""
         with self.engine.begin() as c:
-            return c.execute(jobs.update().where(_ended(), jobs.c.finished < ended).values(**_let_go())).rowcount
+            old = jobs.update().where(_ended(), jobs.c.finished < ended)
+            return c.execute(old.values(**_expired_values())).rowcount
 
     def files_named(self) -> set[str]:
-        """Hashes of every upload and result that a job has a use for."""
+        """Hashes of every upload and result that a job needs."""
         columns = (jobs.c.part_sha256, jobs.c.stock_sha256, jobs.c.program_sha256, jobs.c.artifact)
         named: set[str] = set()
         with self.engine.connect() as c:
@@ -376,7 +378,7 @@ class JobStore:
         return named
 
     def unfinished(self) -> list[RowMapping]:
-        """Every job that waits or runs, as far as its result is named by it (``service.jobs.artifacts.key_of``)."""
+        """Every job that waits or runs, with the columns that name its result (``service.jobs.artifacts.key_of``)."""
         columns = (jobs.c.kind, jobs.c.part_sha256, jobs.c.setup_sha256, jobs.c.program_sha256, jobs.c.spindle_tool,
                    jobs.c.stock_sha256)
         with self.engine.connect() as c:
@@ -388,10 +390,10 @@ class JobStore:
         with self.engine.connect() as c:
             return {state: count for state, count in c.execute(query.group_by(jobs.c.webhook_state))}
 
-    def running(self, lease_s: float = 1e9, mercy_s: float = 0.0) -> int:
-        """How many jobs run under a lease that has not run out; lease_s and mercy_s as for ``claim``."""
+    def running(self, lease_s: float = 1e9, lease_grace_s: float = 0.0) -> int:
+        """Number of jobs that run under a valid lease; lease_s and lease_grace_s as for ``claim``."""
         with self.engine.connect() as c:
-            return int(c.execute(_count_running(time.time(), lease_s, mercy_s)).scalar_one())
+            return int(c.execute(_count_running(time.time(), lease_s, lease_grace_s)).scalar_one())
 
     def counts(self) -> dict[str, int]:
         """Number of jobs by state."""
@@ -408,27 +410,28 @@ class JobStore:
             return c.execute(jobs.update().where(where).values(**values)).rowcount == 1
 
 
-def _silent(now: float, lease_s: float, mercy_s: float) -> sa.ColumnElement[bool]:
-    """Whether the holder went silent: the lease has run out, or ends so far ahead that the clock was set back since."""
-    return sa.or_(jobs.c.lease_until < now - mercy_s, jobs.c.lease_until > now + FAR_LEASES * lease_s + mercy_s)
+def _silent(now: float, lease_s: float, lease_grace_s: float) -> sa.ColumnElement[bool]:
+    """Whether the holder is silent: the lease has expired, or ends so late that the clock was set back."""
+    latest = now + MAX_LEASES_AHEAD * lease_s + lease_grace_s
+    return sa.or_(jobs.c.lease_until < now - lease_grace_s, jobs.c.lease_until > latest)
 
 
-def _count_running(now: float, lease_s: float, mercy_s: float) -> sa.Select[Any]:
+def _count_running(now: float, lease_s: float, lease_grace_s: float) -> sa.Select[Any]:
     return sa.select(sa.func.count()).select_from(jobs).where(jobs.c.state == "running",
-                                                              sa.not_(_silent(now, lease_s, mercy_s)))
+                                                              sa.not_(_silent(now, lease_s, lease_grace_s)))
 
 
 def _ended() -> sa.ColumnElement[bool]:
     return sa.and_(jobs.c.state.in_(FINAL_STATES), jobs.c.expired.is_(None))
 
 
-def _let_go() -> dict[str, Any]:
-    """What expiry leaves of a job: who, when, labels, state, hashes and figures; the setup goes with the files."""
+def _expired_values() -> dict[str, Any]:
+    """Values of an expired job: owner, times, labels, state, hashes and figures stay; the setup goes with the files."""
     return {"expired": time.time(), "artifact": None, "idempotency_key": None, "setup_json": "{}"}
 
 
 def _waiting(principal: str | None = None) -> sa.ScalarSelect[int]:
-    """How many jobs wait, of a principal or in all."""
+    """Number of waiting jobs, of a principal or in total."""
     query = sa.select(sa.func.count()).select_from(jobs).where(jobs.c.state == "queued")
     return (query if principal is None else query.where(jobs.c.principal == principal)).scalar_subquery()
 
@@ -438,7 +441,8 @@ def _has_room(principal: str, room: Room | None) -> sa.ColumnElement[bool]:
 
 
 def _insert_where(values: dict[str, Any], condition: sa.ColumnElement[bool]) -> ReturningInsert[Any]:
-    """Insert a job if a condition holds; returns the row or nothing. The casts tell PostgreSQL what a parameter is."""
+    """Insert a job if a condition holds; returns the row or nothing. The casts give PostgreSQL the types of parameters.
+    """
     columns = [jobs.c[name] for name in values]
     row = sa.select(*(sa.cast(sa.literal(values[c.name], c.type), c.type) for c in columns)).where(condition)
     return jobs.insert().from_select(columns, row).returning(jobs)

@@ -1,8 +1,8 @@
-"""Tools, machines and materials that setups refer to: each write is a version, and versions are never written over.
+"""Tools, machines and materials to which setups refer. Each write is a new version; versions are never overwritten.
 
 An entry belongs to a principal, or to all of them (shared, written by admins only). A name means the principal's own
 entry where there is one, else the shared one. ``lib:NAME`` is the newest version, ``lib:NAME@3`` the third. A deleted
-name cannot be referred to any more; written again it goes on counting, so that ``@3`` never means two things.
+name cannot be used any more. Written again, it continues its numbers, so that ``@3`` never means two things.
 """
 
 from __future__ import annotations
@@ -44,20 +44,20 @@ class LibraryStore:
         self.engine = engine
 
     def all(self, principal: str, shelf: str) -> list[Entry]:
-        """The newest version of every entry a principal can refer to, by name."""
+        """The newest version of every entry that a principal can use, by name."""
         query = (sa.select(entries).where(_seen_by(principal), entries.c.shelf == shelf, entries.c.deleted.is_(None))
                  .order_by(entries.c.name, entries.c.owner, entries.c.version))
         with self.engine.connect() as c:
-            # Shared ones come first and old ones before new ones, so the last of a name is the one that counts.
+            # Shared entries come first, and old ones before new ones, so the last entry of a name is valid.
             return list({row["name"]: _entry(row) for row in c.execute(query).mappings()}.values())
 
     def get(self, principal: str, shelf: str, name: str, version: int | None = None) -> Entry:
-        """One entry, its newest version unless one is named.
+        """One entry, in its newest version unless a version is given.
 
         Raises
         ------
         NotFoundError
-            There is none of that name, or no such version.
+            There is no such name or version.
         """
         query = (sa.select(entries).where(_seen_by(principal), entries.c.shelf == shelf, entries.c.name == name,
                                           entries.c.deleted.is_(None))
@@ -74,7 +74,7 @@ class LibraryStore:
                             remedy=f"GET /v1/{shelf} lists the entries")
 
     def put(self, owner: str, shelf: str, name: str, value: Any) -> tuple[Entry, bool]:
-        """Write an entry, as the next version unless it is as the newest. Returns it and whether the name is new."""
+        """Write an entry as the next version, unless it equals the newest. Returns it and whether the name is new."""
         text = json.dumps(value, sort_keys=True)
         at = sa.and_(entries.c.owner == owner, entries.c.shelf == shelf, entries.c.name == name)
         while True:
@@ -91,15 +91,15 @@ class LibraryStore:
                     made = c.execute(entries.insert().values(row).returning(entries)).mappings().one()
                 return _entry(made), not live
             except IntegrityError:
-                continue  # somebody wrote that very version meanwhile
+                continue  # another request wrote that version meanwhile
 
     def delete(self, owner: str, shelf: str, name: str) -> None:
-        """Take a name out of the library; jobs keep what they used.
+        """Delete a name from the library; jobs keep the versions that they used.
 
         Raises
         ------
         NotFoundError
-            This owner has none of that name.
+            This owner has no entry with that name.
         """
         change = entries.update().where(entries.c.owner == owner, entries.c.shelf == shelf, entries.c.name == name,
                                         entries.c.deleted.is_(None)).values(deleted=time.time())
@@ -114,7 +114,7 @@ class LibraryStore:
 
 
 class LibraryView(Mapping[str, Mapping[str, Any]]):
-    """Shelves by name, entries by what stands behind ``lib:``; keeps in ``used`` what was looked up."""
+    """The library by shelf and by the text after ``lib:``; ``used`` collects the entries that were read."""
 
     def __init__(self, store: LibraryStore, principal: str) -> None:
         self.used: dict[tuple[str, str, int], Entry] = {}
@@ -130,14 +130,14 @@ class LibraryView(Mapping[str, Mapping[str, Any]]):
         return len(self._shelves)
 
     def as_json(self) -> str | None:
-        """What was used, for the job's row; None where nothing was."""
+        """The used entries, for the row of the job; None where there is none."""
         found = [{"shelf": e.shelf, "name": e.name, "version": e.version, "shared": e.shared}
                  for _, e in sorted(self.used.items())]
         return json.dumps(found) if found else None
 
 
 class _Shelf(Mapping[str, Any]):
-    """Entries of one shelf by reference; only what is asked for is read."""
+    """Entries of one shelf by reference; each is read on demand."""
 
     def __init__(self, store: LibraryStore, principal: str, shelf: str,
                  used: dict[tuple[str, str, int], Entry]) -> None:

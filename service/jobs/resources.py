@@ -1,4 +1,4 @@
-"""From database rows and result folders to the wire models of jobs and files."""
+"""Converts database rows and result folders into the wire models of jobs and files."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ def path_of(row: RowMapping) -> str:
 
 
 def time_text(seconds: float | None) -> str | None:
-    """A time of the database as the interface writes it: UTC, ISO 8601."""
+    """A time of the database as text: UTC, ISO 8601."""
     if seconds is None:
         return None
     return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 def job_resource(row: RowMapping) -> Job:
-    """The job as the interface shows it."""
+    """The job as wire model."""
     path, kind = path_of(row), row["kind"]
     links = JobLinks(self=path, events=f"{path}/events", files=f"{path}/files", view=f"{path}/view",
                      zones=f"{path}/zones" if kind != "verify" else None,
@@ -57,7 +57,7 @@ def job_resource(row: RowMapping) -> Job:
 
 
 def key_resource(row: RowMapping) -> Key:
-    """A key as the interface shows it, without its secret and the hash of that."""
+    """A key as wire model, without its secret and hash."""
     return Key(id=row["id"], principal=row["principal"], scopes=row["scopes"].split(","), note=row["note"],
                created_at=time_text(row["created"]) or "", expires_at=time_text(row["expires"]),
                revoked_at=time_text(row["revoked"]), last_used_at=time_text(row["last_used"]))
@@ -90,32 +90,32 @@ def encode_cursor(job_id: str) -> str:
 
 
 def decode_cursor(cursor: str) -> str:
-    """The job a cursor stands for.
+    """The job of a cursor.
 
     Raises
     ------
     RequestError
-        It is no cursor of ours.
+        The text is not a cursor of this service.
     """
     try:
         text = base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)).decode("ascii")
     except (binascii.Error, ValueError):
         text = ""
     if not (text.startswith("j") and text[1:].isalnum() and len(text) <= 40):
-        raise RequestError("the cursor is not one this service gave out", code="bad_cursor", subjects=("cursor",),
-                           remedy="take next_cursor of the page before")
+        raise RequestError("the cursor is not from this service", code="bad_cursor", subjects=("cursor",),
+                           remedy="use next_cursor of the previous page")
     return text
 
 
 def result_folder(artifacts: Artifacts, row: RowMapping) -> Path:
-    """Folder of a job's result.
+    """Folder of the result of a job.
 
     Raises
     ------
     NotReadyError
         The job has not ended, or ended without a result.
     GoneError
-        Its files were let go of.
+        Its files have expired.
     NotFoundError
         The data folder has lost it.
     """
@@ -123,17 +123,17 @@ def result_folder(artifacts: Artifacts, row: RowMapping) -> Path:
         raise NotReadyError(f"job {row['id']} is {row['state']}", subjects=(row["id"],),
                             remedy=f"wait until it ends; GET {path_of(row)}/events follows it")
     if row["expired"] is not None:
-        raise GoneError(f"the files of job {row['id']} were let go of at {time_text(row['expired'])}",
+        raise GoneError(f"the files of job {row['id']} were deleted at {time_text(row['expired'])}",
                         subjects=(row["id"],), remedy="post the same content again")
     if not row["artifact"]:
         cancelled = row["state"] == "cancelled"
-        remedy = ("it was cancelled: post it again, under another Idempotency-Key if it had one" if cancelled else
-                  f"GET {path_of(row)} tells under error what went wrong")
-        raise NotReadyError(f"job {row['id']} ended as {row['state']} and left no result", code="no_result",
+        remedy = ("the job was cancelled: post it again, with another Idempotency-Key if it had one" if cancelled else
+                  f"GET {path_of(row)} has the reason under error")
+        raise NotReadyError(f"job {row['id']} ended as {row['state']} without a result", code="no_result",
                             subjects=(row["id"],), remedy=remedy)
     folder = artifacts.result(row["artifact"])
     if not folder.is_dir():
-        raise NotFoundError(f"the files of job {row['id']} are gone from the data folder", code="result_gone",
+        raise NotFoundError(f"the files of job {row['id']} are missing in the data folder", code="result_gone",
                             subjects=(row["id"],), remedy="post the same content again")
     return folder
 
@@ -144,19 +144,19 @@ def is_program(name: str) -> bool:
 
 
 def withheld(folder: Path, row: RowMapping) -> WithheldError:
-    """The error that tells why the programs of an unproved job are kept back."""
+    """The error for the programs of an unproved job, with the reason."""
     findings: list[Any] = []
     report = folder / "report.json"
     if report.exists():
         findings = json.loads(report.read_bytes()).get("findings") or []
     first = f"; first finding: {json.dumps(findings[0], sort_keys=True)[:300]}" if findings else ""
-    return WithheldError(f"job {row['id']} is {row['state']}, so neither NC nor STEP-NC is handed out{first}",
+    return WithheldError(f"job {row['id']} is {row['state']}, so its NC and STEP-NC files are withheld{first}",
                          subjects=(row["id"],), measured=findings[:20], limit=[],
                          remedy=f"GET {path_of(row)}/report lists findings and remainder")
 
 
 def list_files(folder: Path, row: RowMapping) -> JobFiles:
-    """The files of a job that may be handed out."""
+    """The files of a job that can be downloaded."""
     proved = row["state"] == "proved"
     items = [JobFile(name=p.name, size_bytes=p.stat().st_size, sha256=file_sha256(p), media_type=media_type(p.name),
                      href=f"{path_of(row)}/files/{p.name}")
@@ -186,7 +186,7 @@ def find_file(folder: Path, row: RowMapping, name: str) -> Path:
 
 
 def file_sha256(path: Path) -> str:
-    """SHA-256 of a file, hex; of one that has not changed since it is not computed again."""
+    """SHA-256 of a file, hex; it is cached until the file changes."""
     found = path.stat()
     return _sha256(path, found.st_mtime_ns, found.st_size)
 

@@ -1,9 +1,9 @@
-"""Lets go of the files of old jobs, and removes from the data folder what no job has any use for.
+"""Deletes the files of old jobs, and files in the data folder that no job needs.
 
-First rows: a job that ended longer ago than ``retention_days`` keeps its row, labels and state, and no longer names its
-files. Then files: an upload or result that no row names is removed, and what attempts kept for a result that no job
-waits for. Files are shared by content, so one job's end takes nothing from another. What was written or used within
-``GRACE_S`` stays, for its row may be on its way.
+Rows come first: a job that ended longer ago than ``retention_days`` keeps its row, labels and state, but no longer
+names its files. Files come second: uploads and results that no row names are removed, and so are checkpoints for a
+result that no job waits for. Jobs with the same content share files, so the end of one takes nothing from another.
+Files written or used within ``GRACE_S`` stay, since their row may not be written yet.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ CLOCK_STEP_S = 600.0
 
 
 @dataclass(frozen=True)
-class Swept:
-    """What one round did: jobs let go of, files and folders removed, leftovers of crashes removed."""
+class SweepCounts:
+    """Counts of one round: expired jobs, removed files and folders, removed leftovers of crashes."""
 
     jobs: int = 0
     removed: int = 0
     leftovers: int = 0
 
 
-class Janitor:
-    """Cleans up once in a while; several services may do so side by side, for a file is moved away before it goes."""
+class RetentionSweeper:
+    """Cleans up periodically. Several services may do so at once, since a file is moved away before it is deleted."""
 
     def __init__(self, settings: Settings, jobs: JobStore, artifacts: Artifacts) -> None:
         self.settings, self.jobs, self.artifacts = settings, jobs, artifacts
@@ -49,16 +49,16 @@ class Janitor:
         self._thread.start()
 
     def close(self) -> None:
-        """Stop after the file at hand."""
+        """Stop after the current file."""
         self._stop.set()
         self._thread.join(timeout=5)
 
-    def sweep(self, grace_s: float = GRACE_S) -> Swept:
+    def sweep(self, grace_s: float = GRACE_S) -> SweepCounts:
         """One round."""
         now = time.time()
         days = self.settings.retention_days
         expired = self.jobs.expire_before(now - days * DAY_S) if days > 0 else 0
-        # Candidates first and rows after: a row that came in between names a file that was written or used just now.
+        # List the candidates before the rows: a row that appears between the two names a file that was used just now.
         candidates = [p for p in self.artifacts.stored() if p.stat().st_mtime < now - grace_s]
         named = self.jobs.files_named() if candidates else set()
         removed = 0
@@ -69,21 +69,22 @@ class Janitor:
                 removed += self.artifacts.remove(path, now - grace_s)
         removed += self._unkept(now - grace_s)
         left = max(LEFTOVER_S, 4 * self.settings.job_time_limit_s)
-        done = Swept(expired, removed, self.artifacts.sweep(now - left))
+        done = SweepCounts(expired, removed, self.artifacts.sweep(now - left))
         if any((done.jobs, done.removed, done.leftovers)):
             log.info("swept", jobs=done.jobs, removed=done.removed, leftovers=done.leftovers)
         return done
 
     def _unkept(self, before: float) -> int:
-        """Remove what attempts kept before a time, s, for a result that no job waits for any more; returns how many."""
+        """Remove checkpoints from before a time, s, for results that no job waits for; returns their number."""
         candidates = list(self.artifacts.all_kept())
         wanted = {key_of(row) for row in self.jobs.unfinished()} if candidates else set()
         return sum(self.artifacts.remove(p, before) for p in candidates if p.name not in wanted)
 
     def _clock_was_set(self) -> bool:
-        """Whether the time of the day jumped since this was asked last.
+        """Whether the time of day jumped since the last call.
 
-        What is too old by a clock that is wrong may not be: who set it has until the next round to set it right.
+        A file that is too old by a wrong clock may not be old. The operator has until the next round to correct the
+        clock.
         """
         clock = time.time() - time.monotonic()
         moved, self._clock = clock - self._clock, clock
@@ -99,4 +100,4 @@ class Janitor:
                 if not self._clock_was_set():
                     self.sweep()
             except Exception:
-                log.exception("janitor stumbled")  # database or disk away: the next round tries again
+                log.exception("cleanup round failed")  # no database or disk: the next round tries again

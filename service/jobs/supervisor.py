@@ -1,7 +1,6 @@
-"""Runs one job in a child process and watches it: progress, cancel, wall time, memory, signals.
+"""Runs one job in a child process and monitors it: progress, cancel, wall time, memory, signals.
 
-Whatever happens, nothing of the child is left running when ``supervise`` returns. The thread that calls it only
-waits; the computing is done by the child.
+No process of the child is left when ``supervise`` returns. The calling thread only waits; the child computes.
 """
 
 from __future__ import annotations
@@ -27,20 +26,20 @@ from geometry.errors import CancelledError, ResourceError, error_from_dict
 
 ROOT = Path(__file__).resolve().parents[2]
 JOB_MODULE = "service.jobs.job_process"
-# Address space counts what is mapped and never touched (libraries, thread arenas), so it gets room on top.
+# Address space includes mapped but unused memory (libraries, thread arenas), so its limit is larger.
 ADDRESS_ROOM = 8_000_000_000
 _SECRET = re.compile("^ZONEMILL_|PASSW|SECRET|TOKEN|CREDENTIAL|PRIVATE|_KEY$|_URL$", re.IGNORECASE)
 THREAD_VARIABLES = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
-class Limits:
+class ProcessLimits:
     """Limits of one attempt.
 
     time_s       : wall time, s
-    memory_bytes : resident in the child and its descendants together
+    memory_bytes : resident memory of the child and its descendants together
     threads      : kernel threads
-    poll_s       : how often limits and ``keep`` are looked at, s
+    poll_s       : interval between checks of the limits and of ``keep``, s
     """
 
     time_s: float
@@ -49,27 +48,28 @@ class Limits:
     poll_s: float = 0.2
 
 
-def supervise(request: dict[str, Any], limits: Limits, scratch: Path, *, on_progress: Callable[[str, float], None],
-              on_resumed: Callable[[Mapping[str, int]], None], keep: Callable[[], bool]) -> str:
-    """Run a job in a child.
+def supervise(request: dict[str, Any], limits: ProcessLimits, scratch: Path, *,
+              on_progress: Callable[[str, float], None], on_resumed: Callable[[Mapping[str, int]], None],
+              keep: Callable[[], bool]) -> str:
+    """Run a job in a child process.
 
     request     : see ``service.jobs.job_process``; 'parent' and 'address_bytes' are filled in here
-    scratch     : folder for what lives as long as the child
-    on_progress : called with stage and fraction, at most once per look
-    on_resumed  : called with what the child took over from attempts before, by kind
-    keep        : asked at every look; False kills the child
+    scratch     : folder for temporary files of the child
+    on_progress : called with stage and fraction, at most once per check
+    on_resumed  : called with the number of checkpoints used, by kind
+    keep        : called at every check; False kills the child
 
-    Returns the final state the child reported.
+    Returns the final state from the child.
 
     Raises
     ------
     CancelledError
-        ``keep`` said no.
+        ``keep`` returned False.
     ResourceError
         Codes 'job_timeout', 'job_memory', 'job_crashed' (a signal of its own, such as SIGSEGV) and 'job_killed'
         (SIGKILL from outside).
     CamError
-        The typed error the child reported.
+        The typed error from the child.
     """
     with tempfile.TemporaryDirectory(prefix="job-", dir=scratch) as folder:
         path, log = Path(folder, "request.json"), Path(folder, "log")
@@ -92,7 +92,7 @@ def supervise(request: dict[str, Any], limits: Limits, scratch: Path, *, on_prog
 
 @contextmanager
 def closing_fd(handle: int) -> Iterator[None]:
-    """Close a file descriptor at the end, also where a child could not be started."""
+    """Close a file descriptor at the end, also where the child could not be started."""
     try:
         yield
     finally:
@@ -108,7 +108,7 @@ def kill_tree(child: subprocess.Popen[bytes]) -> None:
     try:
         os.killpg(child.pid, signal.SIGKILL)
     except (ProcessLookupError, PermissionError):
-        pass  # the whole group is gone already
+        pass  # the whole group has ended
     for process in family:
         try:
             process.kill()
@@ -118,14 +118,15 @@ def kill_tree(child: subprocess.Popen[bytes]) -> None:
 
 
 def _environment(threads: int) -> dict[str, str]:
-    """What a child gets: no setting of the service and no secret, for it reads files of strangers."""
+    """Environment of a child, without settings and secrets of the service, since the child reads untrusted files."""
     kept = {k: v for k, v in os.environ.items() if not _SECRET.search(k)}
     path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
     return {**kept, "PYTHONPATH": path, **dict.fromkeys(THREAD_VARIABLES, str(threads))}
 
 
-def _watch(child: subprocess.Popen[bytes], lines: _Lines, limits: Limits, keep: Callable[[], bool]) -> dict[str, Any]:
-    """Look at the child until it ends; returns its last word, {} when it said none."""
+def _watch(child: subprocess.Popen[bytes], lines: _Lines, limits: ProcessLimits,
+           keep: Callable[[], bool]) -> dict[str, Any]:
+    """Monitor the child until it ends; returns its last message, {} when there was none."""
     deadline = time.monotonic() + limits.time_s
     handle = psutil.Process(child.pid)
     next_look = 0.0
@@ -146,7 +147,7 @@ def _watch(child: subprocess.Popen[bytes], lines: _Lines, limits: Limits, keep: 
 
 
 class _Lines:
-    """Messages of the child, line by line, from the pipe ``reading``; ``final`` is its last word."""
+    """Messages of the child, line by line, from the pipe ``reading``; ``final`` is its last message."""
 
     def __init__(self, reading: int, on_progress: Callable[[str, float], None],
                  on_resumed: Callable[[Mapping[str, int]], None]) -> None:
@@ -155,7 +156,7 @@ class _Lines:
         os.set_blocking(reading, False)
 
     def feed(self) -> bool:
-        """Read what is there and pass on the newest progress; False at the end of the pipe."""
+        """Read the available text and pass on the newest progress; False at the end of the pipe."""
         chunk = os.read(self.reading, 65536)
         *lines, self.buffer = (self.buffer + chunk).split(b"\n")
         progress = resumed = None
@@ -174,13 +175,13 @@ class _Lines:
         return chunk != b""
 
 
-def _check(handle: psutil.Process, limits: Limits, deadline: float, keep: Callable[[], bool]) -> None:
+def _check(handle: psutil.Process, limits: ProcessLimits, deadline: float, keep: Callable[[], bool]) -> None:
     if not keep():
         raise CancelledError("the job was cancelled")
     if time.monotonic() > deadline:
         raise ResourceError(f"the job did not finish within {limits.time_s:g} s and was stopped", code="job_timeout",
                             measured=limits.time_s, limit=limits.time_s,
-                            remedy="ask for a coarser scallop or fewer faces, or raise ZONEMILL_JOB_TIME_LIMIT_S")
+                            remedy="allow a larger scallop height or fewer faces, or raise ZONEMILL_JOB_TIME_LIMIT_S")
     used = resident(handle)
     if used > limits.memory_bytes:
         raise ResourceError(f"the job needed more than {limits.memory_bytes / 1e9:.2f} GB of memory and was stopped",
@@ -195,16 +196,16 @@ def resident(handle: psutil.Process) -> int:
         for process in [handle, *handle.children(recursive=True)]:
             total += process.memory_info().rss
     except psutil.Error:
-        pass  # it ended while we looked
+        pass  # it has just ended
     return total
 
 
 def _await_exit(child: subprocess.Popen[bytes]) -> None:
-    """The pipe is closed: give the interpreter a moment to end by itself."""
+    """Wait a moment for the interpreter to end, after it has closed the pipe."""
     try:
         child.wait(timeout=5.0)
     except subprocess.TimeoutExpired:
-        pass  # it said its last word; kill_tree ends it
+        pass  # its last message has arrived; kill_tree ends it
 
 
 def _outcome(code: int, final: dict[str, Any], log: Path) -> str:
@@ -212,14 +213,14 @@ def _outcome(code: int, final: dict[str, Any], log: Path) -> str:
         return str(final["state"])
     if "error" in final:
         raise error_from_dict(final["error"])
-    with log.open("rb") as said:  # it may have said gigabytes
-        said.seek(max(0, log.stat().st_size - 2000))
-        tail = said.read().decode("utf-8", "replace").strip()
+    with log.open("rb") as output:  # the log may have gigabytes
+        output.seek(max(0, log.stat().st_size - 2000))
+        tail = output.read().decode("utf-8", "replace").strip()
     if "MemoryError" in tail or "bad_alloc" in tail:
         raise ResourceError("the job ran out of memory", code="job_memory",
-                            remedy="simplify the part, or give the machine or ZONEMILL_JOB_MEMORY_LIMIT_MB more")
+                            remedy="simplify the part, or use more memory and raise ZONEMILL_JOB_MEMORY_LIMIT_MB")
     name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-    last = tail.splitlines()[-1] if tail else "it said nothing"
-    raise ResourceError(f"the job's process died of {name} ({last})", measured=name,
+    last = tail.splitlines()[-1] if tail else "no message"
+    raise ResourceError(f"the process of the job died from {name} ({last})", measured=name,
                         code="job_killed" if code == -signal.SIGKILL else "job_crashed",
-                        remedy="the same input would do it again; please report it with part and setup")
+                        remedy="the same input fails again; please report this bug with part and setup")

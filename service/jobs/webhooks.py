@@ -1,9 +1,10 @@
-"""Webhooks: one POST when a job ends, signed, tried again until it is taken, and kept in the job's row meanwhile.
+"""Webhooks: one signed POST when a job ends, repeated until the receiver accepts it.
 
-The form is that of Standard Webhooks 1.0: ``webhook-id`` is the same for every attempt and made from the job's id, so a
-receiver drops what it has had; ``webhook-timestamp`` is that of the attempt, so it drops what is old; the signature is
-HMAC-SHA256 over id, timestamp and body. Every principal has a secret of its own, derived from that of the service: who
-checks the webhooks of one cannot forge those of another, and no secret stands in the database.
+The row of the job keeps the state of its webhook. The form is Standard Webhooks 1.0 [StandardWebhooks2023].
+``webhook-id`` is made from the id of the job and is the same for every attempt, so that a receiver drops repeats.
+``webhook-timestamp`` is that of the attempt, so that it drops old messages. The signature is HMAC-SHA256 over id,
+timestamp and body. Every principal has a secret of its own, derived from the secret of the service. Nobody who checks
+the webhooks of one can forge those of another, and no secret is stored.
 """
 
 from __future__ import annotations
@@ -39,26 +40,26 @@ GONE = 410
 
 
 def secret_of(master: str, principal: str) -> str:
-    """The secret of a principal, as receivers' libraries take it: ``whsec_`` and base64."""
+    """The secret of a principal as in [StandardWebhooks2023]: ``whsec_`` and base64."""
     key = hmac.new(master.encode(), f"zonemill webhook {principal}".encode(), hashlib.sha256).digest()
     return f"whsec_{base64.b64encode(key).decode()}"
 
 
 def signature(secret: str, message_id: str, timestamp: int, body: bytes) -> str:
-    """``v1,`` and the signature, base64, of Standard Webhooks."""
+    """The signature of [StandardWebhooks2023]: ``v1,`` and base64."""
     key = base64.b64decode(secret.removeprefix("whsec_"))
     text = f"{message_id}.{timestamp}.".encode() + body
     return f"v1,{base64.b64encode(hmac.new(key, text, hashlib.sha256).digest()).decode()}"
 
 
 def pause_s(attempt: int, first_s: float) -> float:
-    """Pause after a failed attempt, s: four times the one before, six hours at most, a fifth of it by chance."""
+    """Pause after a failed attempt, s: four times the previous one, at most six hours, with a random fifth."""
     pause = min(first_s * 4.0 ** min(attempt - 1, 20), LONGEST_PAUSE_S)
     return pause * random.uniform(0.8, 1.2)
 
 
 def payload(row: RowMapping) -> bytes:
-    """The body: the job as the interface shows it, without how its webhook fares; the same at every attempt."""
+    """The body: the job as wire model without the state of its webhook; it is the same for every attempt."""
     job = job_resource(row).model_dump(mode="json", exclude={"webhook", "expired_at"})
     message = {"type": "job.ended", "timestamp": job["finished_at"], "data": job}
     body = json.dumps(message, separators=(",", ":")).encode()
@@ -69,7 +70,7 @@ def payload(row: RowMapping) -> bytes:
 
 
 def registered(url: str, settings: Settings) -> str:
-    """A webhook's URL as it is kept.
+    """The URL of a webhook, as stored.
 
     Raises
     ------
@@ -78,13 +79,13 @@ def registered(url: str, settings: Settings) -> str:
     """
     if not settings.webhooks_on:
         raise RequestError("this service sends no webhooks", code="webhooks_off", subjects=("webhook_url",),
-                           remedy="leave webhook_url out and follow the job's events, or ask whoever runs the service")
+                           remedy="leave out webhook_url and follow the events of the job, or ask the operator")
     check_allowed(parse_target(url), settings.webhook_origins)
     return url
 
 
-class Courier:
-    """Delivers in the background; several services may do so side by side."""
+class WebhookSender:
+    """Sends in the background; several services may do so at once."""
 
     def __init__(self, settings: Settings, jobs: JobStore) -> None:
         self.settings, self.jobs = settings, jobs
@@ -98,7 +99,7 @@ class Courier:
         self._thread.start()
 
     def close(self) -> None:
-        """Stop claiming, and wait a little for what is on its way; if that did not end, it is sent again later."""
+        """Stop claiming and wait briefly for attempts under way; unfinished ones are sent again later."""
         self._stop.set()
         self._thread.join(timeout=5)
         until = time.monotonic() + LAST_WORDS_S
@@ -109,14 +110,14 @@ class Courier:
         while not self._stop.is_set():
             self._busy = [each for each in self._busy if each.is_alive()]
             try:
-                # The lease outlasts every limit of an attempt: resolving, four connections, each with its rest.
+                # The lease is longer than all limits of an attempt together: name resolution and four connections.
                 lease_s = 60 + 9 * self.settings.webhook_timeout_s
                 while len(self._busy) < SLOTS and (row := self.jobs.claim_webhook(lease_s)):
-                    # A daemon: a receiver that hangs must not keep the process from ending.
+                    # A daemon thread, since a hanging receiver must not keep the process from ending.
                     self._busy.append(threading.Thread(target=self._deliver, args=(row,), name="webhook", daemon=True))
                     self._busy[-1].start()
             except Exception:
-                log.exception("courier stumbled")  # database away: the next round tries again
+                log.exception("webhook round failed")  # no database: the next round tries again
             self._stop.wait(timeout=LOOK_EVERY_S)
 
     def _deliver(self, row: RowMapping) -> None:
@@ -132,10 +133,10 @@ class Courier:
                 self.jobs.settle_webhook(row["id"], attempt, "pending", problem, due)
             log.info("webhook", job=row["id"], attempt=attempt, problem=problem)
         except Exception:
-            log.exception("webhook not settled", job=row["id"])  # it is due again when its lease has run out
+            log.exception("webhook not settled", job=row["id"])  # it is due again when its lease has expired
 
     def _attempt(self, row: RowMapping) -> tuple[str | None, bool]:
-        """What went wrong, None when it was taken, and whether to give up."""
+        """The error of an attempt, None when it was accepted, and whether to give up."""
         try:
             target = parse_target(row["webhook_url"])
             check_allowed(target, self.settings.webhook_origins)

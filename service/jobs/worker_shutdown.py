@@ -1,4 +1,4 @@
-"""What a worker of a cluster does when it is told to end: its jobs go back into the queue, and no attempt is lost."""
+"""Orderly end of a cluster worker: its jobs return to the queue, and no attempt is lost."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from distributed import Status, WorkerPlugin
 
 from service.jobs import attempt
 
-PATIENCE_S = 8.0  # within what is usually given to a process between SIGTERM and SIGKILL
+PATIENCE_S = 8.0  # less than the usual time between SIGTERM and SIGKILL
 LOOK_S = 0.05
 
 
-class OrderlyEnd(WorkerPlugin):  # type: ignore[misc]
-    """Registered by every service under one name: the second replaces the first, which ends no worker."""
+class WorkerShutdown(WorkerPlugin):  # type: ignore[misc]
+    """Worker plugin. Every service registers it under one name; a second registration replaces the first."""
 
     name = "zonemill-orderly-end"
 
     async def teardown(self, worker: Any) -> None:
-        """Stop the attempts of a worker that closes, and wait until they have put their jobs back."""
+        """Stop the attempts of a closing worker, and wait until they have put their jobs back."""
         if worker.status is not Status.closing:
             return
         attempt.ending.set()

@@ -1,4 +1,4 @@
 """Pictures drawn in memory: cameras, rasterizer, annotations, deviation maps, tool drawings.
 
-Nothing here decides what a job is worth.
+Pictures show results; nothing is planned, proved or judged here.
 """

@@ -1,4 +1,4 @@
-"""Words and signs on pictures: Pillow's own font, axes, a scale bar, pairs of facts, swatches."""
+"""Text and symbols on pictures: Pillow's own font, axes, a scale bar, tables, colour swatches."""
 
 from __future__ import annotations
 
@@ -20,7 +20,13 @@ AXES: tuple[tuple[str, RGB], ...] = (("X", (0.80, 0.10, 0.10)), ("Y", (0.05, 0.5
 
 
 def font(size: int) -> FreeTypeFont:
-    """Pillow's own font: the same glyphs on every machine."""
+    """Pillow's own font: the same glyphs on every machine.
+
+    Raises
+    ------
+    RuntimeError
+        Pillow was built without FreeType.
+    """
     found = ImageFont.load_default(size)
     if not isinstance(found, FreeTypeFont):
         raise RuntimeError("Pillow was built without FreeType")
@@ -34,7 +40,7 @@ def bytes_of(colour: RGB) -> tuple[int, int, int]:
 
 
 def draw_triad(pen: ImageDraw.ImageDraw, camera: Camera, origin: tuple[float, float]) -> None:
-    """The axes as the camera sees them, with their names."""
+    """The axes in the view of the camera, with their names."""
     for axis, (name, colour) in enumerate(AXES):
         dx, dy = 36.0 * camera.basis[0, axis], -36.0 * camera.basis[1, axis]
         pen.line([origin, (origin[0] + dx, origin[1] + dy)], fill=bytes_of(colour), width=3)
@@ -63,7 +69,9 @@ def draw_scale(pen: ImageDraw.ImageDraw, camera: Camera, end: tuple[float, float
 
 def draw_pairs(pen: ImageDraw.ImageDraw, pairs: Sequence[tuple[str, str]], x: int, y: int, *, wide: int = 285,
                indent: int = 150) -> None:
-    """Up to ten pairs of words in two columns; ``wide`` pixels a column, values ``indent`` pixels in."""
+    """Up to ten label-value pairs in two columns; a column is ``wide`` pixels, values are indented by ``indent``
+    pixels.
+    """
     for i, (key, value) in enumerate(pairs[:10]):
         left, line = x + wide * (i // 5), y + 21 * (i % 5)
         pen.text((left, line), ascii_text(key), font=font(15), fill=bytes_of(GREY))
@@ -72,7 +80,7 @@ def draw_pairs(pen: ImageDraw.ImageDraw, pairs: Sequence[tuple[str, str]], x: in
 
 def draw_swatches(pen: ImageDraw.ImageDraw, entries: Sequence[tuple[str, RGB | None]], x: int, y: int, *, columns: int,
                   step: int) -> None:
-    """Colours with their names, five to a column; None is words without a colour."""
+    """Colours with their names, five to a column; None is text without a colour."""
     for i, (name, colour) in enumerate(entries[:5 * columns]):
         left, line = x + step * (i // 5), y + 21 * (i % 5)
         if colour is not None:

@@ -28,10 +28,11 @@ class Camera:
     @classmethod
     def fit(cls, points: F64, size: tuple[int, int], *, azimuth: float, elevation: float,
             margin: float = 0.08) -> Camera:
-        """The camera that shows all of (n, 3) points.
+        """The camera that shows all points.
 
-        azimuth, elevation : rad, where the viewer stands, from +X and from the XY plane
-        margin             : part of the picture left free on each side
+        points             : (n, 3) float64, mm, setup frame
+        azimuth, elevation : rad, direction of the viewer, from +X and from the XY plane
+        margin             : share of the picture left free on each side
         """
         ca, sa, ce, se = math.cos(azimuth), math.sin(azimuth), math.cos(elevation), math.sin(elevation)
         basis = np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]])
@@ -42,11 +43,21 @@ class Camera:
         return cls(basis, 0.5 * (low + high) @ basis, scale, size)
 
     def screen(self, points: F64) -> F64:
-        """(..., 3) float64 in mm to pixels right, pixels down, pixels towards the viewer."""
+        """Points as pixels to the right, pixels down, pixels towards the viewer.
+
+        points : (..., 3) float64, mm, setup frame
+
+        Returns (..., 3) float64, pixels.
+        """
         q = (np.asarray(points, dtype=np.float64) - self.centre) @ self.basis.T * self.scale
         return q * [1.0, -1.0, 1.0] + [0.5 * self.size[0], 0.5 * self.size[1], 0.0]
 
     def places(self, screen: F64) -> F64:
-        """(..., 3) float64 pixels, as ``screen`` gives them, back to mm."""
+        """The inverse of ``screen``.
+
+        screen : (..., 3) float64, pixels
+
+        Returns (..., 3) float64, mm, setup frame.
+        """
         q = (np.asarray(screen, dtype=np.float64) - [0.5 * self.size[0], 0.5 * self.size[1], 0.0]) * [1.0, -1.0, 1.0]
         return q / self.scale @ self.basis + self.centre

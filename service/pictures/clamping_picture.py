@@ -1,7 +1,7 @@
-"""Picture of how a part is clamped: blank, part, fixtures, program zero with its axes, and where tools come from.
+"""Picture of the clamping of a part: blank, part, fixtures, program zero with its axes, and tool axes.
 
-Left seen slanting, right from above with the distances of the blank from program zero, both in the frame of one
-program.
+The left view is oblique. The right view is from above, with the distances of the blank from program zero. Both are in
+the frame of one program.
 """
 
 from __future__ import annotations
@@ -38,19 +38,19 @@ PART: RGB = (0.62, 0.70, 0.80)
 FIXTURE: RGB = (0.80, 0.47, 0.16)
 BLANK: RGB = (0.10, 0.45, 0.35)
 COMING: RGB = (0.58, 0.10, 0.68)
-VEIL = 0.16  # share of the blank's colour laid over what stands in it
-FAR = 1.5  # times the size of all else, beyond which program zero would make that too small to see
+VEIL = 0.16  # opacity of the blank over the part and fixtures
+FAR = 1.5  # times the size of the scene; a program zero farther away is left out
 WORDS = 22
 
 
 @dataclass(frozen=True, eq=False)
 class Clamped:
-    """What is held for one program, in its frame, mm.
+    """The clamping for one program, in its frame, mm.
 
     part     : Part
-    blank    : TriangleMesh, the nominal blank; grown: it is a box round a blank that is grown from the part
+    blank    : TriangleMesh, the nominal blank; grown: it is a box around a blank that is grown from the part
     fixtures : each (8, 3) float64, corners of a box, numbered by bits: 1 is +X, 2 is +Y, 4 is +Z of the setup frame
-    zero     : what program zero is called, 'G54'
+    zero     : name of program zero, 'G54'
     comings  : by name, (3,) float64, unit, from tip to spindle
     """
 
@@ -63,19 +63,31 @@ class Clamped:
 
 
 def box_mesh(corners: F64) -> TriangleMesh:
-    """Twelve triangles round a box of (8, 3) float64 corners, mm, numbered as those of ``Clamped.fixtures``."""
+    """Twelve triangles of a box.
+
+    corners : (8, 3) float64, mm, frame of the program, numbered as in ``Clamped.fixtures``
+    """
     quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
     faces = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))], np.int32)
     return TriangleMesh(np.asarray(corners, np.float64), faces, np.repeat(np.arange(1, 7, dtype=np.int32), 2))
 
 
 def corners_of(box: F64) -> F64:
-    """(8, 3) float64, mm: the corners of a box (2, 3), numbered by bits."""
+    """Corners of a box, numbered by bits.
+
+    box : (2, 3) float64, mm, lower and upper corner, any frame
+
+    Returns (8, 3) float64, mm, same frame.
+    """
     return np.array([[box[i >> k & 1][k] for k in range(3)] for i in range(8)], dtype=np.float64)
 
 
 def bar_mesh(low: F64, high: F64, radius: float, sides: int = 64) -> TriangleMesh:
-    """A round bar between the middles (3,) of its ends, mm, as a prism."""
+    """A round bar as a prism.
+
+    low, high : (3,) float64, mm, frame of the program, centres of its ends
+    radius    : mm
+    """
     up = (high - low) / np.linalg.norm(high - low)
     one = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
     one /= np.linalg.norm(one)
@@ -132,7 +144,7 @@ def clamp_picture(held: Clamped, title: str) -> bytes:
 
 
 def _scene(held: Clamped, camera: Camera) -> Canvas:
-    """Part and fixtures, and the blank as a veil with its edges over them."""
+    """Part and fixtures, with the transparent blank and its edges over them."""
     part, count = held.part, len(held.part.faces)
     vertices, faces, ids = [part.mesh.vertices], [part.mesh.faces], [part.mesh.face_ids]
     for k, mesh in enumerate(map(box_mesh, held.fixtures)):
@@ -153,7 +165,7 @@ def _scene(held: Clamped, camera: Camera) -> Canvas:
 
 
 def _sharp(mesh: TriangleMesh) -> NDArray[np.float64]:
-    """(m, 2, 3) ends of the edges of a mesh where two faces of it meet."""
+    """(m, 2, 3) ends of the edges where two faces of a mesh meet."""
     pairs = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1)
     ids = np.tile(mesh.face_ids, 3)
     order = np.lexsort((pairs[:, 1], pairs[:, 0]))
@@ -163,20 +175,20 @@ def _sharp(mesh: TriangleMesh) -> NDArray[np.float64]:
 
 
 def _arrow(middle: F64, axis: F64, things: F64, size: float) -> tuple[F64, F64]:
-    """From where a tool comes, to just above what is held."""
+    """An arrow along a tool axis, from the tool side to just above the clamped part."""
     reach = float(((things - middle) @ axis).max())
     return middle + (reach + 0.34 * size) * axis, middle + (reach + 0.05 * size) * axis
 
 
 def _at(camera: Camera, point: F64, corner: tuple[int, int]) -> tuple[float, float]:
-    """A place (3,), mm, in the halved picture, whose own corner stands at ``corner``, pixels."""
+    """A point (3,), mm, in the halved picture, whose own corner is at ``corner``, pixels."""
     x, y, _ = (0.5 * camera.screen(point)).tolist()
     return corner[0] + x, corner[1] + y
 
 
 def _draw_arrow(pen: ImageDraw.ImageDraw, camera: Camera, tail: F64, head: F64, name: str,
                 named: list[tuple[float, float]]) -> None:
-    """An arrow with its name behind its tail, further up where other names stand; ``named`` is where they do."""
+    """An arrow with its name at the tail, moved up where other names are; ``named`` has their places."""
     a, b = np.array(_at(camera, tail, (0, HEADER))), np.array(_at(camera, head, (0, HEADER)))
     ink, way = bytes_of(COMING), b - a
     length = float(np.hypot(*way))
@@ -198,7 +210,7 @@ def _draw_arrow(pen: ImageDraw.ImageDraw, camera: Camera, tail: F64, head: F64, 
 
 def _draw_zero(pen: ImageDraw.ImageDraw, camera: Camera, corner: tuple[int, int], length: float, name: str, *,
                flat: bool = False) -> None:
-    """Program zero: a target with its axes in the colours they have everywhere."""
+    """Program zero: a target with its axes in their usual colours."""
     x, y = _at(camera, np.zeros(3), corner)
     for axis, (letter, colour) in enumerate(AXES[:2] if flat else AXES):
         end = _at(camera, length * np.eye(3)[axis], corner)
@@ -214,7 +226,7 @@ def _draw_zero(pen: ImageDraw.ImageDraw, camera: Camera, corner: tuple[int, int]
 
 
 def _draw_distances(pen: ImageDraw.ImageDraw, camera: Camera, corner: tuple[int, int], blank: TriangleMesh) -> None:
-    """X and Y of the sides of the box round the blank, written at them."""
+    """X and Y of the sides of the bounding box of the blank, written beside them."""
     low, high = blank.vertices.min(axis=0), blank.vertices.max(axis=0)
     left, bottom = _at(camera, low, corner)
     right, top = _at(camera, high, corner)
@@ -232,7 +244,7 @@ def _draw_distances(pen: ImageDraw.ImageDraw, camera: Camera, corner: tuple[int,
 
 
 def _draw_heights(pen: ImageDraw.ImageDraw, camera: Camera, blank: TriangleMesh) -> None:
-    """Z of top and bottom of the box round the blank, at its edge farthest right in the picture."""
+    """Z of top and bottom of the bounding box of the blank, at its rightmost edge in the picture."""
     low, high = blank.vertices.min(axis=0), blank.vertices.max(axis=0)
     x, y, _ = max(corners_of(np.stack([low, high])), key=lambda c: float(camera.screen(c)[0]))
     for z in (low[2], high[2]):

@@ -1,9 +1,10 @@
-"""deviation.png: the part coloured by what the proof measured on it.
+"""deviation.png: the part coloured by the deviation that the proof measured.
 
-Two views of the part. Red is cut too deep, green within the budget, blue stands too high, hatched grey was never
-reached by a cut, pale was not to be judged. Every pixel has the class of the nearest sample of its face; samples
-outside the budget are dotted over that, so that none is lost between pixels. Rings mark the deepest gouges and the
-place where most is left. No clock, no random number: the same input gives the same bytes.
+There are two views. Red is cut too deep, green is within the budget, blue is too high. Hatched grey was never reached
+by
+a cut; pale was not judged. Every pixel has the class of the nearest sample of its face. Samples outside the budget are
+drawn as dots over it, so that none is lost between pixels. Rings mark the deepest gouges and the place with most stock
+left. The same input gives the same bytes, without clock and random numbers.
 """
 
 from __future__ import annotations
@@ -40,24 +41,24 @@ from service.pictures.view_selection import choose_views, seen
 SIZE = (1760, 960)
 HEADER, LEGEND, GUTTER = 56, 132, 8
 STEPS = (3.0, 10.0)  # times the budget at which a class ends
-GREEN, UNCUT = 3, 7  # classes; 0 to 2 are gouges, the deepest first, 4 to 6 stand too high, the highest last
+GREEN, UNCUT = 3, 7  # classes; 0 to 2 are gouges, the deepest first, 4 to 6 are too high, the highest last
 COLOURS: tuple[RGB, ...] = ((0.45, 0.0, 0.10), (0.86, 0.06, 0.06), (1.0, 0.52, 0.32), (0.60, 0.83, 0.56),
                             (0.55, 0.78, 1.0), (0.18, 0.48, 0.95), (0.06, 0.14, 0.58), (0.66, 0.66, 0.68))
 PALE: RGB = (0.93, 0.92, 0.89)
 HATCH: RGB = (0.36, 0.36, 0.40)
-MOST_RINGS, RING = 5, 14  # and their radius, pixels
-MOST_TRIED = 200  # of equal places for a ring
+MAX_RINGS, RING = 5, 14  # and their radius, pixels
+MAX_RING_PLACES = 200  # of equal places for a ring
 Box = tuple[float, float, float, float]
 INT8 = NDArray[np.int8]
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What the proof measured at the samples.
+    """Measurements of the proof at the samples.
 
     samples : SurfaceSamples, n of them, in the frame of the part
     excess  : (n,) float64, mm over the allowance, negative where cut too deep
-    reached : (n,) bool, whether a feed move took something off there
+    reached : (n,) bool, whether a feed move removed stock there
     scallop, gouge : mm, the budget: -gouge <= excess <= scallop
     """
 
@@ -69,23 +70,23 @@ class Measured:
 
     @property
     def classes(self) -> INT8:
-        """(n,) int8: row of ``COLOURS`` of every sample."""
+        """(n,) int8, index of the row of ``COLOURS`` for each sample."""
         out = np.searchsorted(self.limits, self.excess, side="left").astype(np.int8)
         out[~self.reached & (out > GREEN)] = UNCUT
         return out
 
     @property
     def limits(self) -> F64:
-        """(6,) float64, mm: excess at which the classes 0 to 6 end, the last excepted."""
-        low, high = self.gouge + 1e-6, self.scallop + 1e-6  # the proof forgives as much
+        """(6,) float64, mm: upper end of excess for each class but the last."""
+        low, high = self.gouge + 1e-6, self.scallop + 1e-6  # tolerance of the proof
         return np.array([-STEPS[1] * low, -STEPS[0] * low, -low, high, STEPS[0] * high, STEPS[1] * high])
 
 
 @dataclass(frozen=True, eq=False)
 class Mark:
-    """A place with a ring and words beside it.
+    """A place with a ring and text beside it.
 
-    places : (k, 3) float64, mm, frame of the part, one or more that are as good: one that is seen gets the ring
+    places : (k, 3) float64, mm, frame of the part; equally good places, of which a visible one gets the ring
     """
 
     places: F64
@@ -98,7 +99,7 @@ def draw_deviation(part: Part, measured: Measured, marks: Sequence[Mark], out_pa
     """Draw the deviations into a PNG of 1760 x 960 pixels.
 
     part     : Part, mm; measured : Measured in its frame
-    marks    : gravest first; five are drawn
+    marks    : most severe first; five are drawn
     out_path : file to write
     title    : one line of text
     facts    : up to ten pairs for the legend, for example {'coverage': '97.2 %'}
@@ -108,7 +109,7 @@ def draw_deviation(part: Part, measured: Measured, marks: Sequence[Mark], out_pa
     cameras = choose_views(part.mesh, measured.samples, classes != GREEN, (2 * width, 2 * height))
     sheet = Image.new("RGB", SIZE, bytes_of(WHITE))
     pen = ImageDraw.Draw(sheet)
-    free = list(marks[:MOST_RINGS])
+    free = list(marks[:MAX_RINGS])
     for k, camera in enumerate(cameras):
         x = k * (width + GUTTER)
         canvas = _painted(part, measured, classes, camera)
@@ -132,7 +133,7 @@ def draw_deviation(part: Part, measured: Measured, marks: Sequence[Mark], out_pa
 
 
 def _painted(part: Part, measured: Measured, classes: INT8, camera: Camera) -> Canvas:
-    """One view: light, classes, dots of what is outside the budget, edges."""
+    """One view: light, classes, dots of samples outside the budget, edges."""
     canvas = lit(part.mesh, np.ones((len(part.faces) + 1, 3), np.float32), camera)
     shown = _class_of_pixels(canvas, camera, measured.samples, classes)
     table = np.array([*COLOURS, PALE], np.float32)  # -1, not judged, is the last
@@ -150,7 +151,7 @@ def _painted(part: Part, measured: Measured, classes: INT8, camera: Camera) -> C
 
 
 def _class_of_pixels(canvas: Canvas, camera: Camera, samples: SurfaceSamples, classes: INT8) -> INT8:
-    """(h, w): class of the nearest sample of the face seen, -1 where the face has none or nothing is seen."""
+    """(h, w): class of the nearest sample of the visible face; -1 where the face has none or no face is visible."""
     out = np.full(canvas.owner.shape, -1, np.int8)
     y, x = np.nonzero(np.isin(canvas.owner, samples.face) & (canvas.owner > 0))
     places = camera.places(np.column_stack([x + 0.5, y + 0.5, canvas.depth[y, x]]))
@@ -160,15 +161,17 @@ def _class_of_pixels(canvas: Canvas, camera: Camera, samples: SurfaceSamples, cl
     return out
 
 
-# --- words and signs -------------------------------------------------------------------------------------------
+# --- text and symbols ------------------------------------------------------------------------------------------
 
 
 def _ring(pen: ImageDraw.ImageDraw, camera: Camera, mark: Mark, visible: F64, left: int, width: int,
           taken: list[Box]) -> None:
-    """A ring round a place and its words where no others stand; nothing where graver rings are at all places."""
+    """A ring around a place, with text where no other text is; nothing where rings of more severe marks are at all
+    places.
+    """
     places = visible if len(visible) else mark.places[:1]
     spots = [(left + x - RING, HEADER + y - RING, left + x + RING, HEADER + y + RING)
-             for x, y, _ in (0.5 * camera.screen(places[::-(-len(places) // MOST_TRIED)])).tolist()]
+             for x, y, _ in (0.5 * camera.screen(places[::-(-len(places) // MAX_RING_PLACES)])).tolist()]
     apart = [spot for spot in spots if not any(_meet(spot, ring) for ring in taken[::2])]
     if not apart:
         return
@@ -187,7 +190,7 @@ def _ring(pen: ImageDraw.ImageDraw, camera: Camera, mark: Mark, visible: F64, le
 
 
 def _beside(x: float, y: float, right: bool) -> list[tuple[tuple[float, float], str]]:
-    """Places for words beside a ring with their anchors, the side with more room first."""
+    """Positions for text beside a ring with their anchors, the side with more room first."""
     sides = [(x + RING + 6, "lm"), (x - RING - 6, "rm")]
     return [((at, y + down), anchor) for down in (0, -26, 26, -52, 52)
             for at, anchor in (sides if right else sides[::-1])]
@@ -198,7 +201,7 @@ def _meet(a: Box, b: Box) -> bool:
 
 
 def _scale(pen: ImageDraw.ImageDraw, measured: Measured, x: int, y: int) -> None:
-    """The seven classes as a strip with their limits in mm and the budget between two marks."""
+    """The seven classes as a strip, with their limits in mm and the budget between two marks."""
     box, ink = 98, bytes_of(INK)
     for k, colour in enumerate(COLOURS[:UNCUT]):
         pen.rectangle([x + k * box, y + 22, x + (k + 1) * box, y + 46], fill=bytes_of(colour), outline=ink)

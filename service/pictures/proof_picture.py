@@ -1,4 +1,4 @@
-"""What a person sees of a proof: the deviation map, and the machined part as a mesh."""
+"""Pictures of a proof: the deviation map, and the machined part as a mesh."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from service.pictures.deviation_map import COLOURS, Mark, Measured, draw_deviati
 from verify.model import Finding, FindingKind, Proof, ProofSetup
 
 MAP_NAME = "deviation.png"
-MOST_GOUGES = 4
+MAX_GOUGE_MARKS = 4
 
 
 def draw_proof(part: Part, samples: SurfaceSamples, proof: Proof, setup: ProofSetup, state: str, coverage: float,
                path: Path, title: str) -> None:
     """Draw the deviation map of a proof.
 
-    part, samples : in the frame in which ``proof`` has the places of its findings; the samples of its residuals
+    part, samples : in the frame of the places of the findings; ``samples`` are those of the residuals
     state, coverage : of the report
     """
     excess = proof.residual - setup.stock_allowance
@@ -28,7 +28,7 @@ def draw_proof(part: Part, samples: SurfaceSamples, proof: Proof, setup: ProofSe
     gouges = sorted((f for f in proof.findings if f.kind == FindingKind.GOUGE and f.point is not None),
                     key=lambda f: -f.depth)
     marks = [Mark(np.array([f.point]), f"{f.depth:.3g} mm too deep{_at(f)}", COLOURS[1])
-             for f in gouges[:MOST_GOUGES] if f.point is not None]
+             for f in gouges[:MAX_GOUGE_MARKS] if f.point is not None]
     most, left = _most_left(samples, excess, proof, setup)
     if most is not None:
         marks.append(most)
@@ -46,7 +46,7 @@ def _at(f: Finding) -> str:
 
 
 def _most_left(samples: SurfaceSamples, excess: F64, proof: Proof, setup: ProofSetup) -> tuple[Mark | None, str]:
-    """Where most is left, and in words; no mark where that is within the budget."""
+    """The place with most stock left, and its text; no mark where that is within the budget."""
     if not len(excess):
         return None, "nothing judged"
     row = int(np.argmax(excess))

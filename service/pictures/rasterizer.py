@@ -1,8 +1,7 @@
-"""A small z-buffer: shaded triangles, depth-tested strokes and dots, on plain arrays.
+"""A small z-buffer: shaded triangles, depth-tested lines and dots, on plain arrays.
 
-Pictures must come out of a child process on a machine without any graphics
-library, the same bytes every time; that is why this exists beside VTK.
-Screen: x to the right, y down, in pixels; depth grows towards the viewer.
+Pictures are made in a child process on a machine without graphics library, with the same bytes every time. Therefore
+this exists beside VTK. Screen: x to the right, y down, in pixels; depth grows towards the viewer.
 """
 
 from __future__ import annotations
@@ -22,11 +21,11 @@ F32 = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class Canvas:
-    """What the kernels draw on.
+    """The picture on which the kernels draw.
 
     colour : (h, w, 3) float32, 0..1
-    depth  : (h, w) float64, pixels towards the viewer; -inf where nothing stands
-    owner  : (h, w) int32, number of the face seen; 0 where nothing stands
+    depth  : (h, w) float64, pixels towards the viewer; -inf where nothing is drawn
+    owner  : (h, w) int32, number of the visible face; 0 where nothing is drawn
     """
 
     colour: F32
@@ -47,9 +46,9 @@ class Canvas:
 
     def strokes(self, segments: F64, colour: tuple[float, float, float], *, width: int = 1, alpha: float = 1.0,
                 hidden: float = 0.0, bias: float = 0.0, dash: float = 0.0) -> None:
-        """Draw segments (n, 2, 3) in pixels and depth.
+        """Draw segments (n, 2, 3) float64, in pixels and depth.
 
-        alpha, hidden : opacity in front of and behind what stands already;  bias : pixels of depth forgiven
+        alpha, hidden : opacity in front of and behind the picture;  bias : tolerance of depth, pixels
         dash          : length of dash and of gap in pixels, 0 for a full line
         """
         if len(segments):
@@ -61,13 +60,17 @@ class Canvas:
 
     def dots(self, points: F64, colour: tuple[float, float, float], *, width: int = 3, alpha: float = 1.0,
              hidden: float = 0.0, bias: float = 0.0) -> None:
-        """Draw square dots at (n, 3) in pixels and depth."""
+        """Draw square dots.
+
+        points : (n, 3) float64, pixels and depth
+        alpha, hidden : opacity in front of and behind the picture;  bias : tolerance of depth, pixels
+        """
         if len(points):
             _dots(np.ascontiguousarray(points, dtype=np.float64), np.array(colour, dtype=np.float32), width, alpha,
                   hidden, bias, self.colour, self.depth)
 
     def outline(self, colour: tuple[float, float, float], jump: float) -> None:
-        """Darken where the part ends or the depth jumps by more than ``jump`` pixels from one pixel to the next."""
+        """Darken pixels at the border of the part and where the depth jumps by more than ``jump`` pixels."""
         solid = self.owner > 0
         rim = np.zeros(solid.shape, dtype=bool)
         for axis in (0, 1):

@@ -14,7 +14,8 @@ from service.pictures.rasterizer import F32, Canvas
 def lit(mesh: TriangleMesh, colours: F32, camera: Camera) -> Canvas:
     """Shaded triangles that face the viewer.
 
-    colours : (n + 1, 3) float32, 0..1, by face number (row); 0 serves triangles whose face has none
+    colours : (n + 1, 3) float32, dimensionless, 0..1 in RGB coordinates, by face number; row 0 is for triangles without
+              face
     """
     canvas = Canvas.blank(*camera.size, PAPER)
     front = np.flatnonzero(mesh.normals @ camera.basis[2] > 0.0)
@@ -37,13 +38,21 @@ def add_edges(canvas: Canvas, part: Part, camera: Camera) -> None:
 
 
 def shaded(part: Part, colours: F32, camera: Camera) -> Canvas:
-    """The part with a colour for every face, ``colours`` (n + 1, 3) float32, 0..1 by face number, and its edges."""
+    """The part with a colour for every face, and its edges.
+
+    colours : (n + 1, 3) float32, dimensionless, 0..1 in RGB coordinates, by face number
+    """
     canvas = lit(part.mesh, colours, camera)
     add_edges(canvas, part, camera)
     return canvas
 
 
 def segments(camera: Camera, points: F64) -> F64:
-    """(n - 1, 2, 3) float64 screen segments, pixels, of a polyline of (n, 3) points in mm."""
+    """Screen segments of a polyline.
+
+    points : (n, 3) float64, mm, setup frame
+
+    Returns (n - 1, 2, 3) float64, pixels.
+    """
     p = camera.screen(points)
     return np.stack([p[:-1], p[1:]], axis=1)

@@ -1,8 +1,9 @@
-"""Assembly drawing of a tool to scale, as shapes on paper that a web page and a PDF draw alike.
+"""Scale drawing of a tool assembly, as shapes on paper that a web page and a PDF draw alike.
 
-Left the whole assembly as it hangs in the spindle, tip down, with diameters to its left and heights above the tip to
-its right; beside it the tip once more, larger, where it would be too small to read. Both scales are of the usual series
-and hold on paper: the units of the drawing are mm of it.
+The left view is the whole assembly in the spindle, tip down, with diameters on its left and heights above the tip on
+its
+right. Where the tip would be too small to read, a larger view is beside it. Both scales are standard ones and hold on
+paper: the unit of the drawing is a mm of paper.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from geometry.tool_body import ToolBody
 from output.header_text import decimal
 
 WIDTH, HEIGHT = 118.0, 88.0  # mm of paper
-FLOOR, CEILING = 80.0, 5.0  # where the tip stands, and how high the assembly may go
+FLOOR, CEILING = 80.0, 5.0  # height of the tip, and upper end of the assembly
 MIDDLE, TIP_MIDDLE = 38.0, 97.0  # of the assembly and of the larger tip
 ASSEMBLY_ROOM, TIP_ROOM = (32.0, FLOOR - CEILING), (24.0, 46.0)  # width, height
-LEAST_SHOWN = 10.0  # mm of paper across the cutting part, below which the tip is drawn larger
-MOST_LABELS = 16
+MIN_TIP_WIDTH = 10.0  # mm of paper; a narrower cutting part is also drawn larger
+MAX_LABELS = 16
 APART, LETTER = 4.2, 2.9  # mm between labels; height of letters
 SCALES = (50.0, 20.0, 10.0, 5.0, 2.0, 1.0, 1 / 2, 1 / 5, 1 / 10, 1 / 20, 1 / 50, 1 / 100)
 
@@ -28,7 +29,7 @@ Point = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Area:
+class FilledOutline:
     """A filled outline, y down, mm. part : 'flutes', 'neck', 'shank' or 'holder'; view : 'assembly' or 'tip'."""
 
     part: str
@@ -37,7 +38,7 @@ class Area:
 
 
 @dataclass(frozen=True)
-class Stroke:
+class DrawnLine:
     """A line. kind : 'measure', 'axis' or 'spindle'."""
 
     kind: str
@@ -45,7 +46,7 @@ class Stroke:
 
 
 @dataclass(frozen=True)
-class Word:
+class DrawnText:
     """Text on a base line; anchor : 'start', 'middle' or 'end'."""
 
     text: str
@@ -60,9 +61,9 @@ class ToolDrawing:
     title: str
     scale: float
     tip_scale: float | None
-    areas: tuple[Area, ...]
-    strokes: tuple[Stroke, ...]
-    words: tuple[Word, ...]
+    areas: tuple[FilledOutline, ...]
+    strokes: tuple[DrawnLine, ...]
+    words: tuple[DrawnText, ...]
 
 
 def draw_tool(body: ToolBody, gauge: float) -> ToolDrawing:
@@ -73,41 +74,42 @@ def draw_tool(body: ToolBody, gauge: float) -> ToolDrawing:
     outlines = _outlines(body)
     areas = [_placed(part, "assembly", points, MIDDLE, scale) for part, points in outlines]
     reach = FLOOR - scale * top
-    strokes = [Stroke("axis", ((MIDDLE, FLOOR + 2.0), (MIDDLE, reach - 2.0)))]
-    words = [Word(f"assembly {_ratio(scale)}", (MIDDLE, HEIGHT - 1.5), "middle")]
+    strokes = [DrawnLine("axis", ((MIDDLE, FLOOR + 2.0), (MIDDLE, reach - 2.0)))]
+    words = [DrawnText(f"assembly {_ratio(scale)}", (MIDDLE, HEIGHT - 1.5), "middle")]
     edge = 0.5 * scale * widest
     if gauge > 0.0:
         y = FLOOR - scale * gauge
-        strokes.append(Stroke("spindle", ((MIDDLE - edge - 2.0, y), (MIDDLE + edge + 2.0, y))))
+        strokes.append(DrawnLine("spindle", ((MIDDLE - edge - 2.0, y), (MIDDLE + edge + 2.0, y))))
     _label(_heights(body, gauge), MIDDLE + edge + 4.0, 1.0, scale, strokes, words, MIDDLE)
     _label(_diameters(body), MIDDLE - edge - 4.0, -1.0, scale, strokes, words, MIDDLE)
     tip_scale = None
-    if scale * body.diameter < LEAST_SHOWN:
+    if scale * body.diameter < MIN_TIP_WIDTH:
         tip_scale = _add_tip(body, outlines[0][1], areas, strokes, words)
     title = f"T{body.number}: {body.kind} end mill of {decimal(body.diameter)} mm, to scale"
     return ToolDrawing(title, scale, tip_scale, tuple(areas), tuple(strokes), tuple(words))
 
 
-def _add_tip(body: ToolBody, outline: Sequence[Point], areas: list[Area], strokes: list[Stroke],
-             words: list[Word]) -> float:
-    """The tip once more, cut off where it goes on as it is; returns its scale."""
+def _add_tip(body: ToolBody, outline: Sequence[Point], areas: list[FilledOutline], strokes: list[DrawnLine],
+             words: list[DrawnText]) -> float:
+    """The larger tip, cut off where its shape does not change any more; returns its scale."""
     shown = min(body.flute_length, max(1.6 * body.diameter, 1.2 * body.corner_radius))
     cut = [(x, min(h, shown)) for x, h in outline]
     scale = _scale(TIP_ROOM, body.diameter, shown)
     areas.append(_placed("flutes", "tip", cut, TIP_MIDDLE, scale))
     half, y = 0.5 * scale * body.diameter, FLOOR - scale * shown
-    strokes.append(Stroke("axis", ((TIP_MIDDLE, FLOOR + 2.0), (TIP_MIDDLE, y - 2.0))))
+    strokes.append(DrawnLine("axis", ((TIP_MIDDLE, FLOOR + 2.0), (TIP_MIDDLE, y - 2.0))))
     above = y - 4.0
-    strokes += [Stroke("measure", ((TIP_MIDDLE + side * half, y), (TIP_MIDDLE + side * half, above - 1.0)))
+    strokes += [DrawnLine("measure", ((TIP_MIDDLE + side * half, y), (TIP_MIDDLE + side * half, above - 1.0)))
                 for side in (-1.0, 1.0)]
-    strokes.append(Stroke("measure", ((TIP_MIDDLE - half, above), (TIP_MIDDLE + half, above))))
-    words += [Word(f"Ø{decimal(body.diameter)}", (TIP_MIDDLE, above - 1.2), "middle"),
-              Word(f"tip {_ratio(scale)}, corner R{decimal(body.corner_radius)}", (TIP_MIDDLE, HEIGHT - 1.5), "middle")]
+    strokes.append(DrawnLine("measure", ((TIP_MIDDLE - half, above), (TIP_MIDDLE + half, above))))
+    words += [DrawnText(f"Ø{decimal(body.diameter)}", (TIP_MIDDLE, above - 1.2), "middle"),
+              DrawnText(f"tip {_ratio(scale)}, corner R{decimal(body.corner_radius)}", (TIP_MIDDLE, HEIGHT - 1.5),
+                        "middle")]
     return scale
 
 
 def _scale(room: tuple[float, float], width: float, height: float) -> float:
-    """The largest of the series at which something fits into room, mm of paper."""
+    """The largest standard scale at which the shape fits into the room, mm of paper."""
     return next((s for s in SCALES if s * width <= room[0] and s * height <= room[1]), SCALES[-1])
 
 
@@ -116,7 +118,9 @@ def _ratio(scale: float) -> str:
 
 
 def _outlines(body: ToolBody) -> list[tuple[str, list[Point]]]:
-    """Each part as half widths right of the axis and heights above the tip, mm, from below; mirrored by ``_placed``."""
+    """Each part as half widths right of the axis and heights above the tip, mm, from the tip up; ``_placed`` mirrors
+    it.
+    """
     r, c = body.radius, body.corner_radius
     turns = [math.radians(90.0 * k / 18) for k in range(19)] if c > 0.0 else []
     nose = [(r - c + c * math.sin(a), c - c * math.cos(a)) for a in turns] or [(r, 0.0)]
@@ -133,14 +137,14 @@ def _outlines(body: ToolBody) -> list[tuple[str, list[Point]]]:
     return out
 
 
-def _placed(part: str, view: str, half: Sequence[Point], middle: float, scale: float) -> Area:
+def _placed(part: str, view: str, half: Sequence[Point], middle: float, scale: float) -> FilledOutline:
     right = [(middle + scale * x, FLOOR - scale * h) for x, h in half]
     left = [(middle - scale * x, FLOOR - scale * h) for x, h in reversed(half)]
-    return Area(part, view, tuple(right + left))
+    return FilledOutline(part, view, tuple(right + left))
 
 
 def _heights(body: ToolBody, gauge: float) -> list[tuple[float, float, str]]:
-    """Height above the tip, half width where its line begins, and words, from below."""
+    """Heights of the parts: height above the tip, half width where the line begins, and text, from the tip up."""
     d = decimal
     out = [(0.0, 0.0, "0 tip"), (body.flute_length, body.radius, f"{d(body.flute_length)} flutes")]
     if body.neck_length > body.flute_length:
@@ -159,7 +163,7 @@ def _heights(body: ToolBody, gauge: float) -> list[tuple[float, float, str]]:
 
 
 def _diameters(body: ToolBody) -> list[tuple[float, float, str]]:
-    """The same of diameters, at the middle of each part."""
+    """Diameters of the parts, at the middle of each, in the same form."""
     d = decimal
     out = [(0.5 * body.flute_length, body.radius, f"Ø{d(body.diameter)}")]
     if body.neck_length > body.flute_length:
@@ -176,31 +180,31 @@ def _diameters(body: ToolBody) -> list[tuple[float, float, str]]:
     return out
 
 
-def _label(entries: Sequence[tuple[float, float, str]], x: float, side: float, scale: float, strokes: list[Stroke],
-           words: list[Word], middle: float) -> None:
-    """Words in a column beside the assembly, each with a line to its height, and none over another.
+def _label(entries: Sequence[tuple[float, float, str]], x: float, side: float, scale: float, strokes: list[DrawnLine],
+           words: list[DrawnText], middle: float) -> None:
+    """Text in a column beside the assembly, each with a line to its height, without overlap.
 
-    Of more than there is room for those at both ends are kept; all segments of a holder stand beside the drawing.
+    Where there are too many, those at both ends are kept; the list beside the drawing has all segments of a holder.
     """
-    if len(entries) > MOST_LABELS:
-        entries = [*entries[:MOST_LABELS // 2], *entries[-MOST_LABELS // 2:]]
+    if len(entries) > MAX_LABELS:
+        entries = [*entries[:MAX_LABELS // 2], *entries[-MAX_LABELS // 2:]]
     wanted = [FLOOR - scale * h for h, _, _ in entries]
     placed: list[float] = []
     for y in wanted:  # upwards from the tip
         placed.append(min(y, placed[-1] - APART) if placed else y)
-    if placed and placed[-1] < LETTER:  # no room above: the whole column comes down, the lowest first
+    if placed and placed[-1] < LETTER:  # no room above: move the whole column down, the lowest first
         low = LETTER
         for k in reversed(range(len(placed))):
             placed[k] = max(placed[k], low)
             low = placed[k] + APART
     for (_, half, text), y, at in zip(entries, wanted, placed, strict=True):
         start = middle + side * (scale * half + 0.6)
-        strokes.append(Stroke("measure", ((start, y), (x - side * 1.5, y), (x + side * 2.0, at))))
-        words.append(Word(text, (x + side * 2.8, at + 0.35 * LETTER), "start" if side > 0 else "end"))
+        strokes.append(DrawnLine("measure", ((start, y), (x - side * 1.5, y), (x + side * 2.0, at))))
+        words.append(DrawnText(text, (x + side * 2.8, at + 0.35 * LETTER), "start" if side > 0 else "end"))
 
 
 def svg_of(drawing: ToolDrawing) -> str:
-    """The drawing as an SVG element with a title of its own; every word in it is escaped."""
+    """The drawing as an SVG element with a title; all text in it is escaped."""
     title = html.escape(drawing.title)
     out = [f'<svg class="tool" xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" '
            f'width="{WIDTH:g}mm" height="{HEIGHT:g}mm" role="img" aria-label="{title}" '
@@ -217,4 +221,4 @@ def _pairs(points: Sequence[Point]) -> str:
     return " ".join(f"{x + 0.0:.3f},{y + 0.0:.3f}" for x, y in points)
 
 
-__all__ = ["HEIGHT", "LETTER", "WIDTH", "Area", "Stroke", "ToolDrawing", "Word", "draw_tool", "svg_of"]
+__all__ = ["HEIGHT", "LETTER", "WIDTH", "FilledOutline", "DrawnLine", "ToolDrawing", "DrawnText", "draw_tool", "svg_of"]

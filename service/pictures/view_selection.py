@@ -1,4 +1,4 @@
-"""From where a part is looked at, so that what matters is seen."""
+"""Chooses the views of a part that show the important places."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from service.pictures.annotation import PAPER
 from service.pictures.camera import Camera
 from service.pictures.rasterizer import Canvas
 
-TRIAL = (480, 360)  # pixels of the pictures that views are chosen with
-MOST_TRIED = 20_000  # samples
-STRESS = 20.0  # times what others count, for the samples that matter
-FORGIVEN = 2.0  # pixels by which a place may lie behind what is drawn and still be seen
+TRIAL = (480, 360)  # pixels of the trial pictures
+MAX_TRIED_SAMPLES = 20_000  # samples
+STRESSED_WEIGHT = 20.0  # weight of stressed samples
+DEPTH_SLACK = 2.0  # pixels that a visible place may lie behind the drawn surface
 
 
 def choose_views(mesh: TriangleMesh, samples: SurfaceSamples, stressed: NDArray[np.bool_],
                  size: tuple[int, int]) -> tuple[Camera, Camera]:
-    """Two cameras that together see as much of the samples as any of eight views do: the best, and the best beside it.
+    """The two cameras, out of eight, that together show most of the samples: the best one, and the best in addition.
 
     mesh     : of the part; samples : n of them, on it
     stressed : (n,) bool mask, samples that count twenty times
     size     : of the pictures, pixels
 
-    Ties go to the first, the usual isometric view.
+    The first one wins a tie; it is the usual isometric view.
     """
     tried = np.unique(np.concatenate([_some(np.arange(len(samples))), _some(np.flatnonzero(stressed))]))
-    weight = np.where(stressed[tried], STRESS, 1.0)
+    weight = np.where(stressed[tried], STRESSED_WEIGHT, 1.0)
     views = [(turn, up) for up in (38.0, 58.0) for turn in (-58.0, 122.0, 32.0, 212.0)]
     found = []
     for turn, up in views:
@@ -52,14 +52,19 @@ def choose_views(mesh: TriangleMesh, samples: SurfaceSamples, stressed: NDArray[
 
 
 def seen(canvas: Canvas, camera: Camera, points: F64) -> NDArray[np.bool_]:
-    """(n,) bool: which of (n, 3) points, mm, nothing that is drawn hides."""
+    """Whether points are visible.
+
+    points : (n, 3) float64, mm, frame of the part
+
+    Returns (n,) bool.
+    """
     at = camera.screen(points)
     h, w = canvas.depth.shape
     x = np.clip(np.floor(at[:, 0]).astype(np.int64), 0, w - 1)
     y = np.clip(np.floor(at[:, 1]).astype(np.int64), 0, h - 1)
-    return np.asarray(at[:, 2] >= canvas.depth[y, x] - FORGIVEN)
+    return np.asarray(at[:, 2] >= canvas.depth[y, x] - DEPTH_SLACK)
 
 
 def _some(rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """At most ``MOST_TRIED`` of these rows, evenly."""
-    return rows[::max(1, -(-len(rows) // MOST_TRIED))]
+    """At most ``MAX_TRIED_SAMPLES`` of these rows, evenly spaced."""
+    return rows[::max(1, -(-len(rows) // MAX_TRIED_SAMPLES))]

@@ -20,7 +20,7 @@ from geometry.step_import.reader import read_part
 from geometry.tool_body import ToolBody
 from geometry.trimming.trim import FacePatch
 from schemas.setup import Access, Setup
-from service.from_wire import face_numbers, no_stock_file, of_blank, rotary_machine, tool_bodies
+from service.from_wire import blank_error, face_numbers, no_stock_file, rotary_machine, tool_bodies
 from service.stages.blank_checks import check_against_part
 from service.stages.blank_model import Blank, blank_of
 from zones.features.decomposition import decompose
@@ -128,7 +128,7 @@ def load_blank(path: Path, setup: Setup) -> Part:
     try:
         return read_part(path, placement=placement_of(setup), chord=mesh_chord(setup))
     except CamError as error:
-        raise of_blank(error) from None
+        raise blank_error(error) from None
 
 
 def placement_of(setup: Setup) -> SetupFrame:
@@ -231,8 +231,8 @@ def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True
     if len(views) > len(zoning.reach):
         zoning = zoned([*zoning.reach, *({} for _ in range(len(views) - len(zoning.reach)))])
     progress("zones", 0.27)
-    of_blank = () if blank.solid is None else (f"the blank: {w}" for w in blank.solid.warnings)
-    warnings = (*part.warnings, *of_blank, *decomposition.warnings, *_stood_askew(setup, part, decomposition))
+    blank_error = () if blank.solid is None else (f"the blank: {w}" for w in blank.solid.warnings)
+    warnings = (*part.warnings, *blank_error, *decomposition.warnings, *_stood_askew(setup, part, decomposition))
     return Prepared(setup, part, blank, tuple(accesses), tuple(views), decomposition, zoning, seen_from, lift, warnings)
 
 

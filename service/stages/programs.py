@@ -14,13 +14,13 @@ from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import ToolBody
 from output.arc_fitting import SHARE as ARCS
 from output.arc_fitting import fitted
-from output.clamping_sequence import SWING, home_of
+from output.clamping_sequence import MAX_AXIS_DEVIATION, home_of
 from output.gcode.dialects import DIALECTS, Switches
 from output.gcode.program_splitting import parts_of
 from output.gcode.program_writer import write_program
 from output.gcode.proof_header import AWAITED, filled
 from output.header_text import decimal
-from output.workplan import FIRST_NUMBER, Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
+from output.workplan import FIRST_NUMBER, AccessFrame, Ap238, Assembly, Clamping, StockBox, StockCylinder, Workplan
 from schemas.setup import Access, Setup, setup_sha256
 from service.cutting_data import rates_of
 from service.from_wire import material_name, rotary_machine, tool_bodies
@@ -160,7 +160,7 @@ def clamped_workplan(ready: Prepared, sides: Sequence[Side]) -> Workplan:
     boxes = [ready.blank.corners(look.rotation) + [[-spare], [spare]], ready.part.bounds, *fixture_boxes(ready, look)]
     low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
     radius = 0.5 * float(np.linalg.norm(high - low)) + setup.clearance_mm.rapid
-    frames = {s.view.id: Frame(s.view.rotation, s.clearance) for s in sides}
+    frames = {s.view.id: AccessFrame(s.view.rotation, s.clearance) for s in sides}
     rises = [float(s.view.rotation[2, 2]) for s in sides]
     rises += [float((t.axes @ s.view.rotation)[:, 2].min()) for s in sides for step in s.made.steps
               for t in step.trajectories if t.axes is not None]
@@ -187,7 +187,7 @@ def turning_of(ready: Prepared, view: View) -> RotaryAxes | None:
 
     def along(tips: F64, axes: F64) -> tuple[F64, F64, F64] | None:
         try:
-            way, turns = machine.course(tips @ turn, axes @ turn, tolerance, SWING, longest)
+            way, turns = machine.course(tips @ turn, axes @ turn, tolerance, MAX_AXIS_DEVIATION, longest)
         except OutputError:
             return None
         least = np.zeros(len(way) - 1)

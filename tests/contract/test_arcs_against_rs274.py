@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from output.arc_fitting import fitted
-from output.linuxcnc import write_linuxcnc
 from tests import rs274
 from tests.arc_plans import HALF, round_clamped, round_plan
+from tests.synthetic_plan import write_linuxcnc
 from verify.gcode.reader import read_program
 
 CHECK = Path(__file__).resolve().parents[3] / "shared" / "tools" / "gcode_check.sh"

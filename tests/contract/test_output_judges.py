@@ -12,12 +12,11 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from output.linuxcnc import write_linuxcnc
 from output.stepnc.ap238 import write_stepnc_aim
 from output.stepnc.iso14649 import write_stepnc_arm
 from output.workplan import Ap238
 from tests import rs274
-from tests.synthetic_plan import BALL, block_mesh, clamped, full, long_plan, plan, shaped, step, tiny
+from tests.synthetic_plan import BALL, block_mesh, clamped, full, long_plan, plan, shaped, step, tiny, write_linuxcnc
 from toolpath.workingsteps import TrajectoryKind
 from verify.gcode.reader import read_program
 

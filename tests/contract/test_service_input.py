@@ -212,7 +212,7 @@ def test_a_job_without_result_says_what_to_do_in_the_state_it_is_in(client, post
     failed = finish(client, post(client, "open").json())
     answer = client.get(failed["links"][document])
     _is_problem(answer, 409, "no_result")
-    assert failed["error"] and f"GET {failed['links']['self']} tells under error" in answer.json()["remedy"]
+    assert failed["error"] and f"GET {failed['links']['self']} has the reason under error" in answer.json()["remedy"]
 
 
 def test_a_bug_in_a_route_is_a_problem_document_too(make_client, monkeypatch):

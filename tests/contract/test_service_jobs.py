@@ -247,7 +247,7 @@ def test_a_child_that_cannot_be_started_for_want_of_handles_is_waited_for(client
         return popen(*args, **kwargs)
 
     monkeypatch.setattr("service.jobs.supervisor.subprocess.Popen", starts)
-    monkeypatch.setattr("service.jobs.attempt.AGAIN_S", 0.1)
+    monkeypatch.setattr("service.jobs.attempt.RETRY_S", 0.1)
     job = finish(client, post(client, "few handles").json())
     assert (job["state"], job["attempt"]) == ("proved", 1) and not left
 
@@ -257,7 +257,7 @@ def test_a_worker_that_can_start_no_child_at_all_says_so(client, post, finish, m
         raise OSError(errno.EMFILE, "Too many open files")
 
     monkeypatch.setattr("service.jobs.supervisor.subprocess.Popen", never)
-    monkeypatch.setattr("service.jobs.attempt.AGAIN_S", 0.05)
+    monkeypatch.setattr("service.jobs.attempt.RETRY_S", 0.05)
     monkeypatch.setattr("service.jobs.attempt.PATIENCE_S", 0.3)
     job = finish(client, post(client, "no handles").json())
     assert (job["state"], job["error"]["code"]) == ("failed", "worker_exhausted")

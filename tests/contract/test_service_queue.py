@@ -8,7 +8,7 @@ import pytest
 from sqlalchemy.exc import OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 
-from service.jobs.attempt import Unshown, WorkConfig
+from service.jobs.attempt import HiddenText, WorkConfig
 
 Usage = namedtuple("Usage", "total used free")
 
@@ -114,9 +114,9 @@ def test_a_database_that_is_away_is_503_and_tells_nothing_of_itself(make_client,
 def test_the_password_of_the_database_does_not_show_in_the_arguments_of_a_task():
     from pickle import dumps, loads
 
-    from service.jobs.supervisor import Limits
+    from service.jobs.supervisor import ProcessLimits
 
     url = "postgresql+psycopg://zonemill:hunter2@db/zonemill"
-    given = WorkConfig(url, "/data", Limits(1, 1), 20.0).as_dict()
+    given = WorkConfig(url, "/data", ProcessLimits(1, 1), 20.0).as_dict()
     assert "hunter2" not in repr(given) and "hunter2" not in repr(loads(dumps(given)))
-    assert WorkConfig(**given).url == url and isinstance(given["url"], Unshown)
+    assert WorkConfig(**given).url == url and isinstance(given["url"], HiddenText)

@@ -10,7 +10,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service.jobs.retention import GRACE_S, Janitor
+from service.jobs.retention import GRACE_S, RetentionSweeper
 from service.settings import Settings
 from tests.contract.servers import free_port
 from tests.contract.test_service_cluster import Cluster
@@ -190,7 +190,7 @@ def test_what_is_kept_for_jobs_that_wait_stays_and_the_rest_goes(make_client, po
         os.utime(folder, (time.time() - (0 if key.startswith("cd") else 2 * GRACE_S),) * 2)
 
     def sweep():
-        done = Janitor(Settings(data_dir=engine.settings.data_dir), engine.jobs, engine.artifacts).sweep()
+        done = RetentionSweeper(Settings(data_dir=engine.settings.data_dir), engine.jobs, engine.artifacts).sweep()
         return done.removed, {p.name for p in engine.artifacts.all_kept()}
 
     assert sweep() == (1, {keys[0], keys[1], keys[3]})  # nobody's goes, unless it is fresh

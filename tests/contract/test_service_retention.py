@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import service.jobs.engine as engine_module
-from service.jobs.retention import GRACE_S, Janitor, Swept
+from service.jobs.retention import GRACE_S, RetentionSweeper, SweepCounts
 from service.settings import Settings
 from tests.contract.test_service_input import STEP
 
@@ -32,7 +32,7 @@ def stored(client):
 def sweep(client, **settings):
     engine = client.app.state.engine
     wanted = Settings(**{"data_dir": engine.settings.data_dir, **settings})
-    return Janitor(wanted, engine.jobs, engine.artifacts).sweep()
+    return RetentionSweeper(wanted, engine.jobs, engine.artifacts).sweep()
 
 
 def test_files_of_old_jobs_go_and_the_rest_of_them_stays(make_client, post, finish, setup_json):
@@ -40,9 +40,9 @@ def test_files_of_old_jobs_go_and_the_rest_of_them_stays(make_client, post, fini
     old = finish(client, post(client, setup=setup_json(labels={"order": "1"}), key="k").json())
     new = finish(client, post(client, setup=setup_json(quality={"scallop_height_mm": 0.02})).json())
     aged(client, old, days=31)
-    assert sweep(client) == Swept() and len(stored(client)) == 3  # nothing goes unless it is asked for
-    assert sweep(client, retention_days=30) == Swept(jobs=1, removed=1)
-    assert sweep(client, retention_days=30) == Swept()
+    assert sweep(client) == SweepCounts() and len(stored(client)) == 3  # nothing goes unless it is asked for
+    assert sweep(client, retention_days=30) == SweepCounts(jobs=1, removed=1)
+    assert sweep(client, retention_days=30) == SweepCounts()
     for document in ("report", "zones", "files"):
         answer = client.get(old["links"][document])
         assert answer.status_code == 410 and answer.json()["code"] == "result_expired"
@@ -88,7 +88,7 @@ def test_a_job_whose_uploads_are_gone_fails_by_name_and_is_not_claimed_for_ever(
 
 def test_a_round_is_left_out_after_the_clock_was_set(make_client, monkeypatch):
     client = make_client()
-    janitor = Janitor(client.app.state.engine.settings, client.app.state.engine.jobs, client.app.state.engine.artifacts)
+    janitor = RetentionSweeper(client.app.state.engine.settings, client.app.state.engine.jobs, client.app.state.engine.artifacts)
     assert not janitor._clock_was_set()
     true = time.time
     monkeypatch.setattr(time, "time", lambda: true() + 400 * DAY)
@@ -132,7 +132,7 @@ def test_what_waits_or_runs_keeps_its_files_however_old(make_client, post, finis
     finish(client, busy, until=("queued",))
     for job in (busy, waiting):
         aged(client, job, days=100)
-    assert sweep(client, retention_days=1) == Swept() and len(stored(client)) == 2
+    assert sweep(client, retention_days=1) == SweepCounts() and len(stored(client)) == 2
     client.delete(busy["links"]["self"])
     assert finish(client, waiting)["state"] == "proved"
 
@@ -141,12 +141,12 @@ def test_uploads_that_led_to_no_job_and_leftovers_of_a_crash_go(make_client, pos
     client = make_client()
     files = client.app.state.engine.artifacts
     sha, _ = files.put_blob([b"nobody's"])
-    assert sweep(client) == Swept()  # its row may be on its way
+    assert sweep(client) == SweepCounts()  # its row may be on its way
     os.utime(files.blob(sha), (time.time() - GRACE_S - 60,) * 2)
     left, writing = files.workspace(), files.workspace()
     (left / "report.json").write_text("{")
     os.utime(left, (time.time() - 2 * DAY,) * 2)
-    assert sweep(client) == Swept(removed=1, leftovers=1)
+    assert sweep(client) == SweepCounts(removed=1, leftovers=1)
     assert not left.exists() and writing.exists() and stored(client) == set()
 
 

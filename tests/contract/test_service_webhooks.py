@@ -216,7 +216,7 @@ def test_an_orderly_stop_waits_for_what_is_on_its_way_so_that_it_is_not_sent_twi
 
 def test_an_attempt_that_was_cut_off_by_a_crash_is_made_again(receiver, hooked, post, monkeypatch):
     there = receiver(200)
-    monkeypatch.setattr(webhooks.Courier, "_deliver", lambda *_: None)  # claimed, and never heard of again
+    monkeypatch.setattr(webhooks.WebhookSender, "_deliver", lambda *_: None)  # claimed, and never heard of again
     client = hooked(there)
     jobs = client.app.state.engine.jobs
     job = post(client, "", webhook_url=f"http://127.0.0.1:{there.port}").json()

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from benchmarks.passes.faceting import facet_deviation
-from examples.family.thesis import Kind, surface
+from examples.family.thesis import ThesisSurface, surface
 
 
-@pytest.mark.parametrize("kind", Kind)
+@pytest.mark.parametrize("kind", ThesisSurface)
 def test_the_deviation_falls_with_the_square_of_the_step(kind):
     steps = 2.0 / np.array([40, 56, 80])
     s = surface(kind)

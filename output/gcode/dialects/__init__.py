@@ -1,4 +1,4 @@
-"""The controls programs are written for, each one file of data and rules.
+"""The controls for which programs are written, one file of data and rules each.
 
 >>> sorted(DIALECTS)
 ['fanuc', 'haas', 'heidenhain', 'linuxcnc', 'siemens']
@@ -14,6 +14,6 @@ from output.gcode.dialects.linuxcnc import LinuxCnc
 from output.gcode.dialects.siemens import Siemens
 
 DIALECTS: dict[str, type[Dialect]] = {d.name: d for d in (LinuxCnc, Fanuc, Haas, Siemens, Heidenhain)}
-"""By the name that ``machine.dialects`` has for it."""
+"""The dialect classes by their names in ``machine.dialects``."""
 
 __all__ = ["DIALECTS", "Dialect", "Switches"]

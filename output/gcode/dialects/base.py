@@ -1,7 +1,8 @@
-"""What a control has to be told, and in which words: those of RS-274 where a dialect does not say otherwise.
+"""What a control needs and the words it uses: those of RS-274 [Kramer2000], where a dialect has no other.
 
-A dialect is asked by ``output.gcode.program_writer`` and keeps nothing between two questions. What it answers are lines of a
-program; lengths come as whole steps of the grid or as text, speeds and feeds as text.
+``output.gcode.program_writer`` calls a dialect, which keeps no state between calls. It returns lines of a program.
+Lengths
+are whole grid steps or text, speeds and feeds are text.
 """
 
 from __future__ import annotations
@@ -19,14 +20,14 @@ from output.header_text import ascii_text, decimal
 from output.program_grid import PER_MM, GridArc
 
 UP_THE_TOOL = 50.0
-"""mm above the tip at which a tool may leave its place by the path tolerance where its axis is smoothed too."""
+"""mm above the tip; there the smoothing of the tool axis may move the tool by the path tolerance."""
 
 ZEROS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
-"""How a setup names the zeros of a control, from the first on."""
+"""Names of the work offsets in a setup, from the first on."""
 
 
 def axis_tolerance(tolerance: str) -> str:
-    """Degrees the tool axis may leave its way by, for a path tolerance in mm.
+    """Tolerance of the tool axis in degrees, for a path tolerance in mm.
 
     >>> axis_tolerance("0.001")
     '0.0011'
@@ -36,13 +37,14 @@ def axis_tolerance(tolerance: str) -> str:
 
 @dataclass(frozen=True)
 class Switches:
-    """What shops set differently on machines of one control.
+    """Settings that differ between machines with the same control.
 
-    high_speed : say the word for fast contouring (G05.1 Q1, CYCLE832) where the control has it as an option
-    haas_tcp   : the word by which a Haas keeps the tip: 'G234' or 'G43.4'
-    planes     : a Heidenhain cuts with a fixed tool axis in a plane tilted to it (PLANE SPATIAL)
-    swivel     : so does a Siemens (CYCLE800); the name of its swivel data record, '' where it has one alone; None: it
-                 does not
+    high_speed : the control has fast contouring as an option (G05.1 Q1, CYCLE832), and programs use it
+    haas_tcp   : word of tool centre point control on a Haas: 'G234' or 'G43.4'
+    planes     : a Heidenhain cuts with a fixed tool axis in a tilted plane (PLANE SPATIAL)
+    swivel     : name of the swivel data record with which a Siemens does the same (CYCLE800), '' for its only one;
+                 None:
+                 it does not
     """
 
     high_speed: bool = False
@@ -52,32 +54,42 @@ class Switches:
 
 
 def about_x(angle: float) -> F64:
-    """(3, 3): turns right-handed about X by rad."""
+    """Rotation about X, right-handed.
+
+    angle : rad
+
+    Returns (3, 3) float64, dimensionless, coordinates of the frame in which it turns.
+    """
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
 
 
 def about_y(angle: float) -> F64:
-    """(3, 3): turns right-handed about Y by rad."""
+    """Rotation about Y, right-handed.
+
+    angle : rad
+
+    Returns (3, 3) float64, dimensionless, coordinates of the frame in which it turns.
+    """
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
 def coolant(wet: bool) -> str:
-    """The word that turns it on or off."""
+    """The word that turns coolant on or off."""
     return "M8" if wet else "M9"
 
 
 class Dialect:
-    """One control. Methods return lines unless they say otherwise.
+    """One control. Methods return lines unless their docstring says otherwise.
 
     name    : in ``machine.dialects`` and in file names;  title : in headers;  ending : of files, without the point
     line    : longest line, characters
     zeros   : words for the zeros of ``ZEROS``, in that order
-    path    : 'Path mode ...', what the header says of how far the control may leave the path
-    bounds_path : whether a word of the program bounds it
-    needs   : what the header says of the machine that no word of the program sees to
-    needs_restart : and of a program of three axes with restart points besides
+    path    : header line 'Path mode ...' on how far the control may deviate from the path
+    bounds_path : whether a word of the program bounds that deviation
+    needs   : header lines on conditions of the machine that no word of the program sets
+    needs_restart : the same, for programs of three axes with restart points
     """
 
     name = title = ending = ""
@@ -101,11 +113,17 @@ class Dialect:
         return f"{sign}{whole}.{rest:04d}".rstrip("0") if rest else f"{sign}{whole}."
 
     def feed(self, value: str) -> str:
-        """The feed word for mm/min."""
+        """The feed word, mm/min."""
         return f"F{value}"
 
     def zero(self, work_offset: str) -> str:
-        """The word for the zero that a setup calls ``work_offset``; OutputError where the control has none such."""
+        """The word for the zero that a setup names ``work_offset``.
+
+        Raises
+        ------
+        OutputError
+            bad_work_offset: the control has no such zero.
+        """
         try:
             return self.zeros[ZEROS.index(work_offset)]
         except (ValueError, IndexError):
@@ -119,46 +137,46 @@ class Dialect:
         return [f"({p})" for p in parts]
 
     def plain(self, text: str) -> str:
-        """One line of ASCII without what the control does not take in a comment."""
+        """One line of ASCII without characters that the control refuses in a comment."""
         return text.replace("(", "[").replace(")", "]")
 
     def path(self, tolerance: str) -> str:
-        """What the header says of the way between two points."""
+        """Header line on the deviation that the control may make between two points."""
         return f"Path mode G64 P{tolerance}: the control may leave the written path by that much, in mm"
 
     # the whole
 
     def opening(self, name: str, low: Sequence[float], high: Sequence[float]) -> list[str]:
-        """Before the header; corners of the stock box (3,), mm."""
+        """Lines before the header; ``low`` and ``high`` are corners of the stock box (3,), mm."""
         return ["%"]
 
     def numbered(self, number: int, words: str) -> list[str]:
-        """Behind ``opening``: the number of the program and what it is, where the control has such numbers."""
+        """Lines after ``opening``: number and comment of the program, where the control numbers programs."""
         return []
 
     def closing(self, name: str) -> list[str]:
-        """After the last tool is put away."""
+        """Lines after the last tool is put away."""
         return ["M30", "%"]
 
     def text(self, lines: list[str]) -> str:
-        """All lines as the file holds them."""
+        """All lines as the text of the file."""
         return "\n".join(lines) + "\n"
 
     # states
 
     def label(self, step: str, number: int) -> list[str]:
-        """Where a step can be started: lines before it."""
+        """Lines before a step at which it can be started."""
         return [f"N{number}"]
 
     def modes(self, tolerance: str, turns: bool) -> list[str]:
-        """Units, plane, absolute coordinates, feed by the minute, everything else off.
+        """Units, plane, absolute coordinates, feed per minute; all other functions off.
 
-        tolerance : mm the control may leave the path by;  turns : the program has rotary words
+        tolerance : mm, allowed deviation of the path;  turns : whether the program has rotary words
         """
         return [f"G21 G17 G90 G94 G40 G49 G80 G64 P{tolerance}"]
 
     def state_zero(self, zero: str) -> list[str]:
-        """Count from a zero, a word of ``zeros``."""
+        """Activate a zero, a word of ``zeros``."""
         return [zero]
 
     def aloft(self, letters: str) -> list[str]:
@@ -166,27 +184,27 @@ class Dialect:
         return ["G53 G0 Z0.", "G0 " + " ".join(f"{letter}0." for letter in letters)]
 
     def take(self, number: int, speed: str) -> list[str]:
-        """Put a tool in, its length counted from here on or from ``arrive``; speed in 1/min."""
+        """Load a tool; its length counts from here on or from ``arrive``. ``speed`` in 1/min."""
         return [f"T{number} M6", f"G43 H{number}"]
 
     def fresh(self, number: int) -> list[str]:
-        """Stop for a fresh cutter in the place of the tool that is in the spindle, which stands still."""
+        """Stop, so that the machinist replaces the cutter of the tool in the spindle; the spindle stands."""
         return [*self.comment(f"Fresh cutter in T{number}: change it and set its length"), "M0"]
 
     def spindle(self, speed: str, first: bool, wet: bool) -> list[str]:
-        """Turn clockwise at 1/min; ``first``: and say whether the coolant runs, after a tool was taken.
+        """Turn clockwise, 1/min. With ``first``, after a tool change, the coolant is set too.
 
-        A block has one M word: many controls take no more.
+        A block has one M word, since many controls accept no more.
         """
         return [f"S{speed} M3", *([coolant(wet)] if first else [])]
 
     def rise(self) -> list[str]:
-        """Before a step with the tool that is in the spindle, where ``stop`` leaves it low: up to machine zero."""
+        """Up to machine zero, before a step with the tool in the spindle, where ``stop`` leaves it low."""
         return []
 
     def up(self) -> list[str]:
-        """Behind ``modes`` and the zero of a program of three axes that may be started there: the spindle to machine
-        zero, wherever it stands."""
+        """After ``modes`` and the zero, at a restart point on three axes: the spindle to machine zero from any place.
+        """
         return self.rise()
 
     def stop(self) -> list[str]:
@@ -194,28 +212,36 @@ class Dialect:
         return ["M5", "M9"]
 
     def tcp_on(self, number: int, zero: str) -> list[str]:
-        """From here on the control keeps the tip while rotary axes turn; they stand at 0, the tip over the part."""
+        """Tool centre point control on; rotary axes stand at 0, the tip above the part."""
         return []
 
     def tcp_off(self) -> list[str]:
-        """It does not any more; rotary axes stand at 0, the tip over the part."""
+        """Tool centre point control off; rotary axes stand at 0, the tip above the part."""
         return []
 
     def restated(self, zero: str) -> list[str]:
-        """What has to be said again after ``tcp_off``, with a tool in the spindle, before anything moves."""
+        """Words to repeat after ``tcp_off`` before anything moves, with a tool in the spindle."""
         return []
 
     @property
     def planes(self) -> bool:
-        """Whether steps of a fixed tool axis are written in a plane square to it; the tip is kept all along."""
+        """Whether steps with a fixed tool axis are written in a plane perpendicular to it; the tip is kept throughout.
+        """
         return False
 
     def plane_angles(self, axis: F64) -> tuple[float, float]:
-        """rad about X and about Y that a plane square to a tool axis (3,), unit, is turned by; see ``plane_axes``."""
+        """Angles about X and Y of the plane perpendicular to a tool axis; see ``plane_axes``.
+
+        axis : (3,) float64, unit, setup frame
+
+        Returns rad.
+        """
         return -math.asin(float(axis[1])), math.atan2(float(axis[0]), float(axis[2]))
 
     def plane_axes(self, first: float, second: float) -> F64:
-        """(3, 3): columns are X, Y, Z of the setup frame turned about its X by ``first``, then about its Y, rad.
+        """Axes of the setup frame turned about its X by ``first``, then about its Y by ``second``, rad.
+
+        Returns (3, 3) float64, unit; columns are X, Y, Z of the tilted plane in the setup frame.
 
         >>> np.round(Dialect(Switches()).plane_axes(np.radians(90.0), 0.0) @ [0.0, 0.0, 1.0], 9) + 0.0
         array([ 0., -1.,  0.])
@@ -223,17 +249,18 @@ class Dialect:
         return np.asarray(about_y(second) @ about_x(first))
 
     def plane_on(self, first: int, second: int) -> list[str]:
-        """From here on X, Y, Z count in the frame of ``plane_axes``, grid steps of 0.0001 deg; no axis moves."""
+        """X, Y, Z count in the frame of ``plane_axes`` from here on, angles in grid steps of 0.0001 deg; no axis moves.
+        """
         return []
 
     def plane_off(self) -> list[str]:
-        """They count in the setup frame again; no axis moves."""
+        """X, Y, Z count in the setup frame again; no axis moves."""
         return []
 
     # moves
 
     def arrive(self, number: int, row: str, tcp: bool) -> list[str]:
-        """The first way down after a tool was taken, Z alone; tcp: on a control that will keep the tip."""
+        """The first approach after a tool change, Z alone. ``tcp``: the control will keep the tip."""
         return [f"G0 {row}"]
 
     def straight(self, rows: list[str], rapid: bool, first: bool, feed: str) -> list[str]:
@@ -246,17 +273,17 @@ class Dialect:
         return [" ".join(words), *rows[1:]]
 
     def arc_modes(self) -> list[str]:
-        """Behind ``modes`` in a program with arcs: I and J count from the start of an arc."""
+        """After ``modes`` in a program with arcs: I and J count from the start of an arc."""
         return []
 
     def arc(self, arc: GridArc, feed: str) -> list[str]:
-        """An arc of less than half a turn, or a helix, in the XY plane; feed: mm/min where it changes, else ''."""
+        """An arc of less than half a turn, or a helix, in the XY plane. ``feed``: mm/min where it changes, else ''."""
         (x, y, z), (i, j) = arc.end, arc.offset
         words = [("X", x), ("Y", y), *([("Z", z)] if z != arc.start[2] else []), ("I", i), ("J", j)]
         return [" ".join(["G3" if arc.left else "G2", *(a + self.number(v) for a, v in words),
                           *([self.feed(feed)] if feed else [])])]
 
     def timed(self, rows: list[str], per_minute: Sequence[float]) -> list[str]:
-        """Feed blocks that say how often each would fit into a minute (inverse time)."""
+        """Feed blocks with inverse-time feed: how often each block fits into a minute."""
         blocks = (f"G1 {row} {self.feed(decimal(f, 4))}" for row, f in zip(rows, per_minute, strict=True))
         return ["G93", *blocks, "G94"]

@@ -1,11 +1,9 @@
-"""Fanuc 0i, 30i and their kin.
+"""Fanuc 0i, 30i and related controls.
 
-The length is counted by G43 in the block of the first way down, and on machines
-that turn by G43.4 there, which keeps the tip too: G43 alone may move Z by the
-length of the tool (parameter 5006). For the same reason G49 stands after the
-way home (G28), never above the part. No word of a program bounds what the
-control rounds corners by: parameters do, and G05.1 Q1 where the option is
-there. Numbers have a decimal point, for X10 may mean 0.010 mm (parameter 3401).
+G43 activates the tool length in the block of the first approach. On machines with rotary axes G43.4 does so, and it
+keeps the tip too; G43 alone may move Z by the tool length (parameter 5006). For the same reason G49 stands after the
+return home (G28), never above the part. No word of a program bounds the rounding of corners: parameters do, and G05.1
+Q1 where the option exists. Numbers have a decimal point, since X10 may mean 0.010 mm (parameter 3401).
 """
 
 from __future__ import annotations
@@ -13,13 +11,13 @@ from __future__ import annotations
 from output.gcode.dialects.base import Dialect
 
 NAMED = 40
-"""Characters of what stands beside the number of a program."""
+"""Most characters of the comment beside the number of a program."""
 
 _SIGNS = str.maketrans({"%": "PCT", ";": ",", "{": "[", "}": "]", "\\": "/", "|": "/", "~": "-", "^": "'", "`": "'"})
 
 
 class Fanuc(Dialect):
-    """Comments in capitals, of the characters that all of them show."""
+    """Comments are in capitals, with characters that all of these controls show."""
 
     name, title, ending = "fanuc", "Fanuc", "nc"
     line = 72
@@ -32,47 +30,49 @@ class Fanuc(Dialect):
     tcp_word = "G43.4"
 
     def plain(self, text: str) -> str:
-        """% would end the file and ; the block, on a way of transfer or another; others its code has no sign for."""
+        """Without % and ;, which may end the file or the block during transfer, and without characters outside the
+        code.
+        """
         return super().plain(text).upper().translate(_SIGNS)
 
     def feed(self, value: str) -> str:
-        """With its decimal point."""
+        """With a decimal point."""
         return f"F{value}" if "." in value else f"F{value}."
 
     def path(self, tolerance: str) -> str:
-        """Bounded by parameters."""
+        """Parameters bound the deviation."""
         mode = "G05.1 Q1" if self.switches.high_speed else "G64"
         return f"Path mode {mode}: parameters of the machine say how far the control may leave the written path"
 
     def opening(self, name: str, low: object, high: object) -> list[str]:
-        """The number follows."""
+        """The number comes next."""
         return ["%"]
 
     def numbered(self, number: int, words: str) -> list[str]:
-        """One file of a job would take the place of another in the control if they had the same."""
+        """Each file of a job has its own number, else one would replace another in the control."""
         return [" ".join([f"O{number}", *self.comment(words[:NAMED])[:1 if words else 0]])]
 
     def modes(self, tolerance: str, turns: bool) -> list[str]:
-        """The unit has a block of its own, and the length is given up at home."""
-        slow = ["G05.1 Q0"] if self.switches.high_speed else []  # a run that was broken off may have left it on
+        """The unit has a block of its own; the tool length is cancelled at home."""
+        slow = ["G05.1 Q0"] if self.switches.high_speed else []  # an aborted run may have left it on
         return [*slow, "G21", "G17 G90 G94 G40 G80 G64", *self.home(), "G49"]
 
     def home(self) -> list[str]:
-        """The spindle to its reference point, no other axis."""
+        """The spindle to its reference point; no other axis moves."""
         return ["G91 G28 Z0.", "G90"]
 
     def aloft(self, letters: str) -> list[str]:
-        """``modes`` has sent the spindle home."""
+        """Rotary axes only: ``modes`` has sent the spindle home."""
         return ["G0 " + " ".join(f"{letter}0." for letter in letters)]
 
     def take(self, number: int, speed: str) -> list[str]:
-        """Its length is counted in ``arrive``."""
+        """``arrive`` activates the tool length."""
         return [f"T{number} M6", *(["G05.1 Q1"] if self.switches.high_speed else [])]
 
     def arrive(self, number: int, row: str, tcp: bool) -> list[str]:
-        """With the word that counts the length."""
+        """With the word that activates the tool length."""
         return [f"G0 {self.tcp_word if tcp else 'G43'} {row} H{number}"]
 
     def stop(self) -> list[str]:
-        """Home before the length is given up."""
+        """Home first, then the tool length off."""
         return ["M5", "M9", *self.home(), "G49", *(["G05.1 Q0"] if self.switches.high_speed else [])]

@@ -1,7 +1,8 @@
 """Haas mills.
 
-Like Fanuc, but for the word that keeps the tip (G234 on a UMC; G43.4 on controls that were set up so), further work
-offsets (G154 P) and the rounding of corners, which the program bounds itself (G187 E).
+They are like Fanuc, with three differences. The word of tool centre point control is G234 on a UMC, or G43.4 on
+controls
+set up so. There are further work offsets (G154 P). The program itself bounds the rounding of corners (G187 E).
 """
 
 from __future__ import annotations
@@ -20,13 +21,13 @@ class Haas(Fanuc):
     zeros = ("G54", "G55", "G56", "G57", "G58", "G59", "G154 P1", "G154 P2", "G154 P3")
 
     def __init__(self, switches: Switches) -> None:
-        super().__init__(Switches(False, switches.haas_tcp))  # G187 is no option
+        super().__init__(Switches(False, switches.haas_tcp))  # G187 is not an option
         self.tcp_word = switches.haas_tcp
         self.tcp_words = (f"{self.tcp_word}: the control keeps the tool tip on the part while axes turn; G49: it does "
                           "not any more")
 
     def path(self, tolerance: str) -> str:
-        """Bounded by E."""
+        """E bounds the deviation."""
         return f"Path mode G187 E{tolerance}: the control may leave the written path by that much, in mm"
 
     def modes(self, tolerance: str, turns: bool) -> list[str]:

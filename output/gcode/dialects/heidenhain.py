@@ -1,11 +1,13 @@
 """Heidenhain TNC, conversational.
 
-Every block has its number, from 0 on. A rapid says FMAX in every block, for FMAX holds for one block alone. Zeros are
-rows of the preset table (cycle 247), corners are rounded by no more than the tolerance of cycle 32. The tip is kept
-by M128, which is off (M129) before the spindle goes to machine zero (M91) and before a tool is called. Where the shop
-wants it, steps of a fixed tool axis stand in a tilted plane (PLANE SPATIAL), M128 on and the axes already there (STAY).
-Rotary words go on over 360 deg. An axis whose display does not may then be turned back by a whole turn, as a machine
-parameter has it; with M126 it goes the shorter way, and no block turns by more than half a turn.
+Every block has its number, from 0 on. FMAX holds for one block only, so every rapid repeats it. Zeros are rows of the
+preset table (cycle 247). Cycle 32 bounds the rounding of corners by its tolerance. M128 keeps the tip; it is off (M129)
+before the spindle goes to machine zero (M91) and before a tool is called. Where the shop wants it, steps with a fixed
+tool axis are in a tilted plane (PLANE SPATIAL), with M128 on and the axes already in place (STAY). Rotary words
+continue
+beyond 360 deg. An axis whose display does not may then turn back by a whole turn, depending on a machine parameter.
+With
+M126 it takes the shorter way, and no block turns by more than half a turn.
 """
 
 from __future__ import annotations
@@ -29,24 +31,24 @@ class Heidenhain(Dialect):
     tcp_words = "M128: the control keeps the tool tip on the part while axes turn; M129: it does not any more"
 
     def number(self, value: int) -> str:
-        """With its sign."""
+        """With a sign."""
         text = super().number(value).removesuffix(".")
         return text if value < 0 else f"+{text}"
 
     def comment(self, text: str) -> list[str]:
-        """From a semicolon on."""
+        """After a semicolon."""
         return [f"; {c[1:-1]}" for c in super().comment(text)]
 
     def plain(self, text: str) -> str:
-        """A ~ at the end of a line would go on in the next."""
+        """Without ~, which at the end of a line continues the block."""
         return text.replace("~", "-")
 
     def path(self, tolerance: str) -> str:
-        """Bounded by cycle 32."""
+        """Cycle 32 bounds the deviation."""
         return f"Path mode cycle 32 T{tolerance}: the control may leave the written path by that much, in mm"
 
     def opening(self, name: str, low: Sequence[float], high: Sequence[float]) -> list[str]:
-        """The name and the blank, from which the control draws its picture."""
+        """The name, and the blank for the graphics of the control."""
         corner = [" ".join(f"{a}{self.number(round(v * 1000) * 10)}" for a, v in zip("XYZ", p, strict=True))
                   for p in (low, high)]
         return [f"BEGIN PGM {_name(name)} MM", f"BLK FORM 0.1 Z {corner[0]}", f"BLK FORM 0.2 {corner[1]}"]
@@ -56,7 +58,7 @@ class Heidenhain(Dialect):
         return ["M30", f"END PGM {_name(name)} MM"]
 
     def text(self, lines: list[str]) -> str:
-        """Numbered; lines that go on from the one before stand aside."""
+        """Numbered; continuation lines have no number."""
         out, count = [], 0
         for line in lines:
             if line.startswith(" "):
@@ -67,11 +69,11 @@ class Heidenhain(Dialect):
         return "\n".join(out) + "\n"
 
     def label(self, step: str, number: int) -> list[str]:
-        """A label by name."""
+        """A named label."""
         return [f'LBL "{step}"']
 
     def modes(self, tolerance: str, turns: bool) -> list[str]:
-        """Units, plane and absolute coordinates are what they are; cycle 32 for the path, in its finishing mode."""
+        """Cycle 32 for the path, in its finishing mode; units, plane and absolute coordinates are fixed."""
         way = ["CYCL DEF 32.0 TOLERANCE", f"CYCL DEF 32.1 T{tolerance}"]
         if not turns:
             return way
@@ -82,7 +84,7 @@ class Heidenhain(Dialect):
         return ["CYCL DEF 247 DATUM SETTING ~", f"    Q339=+{zero.split()[1]} ;DATUM NUMBER"]
 
     def aloft(self, letters: str) -> list[str]:
-        """In coordinates of the machine."""
+        """In machine coordinates."""
         return ["L Z+0 R0 FMAX M91", "L " + " ".join(f"{letter}+0" for letter in letters) + " R0 FMAX"]
 
     def take(self, number: int, speed: str) -> list[str]:
@@ -90,19 +92,19 @@ class Heidenhain(Dialect):
         return [f"TOOL CALL {number} Z S{speed}"]
 
     def spindle(self, speed: str, first: bool, wet: bool) -> list[str]:
-        """The tool was called with its speed; another one is a call without a tool."""
+        """The tool call has set the speed; another speed is a call without a tool."""
         return ["M3", coolant(wet)] if first else [f"TOOL CALL S{speed}"]
 
     def up(self) -> list[str]:
-        """In coordinates of the machine."""
+        """In machine coordinates."""
         return ["L Z+0 R0 FMAX M91"]
 
     def stop(self) -> list[str]:
-        """Up in coordinates of the machine."""
+        """Up in machine coordinates."""
         return ["M5", "M9", "L Z+0 R0 FMAX M91"]
 
     def tcp_on(self, number: int, zero: str) -> list[str]:
-        """From its own block on."""
+        """It needs its own block."""
         return ["M128"]
 
     def tcp_off(self) -> list[str]:
@@ -111,15 +113,15 @@ class Heidenhain(Dialect):
 
     @property
     def planes(self) -> bool:
-        """As the shop says."""
+        """A setting of the shop."""
         return self.switches.planes
 
     def plane_on(self, first: int, second: int) -> list[str]:
-        """Without a preferred side the control takes the place of the axes that is nearest: where they stand."""
+        """Without a preferred side the control takes the nearest solution, which is where the axes stand."""
         return [f"PLANE SPATIAL SPA{self.number(first)} SPB{self.number(second)} SPC+0 STAY"]
 
     def plane_off(self) -> list[str]:
-        """The plane alone; M128 stays."""
+        """The plane only; M128 stays on."""
         return ["PLANE RESET STAY"]
 
     def arrive(self, number: int, row: str, tcp: bool) -> list[str]:
@@ -134,7 +136,7 @@ class Heidenhain(Dialect):
         return [f"{out[0]} R0 F{feed}" if feed else out[0], *out[1:]]
 
     def arc(self, arc: GridArc, feed: str) -> list[str]:
-        """C round CC; a helix is there in polar coordinates alone, by the angle it goes on."""
+        """C around CC. A helix exists in polar coordinates only, with its incremental angle."""
         number, sense = self.number, "+" if arc.left else "-"
         x, y, z = arc.end
         words = f"C X{number(x)} Y{number(y)}"
@@ -144,10 +146,16 @@ class Heidenhain(Dialect):
                 f"{words} DR{sense}" + (f" R0 F{feed}" if feed else "")]
 
     def timed(self, rows: list[str], per_minute: Sequence[float]) -> list[str]:
-        """There is no word for it."""
-        raise OutputError("Heidenhain has no inverse-time feed, and the joints of a turning cut have no even one",
+        """The control has no inverse-time feed.
+
+        Raises
+        ------
+        OutputError
+            no_inverse_time: always.
+        """
+        raise OutputError("Heidenhain has no inverse-time feed, which a turning cut with joint positions needs",
                           code="no_inverse_time", subjects=("machine.tcp",), measured=decimal(per_minute[0]),
-                          remedy="say machine.tcp true and let the control keep the tip (M128), or set "
+                          remedy="set machine.tcp true so that the control keeps the tip (M128), or set "
                                  "machine.simultaneous false")
 
 

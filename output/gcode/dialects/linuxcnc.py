@@ -1,11 +1,10 @@
 """LinuxCNC.
 
-Path mode: G64 P, not G61. G61 brakes at every corner of a polyline with
-thousands of short segments and leaves dwell marks; G64 without P would round
-corners as far as the acceleration needs. Q0, for without a Q the control leaves
-points out by P as well, and rounds the corners of what is left by P more. Tool centre point control is a switch
-of the kinematics (M428, M429). A tool that is in the spindle is not changed by
-its own T and M6, so a fresh cutter is taken by putting the old one away.
+Path mode is G64 P, not G61: G61 brakes at every corner of a polyline of many short segments and leaves dwell marks. G64
+without P rounds corners as far as the acceleration needs. Q0 is stated because without Q the control drops points
+within P and then rounds the corners of the rest by P again. Tool centre point control is a switch of the kinematics
+(M428, M429). T and M6 do not change a tool that is already in the spindle, so the program first puts it away to get a
+fresh cutter.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ _ACTIVE = re.compile(r"^(msg|debug|print|log\w*|probe\w*|py|abort|warning)\s*[,;
 
 
 class LinuxCnc(Dialect):
-    """LinuxCNC 2.8 and later; its interpreter rs274 reads what is written here (``tests/contract``)."""
+    """LinuxCNC 2.8 and later; its interpreter rs274 reads these programs (``tests/contract``)."""
 
     name, title, ending = "linuxcnc", "LinuxCNC", "ngc"
     tcp_words = "M428: the control keeps the tool tip on the part while axes turn; M429: it does not any more"
@@ -26,32 +25,32 @@ class LinuxCnc(Dialect):
     needs_restart = ("Every step begins at machine zero of Z, which is taken to be the top of its travel",)
 
     def comment(self, text: str) -> list[str]:
-        """Never one of the comments that act."""
+        """Never one of the active comments."""
         return [f"(- {c[1:]}" if _ACTIVE.match(c[1:]) else c for c in super().comment(text)]
 
     def fresh(self, number: int) -> list[str]:
-        """The tool is put away first, as the control takes no tool that it has."""
+        """The tool is put away first, since the control does not load a tool that it holds."""
         return ["T0 M6", *super().fresh(number)]
 
     def spindle(self, speed: str, first: bool, wet: bool) -> list[str]:
-        """Both M words in one block: they are of two groups."""
+        """Both M words in one block: they belong to two groups."""
         return [" ".join(super().spindle(speed, first, wet))]
 
     def modes(self, tolerance: str, turns: bool) -> list[str]:
-        """A shift by G92 or G52 outlives the program that made it, and even the control's being switched off."""
+        """G92.1, since a shift by G92 or G52 outlives its program and even a restart of the control."""
         words = super().modes(tolerance, turns)
         return [*words[:-1], f"{words[-1]} Q0", "G92.1"]
 
     def path(self, tolerance: str) -> str:
-        """Bounded by P, as Q is 0."""
+        """P bounds the deviation, as Q is 0."""
         return f"Path mode G64 P{tolerance} Q0: the control may leave the written path by P, in mm"
 
     def arc_modes(self) -> list[str]:
-        """G90.1 of a run before may still be in force."""
+        """G91.1, since G90.1 of an earlier run may still be active."""
         return ["G91.1"]
 
     def rise(self) -> list[str]:
-        """The control itself goes up to change a tool, but not for one that it has."""
+        """The control rises by itself for a tool change, but not for the tool that it holds."""
         return ["G53 G0 Z0."]
 
     def tcp_on(self, number: int, zero: str) -> list[str]:

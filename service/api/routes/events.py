@@ -1,8 +1,9 @@
 """GET /v1/jobs/{id}/events: server-sent events, a few a second, ending with the final state.
 
-An event's id is the job's change counter. Whoever connects, or comes back with Last-Event-ID, first gets the job as
-it stands unless that event is what they had last; a client that comes back after the final event gets 204, which
-tells an EventSource to stop.
+The id of an event is the change counter of the job. A client that connects first gets the current state of the job.
+With
+Last-Event-ID it gets that state only where it has changed since. After the final event it gets 204, which tells an
+EventSource to stop.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from sqlalchemy.engine import RowMapping
 from starlette.concurrency import run_in_threadpool
 
 from schemas.jobs import FINAL_STATES
-from service.api.principals import Principal, Who
+from service.api.principals import Caller, Principal
 from service.api.problems import responses
 from service.errors import NotFoundError, RateError, RequestError, UnauthorizedError
 from service.jobs.database import AWAY
@@ -36,31 +37,37 @@ KEY_LOOK_S = 5.0
 STREAM: dict[int | str, dict[str, Any]] = {
     200: {"description": "Events 'progress' and, once, 'end'; data is a JobEvent.",
           "content": {"text/event-stream": {"schema": {"type": "string"}}}},
-    204: {"description": "Last-Event-ID was the final event."}}
+    204: {"description": "Last-Event-ID is the final event."}}
 
 
 @router.get("/{job_id}/events", operation_id="followJob", summary="Follow a job", response_class=StreamingResponse,
             responses=STREAM | responses(UnauthorizedError, NotFoundError, RequestError, RateError))
-async def follow(request: Request, principal: Principal, who: Who, job_id: str,
+async def follow(request: Request, principal: Principal, caller: Caller, job_id: str,
                  last: Annotated[str | None, Header(alias="Last-Event-ID", max_length=20)] = None) -> Response:
-    """Progress of a job until it ends."""
+    """Progress of a job until it ends.
+
+    Raises
+    ------
+    RateError
+        The principal has too many open streams.
+    """
     row = await run_in_threadpool(request.app.state.engine.jobs.get, job_id, principal)
-    # isdecimal also holds for other scripts' digits; an id of ours is ASCII
+    # isdecimal also accepts digits of other scripts; ids are ASCII
     seen = int(last) if last is not None and last.isascii() and last.isdecimal() else -1
     if row["state"] in FINAL_STATES and row["event_seq"] == seen:
         return Response(status_code=204)
     streams: Counter[str] = request.app.state.streams
     most = request.app.state.settings.max_streams_each
     if streams[principal] >= most:
-        raise RateError(f"{most} event streams of yours are open", code="too_many_streams", limit=most,
-                        remedy="close some, or ask for the job now and then", retry_after_s=10)
-    stream = _counted(streams, principal, _stream(request, row, seen, who.key_id))
+        raise RateError(f"{most} of your event streams are open", code="too_many_streams", limit=most,
+                        remedy="close some streams, or poll the job instead", retry_after_s=10)
+    stream = _counted(streams, principal, _stream(request, row, seen, caller.key_id))
     return StreamingResponse(stream, media_type="text/event-stream",
                              headers={"Cache-Control": "no-cache", "X-Accel-Buffering": "no"})
 
 
 async def _counted(streams: Counter[str], principal: str, stream: AsyncIterator[bytes]) -> AsyncIterator[bytes]:
-    """A stream that counts from its first event to its end, however it ends."""
+    """A stream that counts as open from its first event to its end."""
     streams[principal] += 1
     try:
         async for event in stream:
@@ -89,8 +96,8 @@ async def _stream(request: Request, row: RowMapping, seen: int, key_id: str | No
             if key_id is not None and time.monotonic() - looked > KEY_LOOK_S:
                 looked = time.monotonic()
                 if not await run_in_threadpool(keys.is_live, key_id):
-                    return  # revoked or expired: who comes back is asked again
+                    return  # revoked or expired: a new connection checks the key again
             row = await run_in_threadpool(jobs.get, row["id"])
         except AWAY as error:
-            log.warning("a stream ends, for the database does not answer", error=type(error).__name__)
-            return  # who comes back gets 503 until it does
+            log.warning("a stream ends because the database does not answer", error=type(error).__name__)
+            return  # a new connection gets 503 until the database answers

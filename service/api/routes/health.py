@@ -1,4 +1,4 @@
-"""/healthz, /readyz, /metrics: for whoever runs the service."""
+"""/healthz, /readyz, /metrics: for operators."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ router = APIRouter(tags=["operation"])
 
 
 @router.get("/healthz", operation_id="healthz")
-async def healthz() -> Health:  # without a thread: those may all wait for the database
+async def healthz() -> Health:  # without a thread: all threads may wait for the database
     """The process answers."""
     return Health(status="ok")
 
 
 @router.get("/readyz", operation_id="readyz", responses={503: {"model": Health, "description": "Not ready."}})
 def readyz(request: Request, response: Response) -> Health:
-    """Database and engine answer, the data folder can be written to and has room; 503 names what does not."""
+    """Check database, engine, data folder and free disk space; 503 names what fails."""
     checks = request.app.state.engine.ready()
     if all(text == "ok" for text in checks.values()):
         return Health(status="ok", checks=checks)

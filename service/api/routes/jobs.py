@@ -41,16 +41,16 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
 ONE = responses(UnauthorizedError, NotFoundError, RequestError)
 SENT: dict[int | str, dict[str, Any]] = responses(RangeError) | {
-    206: {"description": "The parts of it that Range names, if If-Range allows."},
-    304: {"description": "If-None-Match names what the client has."}}
+    206: {"description": "The parts that Range requests, if If-Range allows."},
+    304: {"description": "If-None-Match names the version that the client has."}}
 RESULT = responses(UnauthorizedError, NotFoundError, RequestError, NotReadyError, GoneError)
 
 
 Labels = Annotated[list[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}:[^\x00-\x1f\x7f]{0,200}$")]],
-                   Query(max_length=8, description="KEY:VALUE of a label; of several all have to be there.",
+                   Query(max_length=8, description="KEY:VALUE of a label; several labels must all match.",
                          examples=[["order:4711"]])]
-Time = Annotated[datetime | None, Query(description="When it was posted: from this time on, or before it; ISO 8601, "
-                                                    "UTC where no zone is named.")]
+Time = Annotated[datetime | None, Query(description="Time of posting: from this time on, or before it; ISO 8601, UTC "
+                                                    "where no time zone is given.")]
 
 
 def _seconds(time: datetime | None) -> float | None:
@@ -65,7 +65,7 @@ def list_jobs(request: Request, principal: Principal, limit: Annotated[int, Quer
               cursor: Annotated[str | None, Query(max_length=100)] = None, state: JobState | None = None,
               kind: JobKind | None = None, label: Labels = [],  # noqa: B006
               created_from: Time = None, created_to: Time = None) -> JobPage:
-    """A page of jobs that are all of what is asked for; pages do not shift when jobs are added."""
+    """A page of jobs that match all filters. Pages do not shift when jobs are added."""
     before = decode_cursor(cursor) if cursor is not None else None
     rows = request.app.state.engine.jobs.page(
         principal, limit=limit + 1, before=before, state=state, kind=kind, since=_seconds(created_from),
@@ -82,9 +82,9 @@ def get_job(request: Request, principal: Principal, job_id: str) -> Job:
 
 @router.delete("/{job_id}", operation_id="cancelJob", summary="Cancel a job", responses=ONE)
 def cancel_job(request: Request, principal: Submitter, job_id: str, purge: Annotated[bool, Query(
-        description="Let go of its files too, also where it has ended before: they are answered with 410 from now on "
-                    "and removed within hours, unless another job has the same.")] = False) -> Job:
-    """Cancel a job that has not ended; one that has ended is answered as it is."""
+        description="Also delete the files of the job, even where it has ended before. They answer 410 at once and are "
+                    "removed within hours, unless another job has the same files.")] = False) -> Job:
+    """Cancel a job that has not ended. A job that has ended is returned unchanged."""
     jobs = request.app.state.engine.jobs
     jobs.get(job_id, principal)
     jobs.cancel(job_id)
@@ -103,13 +103,13 @@ def get_zones(request: Request, principal: Principal, job_id: str) -> Response:
 @router.get("/{job_id}/report", operation_id="getReport", summary="report.json", responses=RESULT | SENT,
             response_model=Report | Verification)
 def get_report(request: Request, principal: Principal, job_id: str) -> Response:
-    """The plan and its proof; of a verification, its findings."""
+    """The plan and its proof; for a verification, its findings."""
     return _document(request, principal, job_id, "report.json")
 
 
 @router.get("/{job_id}/files", operation_id="listFiles", summary="Files of a job", responses=RESULT)
 def get_files(request: Request, principal: Principal, job_id: str) -> JobFiles:
-    """All files that may be handed out."""
+    """All files that can be downloaded."""
     row = request.app.state.engine.jobs.get(job_id, principal)
     return list_files(result_folder(request.app.state.engine.artifacts, row), row)
 
@@ -117,27 +117,27 @@ def get_files(request: Request, principal: Principal, job_id: str) -> JobFiles:
 FILE_OK: dict[int | str, dict[str, Any]] = {200: {
     "description": "The file; ETag is its SHA-256.",
     "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}},
-    206: {"description": "The parts of it that Range names, if If-Range allows.",
+    206: {"description": "The parts that Range requests, if If-Range allows.",
           "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}}}
 
 
 @router.get("/{job_id}/files/{name}", operation_id="getFile", summary="One file", response_class=FileResponse,
             responses=RESULT | SENT | FILE_OK | responses(NotReadyError, WithheldError))
 def get_file(request: Request, principal: Principal, job_id: str, name: str) -> Response:
-    """A file, or with Range parts of it. Programs and STEP-NC of a job that is not proved are withheld (409)."""
+    """A file, or parts of it with Range. Programs and STEP-NC of a job that is not proved are withheld (409)."""
     row = request.app.state.engine.jobs.get(job_id, principal)
     path = find_file(result_folder(request.app.state.engine.artifacts, row), row, name)
     return _sent(request, path, media_type(name), filename=name)
 
 
 def _is_known(request: Request, etag: str) -> bool:
-    """Whether If-None-Match holds this entity tag; the comparison is the weak one (RFC 9110, 13.1.2)."""
+    """Whether If-None-Match contains this entity tag, by the weak comparison (RFC 9110, 13.1.2)."""
     given = [t.strip().removeprefix("W/") for t in request.headers.get("if-none-match", "").split(",")]
     return etag in given or given == ["*"]
 
 
 def _document(request: Request, principal: str, job_id: str, name: str) -> Response:
-    """The bytes of a JSON result, as the child wrote them."""
+    """The bytes of a JSON result, as the job process wrote them."""
     engine = request.app.state.engine
     row = engine.jobs.get(job_id, principal)
     path = result_folder(engine.artifacts, row) / name
@@ -148,7 +148,7 @@ def _document(request: Request, principal: str, job_id: str, name: str) -> Respo
 
 
 def _sent(request: Request, path: Path, media: str, filename: str | None = None) -> Response:
-    """A file of a result, whole, in parts, or not at all where the client has it."""
+    """A file of a result: whole, in parts, or not at all where the client has it."""
     headers = {"ETag": f'"{file_sha256(path)}"', "X-Content-Type-Options": "nosniff"}
     if _is_known(request, headers["ETag"]):
         return Response(status_code=304, headers=headers)

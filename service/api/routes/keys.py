@@ -21,14 +21,14 @@ KeyId = Annotated[str, Path(pattern="^[0-9a-f]{12}$", description="Id of the key
 
 @router.get("", operation_id="listKeys", summary="All keys", responses=responses(UnauthorizedError))
 def list_keys(request: Request, _: Admin) -> KeyList:
-    """Every key without its secret, also those that were revoked."""
+    """Every key without its secret, including revoked ones."""
     return KeyList(items=[key_resource(row) for row in request.app.state.engine.keys.all()])
 
 
 @router.post("", operation_id="createKey", summary="Make a key", status_code=status.HTTP_201_CREATED,
              responses=responses(UnauthorizedError, RequestError, TooLargeError))
 def create_key(request: Request, admin: Admin, new: NewKey) -> MadeKey:
-    """Make a key. Its text stands in this answer and nowhere else. The first one ends the time without keys."""
+    """Create a key. Its text is in this answer only. The first key ends access without keys."""
     text, row = request.app.state.engine.keys.make(new.principal, new.scopes, new.days, new.note)
     log.info("key made", key=row["id"], principal=new.principal, scopes=row["scopes"], by=admin)
     return MadeKey(key=text, about=key_resource(row))
@@ -37,6 +37,6 @@ def create_key(request: Request, admin: Admin, new: NewKey) -> MadeKey:
 @router.delete("/{key_id}", operation_id="revokeKey", summary="Revoke a key", status_code=204,
                responses=responses(UnauthorizedError, NotFoundError, RequestError))
 def revoke_key(request: Request, admin: Admin, key_id: KeyId) -> None:
-    """End a key now. Its row stays; a second time changes nothing."""
+    """Revoke a key now. It stays in the list; a second call changes nothing."""
     request.app.state.engine.keys.revoke(key_id)
     log.info("key revoked", key=key_id, by=admin)

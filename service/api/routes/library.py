@@ -1,7 +1,7 @@
-"""/v1/tools, /v1/machines, /v1/materials: entries that a setup refers to as "lib:NAME", or "lib:NAME@3".
+"""/v1/tools, /v1/machines, /v1/materials: entries to which a setup refers as "lib:NAME" or "lib:NAME@3".
 
-Who writes an entry owns it. A job keeps the entry as it was when the job was posted, and says which versions it used:
-later changes of the library change no job.
+The principal that writes an entry owns it. A job keeps the entry as it was when the job was posted, and lists the
+versions it used. Later changes of the library change no job.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from schemas.jobs import MachineEntry, MachineList, MaterialEntry, MaterialList,
 from schemas.machine import Machine
 from schemas.materials import MATERIALS, Material
 from schemas.tools import Tool
-from service.api.principals import Principal, Who, require
+from service.api.principals import Caller, Principal, require
 from service.api.problems import responses
 from service.errors import NotFoundError, RequestError, TooLargeError, UnauthorizedError
 from service.jobs.api_keys import ADMIN, SUBMIT, Identity
@@ -24,11 +24,11 @@ from service.jobs.resources import time_text
 
 router = APIRouter(prefix="/v1", tags=["libraries"])
 
-Name = Annotated[str, Path(pattern=NAME_PATTERN, description="Name of the entry; a setup says lib:NAME.")]
+Name = Annotated[str, Path(pattern=NAME_PATTERN, description="Name of the entry; a setup refers to it as lib:NAME.")]
 MaterialName = Annotated[str, Path(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,63}$",
-                                   description="Name as GET /v1/materials lists it; built-in ones may have blanks.")]
-Version = Annotated[int | None, Query(ge=1, le=10**9, description="A version that is not the newest.")]
-Shared = Annotated[bool, Query(description="The entry of all principals rather than one's own; for admins.")]
+                                   description="Name as in GET /v1/materials; built-in names may have spaces.")]
+Version = Annotated[int | None, Query(ge=1, le=10**9, description="Version of the entry; default: the newest.")]
+Shared = Annotated[bool, Query(description="The entry that all principals share, not your own; for admins.")]
 READ = responses(UnauthorizedError)
 ONE = responses(UnauthorizedError, NotFoundError, RequestError)
 WRITE = responses(UnauthorizedError, RequestError, TooLargeError) | {201: {"description": "The name is new."}}
@@ -44,15 +44,15 @@ def _about(entry: Entry) -> dict[str, Any]:
             "created_at": time_text(entry.created)}
 
 
-def _owner(who: Identity, shared: bool) -> str:
-    """Whose entries a request writes; shared ones are for admins."""
-    require(who, ADMIN if shared else SUBMIT)
-    return SHARED if shared else who.principal
+def _owner(caller: Identity, shared: bool) -> str:
+    """Owner of the entries that a request writes; only admins write shared ones."""
+    require(caller, ADMIN if shared else SUBMIT)
+    return SHARED if shared else caller.principal
 
 
-def _put(request: Request, response: Response, who: Identity, shelf: str, name: str, shared: bool,
+def _put(request: Request, response: Response, caller: Identity, shelf: str, name: str, shared: bool,
          value: Tool | Machine | Material) -> dict[str, Any]:
-    entry, new = _library(request).put(_owner(who, shared), shelf, name, value.model_dump(mode="json"))
+    entry, new = _library(request).put(_owner(caller, shared), shelf, name, value.model_dump(mode="json"))
     response.status_code = status.HTTP_201_CREATED if new else status.HTTP_200_OK
     return _about(entry)
 
@@ -71,64 +71,64 @@ def _material(entry: Entry) -> MaterialEntry:
 
 @router.get("/tools", operation_id="listTools", responses=READ)
 def list_tools(request: Request, principal: Principal) -> ToolList:
-    """The newest version of every tool you can refer to."""
+    """The newest version of every tool that you can use."""
     return ToolList(items=[_tool(e) for e in _library(request).all(principal, "tools")])
 
 
 @router.get("/tools/{name}", operation_id="getTool", responses=ONE)
 def get_tool(request: Request, principal: Principal, name: Name, version: Version = None) -> ToolEntry:
-    """One tool: yours of that name, else the shared one."""
+    """One tool: your own with that name, otherwise the shared one."""
     return _tool(_library(request).get(principal, "tools", name, version))
 
 
 @router.put("/tools/{name}", operation_id="putTool", responses=WRITE)
-def put_tool(request: Request, response: Response, who: Who, name: Name, tool: Tool,
+def put_tool(request: Request, response: Response, caller: Caller, name: Name, tool: Tool,
              shared: Shared = False) -> ToolEntry:
-    """Write a tool; what is not as the newest version becomes the next one."""
-    return ToolEntry(**_put(request, response, who, "tools", name, shared, tool), entry=tool)
+    """Write a tool. A change creates the next version."""
+    return ToolEntry(**_put(request, response, caller, "tools", name, shared, tool), entry=tool)
 
 
 @router.delete("/tools/{name}", operation_id="deleteTool", status_code=204, responses=ONE)
-def delete_tool(request: Request, who: Who, name: Name, shared: Shared = False) -> None:
-    """Remove a tool with all its versions; jobs keep what they used."""
-    _library(request).delete(_owner(who, shared), "tools", name)
+def delete_tool(request: Request, caller: Caller, name: Name, shared: Shared = False) -> None:
+    """Delete a tool with all its versions. Jobs keep the versions that they used."""
+    _library(request).delete(_owner(caller, shared), "tools", name)
 
 
 @router.get("/machines", operation_id="listMachines", responses=READ)
 def list_machines(request: Request, principal: Principal) -> MachineList:
-    """The newest version of every machine you can refer to."""
+    """The newest version of every machine that you can use."""
     return MachineList(items=[_machine(e) for e in _library(request).all(principal, "machines")])
 
 
 @router.get("/machines/{name}", operation_id="getMachine", responses=ONE)
 def get_machine(request: Request, principal: Principal, name: Name, version: Version = None) -> MachineEntry:
-    """One machine: yours of that name, else the shared one."""
+    """One machine: your own with that name, otherwise the shared one."""
     return _machine(_library(request).get(principal, "machines", name, version))
 
 
 @router.put("/machines/{name}", operation_id="putMachine", responses=WRITE)
-def put_machine(request: Request, response: Response, who: Who, name: Name, machine: Machine,
+def put_machine(request: Request, response: Response, caller: Caller, name: Name, machine: Machine,
                 shared: Shared = False) -> MachineEntry:
-    """Write a machine; what is not as the newest version becomes the next one."""
-    return MachineEntry(**_put(request, response, who, "machines", name, shared, machine), entry=machine)
+    """Write a machine. A change creates the next version."""
+    return MachineEntry(**_put(request, response, caller, "machines", name, shared, machine), entry=machine)
 
 
 @router.delete("/machines/{name}", operation_id="deleteMachine", status_code=204, responses=ONE)
-def delete_machine(request: Request, who: Who, name: Name, shared: Shared = False) -> None:
-    """Remove a machine with all its versions; jobs keep what they used."""
-    _library(request).delete(_owner(who, shared), "machines", name)
+def delete_machine(request: Request, caller: Caller, name: Name, shared: Shared = False) -> None:
+    """Delete a machine with all its versions. Jobs keep the versions that they used."""
+    _library(request).delete(_owner(caller, shared), "machines", name)
 
 
 @router.get("/materials", operation_id="listMaterials", responses=READ)
 def list_materials(request: Request, principal: Principal) -> MaterialList:
-    """Built-in materials, then the newest version of every one you can refer to."""
+    """Built-in materials, then the newest version of every material that you can use."""
     own = [_material(e) for e in _library(request).all(principal, "materials")]
     return MaterialList(items=[MaterialEntry(name=n, entry=m, built_in=True) for n, m in MATERIALS.items()] + own)
 
 
 @router.get("/materials/{name}", operation_id="getMaterial", responses=ONE)
 def get_material(request: Request, principal: Principal, name: MaterialName, version: Version = None) -> MaterialEntry:
-    """One material: yours of that name, else the shared one, else the built-in one."""
+    """One material: your own with that name, otherwise the shared one, otherwise the built-in one."""
     try:
         return _material(_library(request).get(principal, "materials", name, version))
     except NotFoundError:
@@ -138,13 +138,13 @@ def get_material(request: Request, principal: Principal, name: MaterialName, ver
 
 
 @router.put("/materials/{name}", operation_id="putMaterial", responses=WRITE)
-def put_material(request: Request, response: Response, who: Who, name: Name, material: Material,
+def put_material(request: Request, response: Response, caller: Caller, name: Name, material: Material,
                  shared: Shared = False) -> MaterialEntry:
-    """Write a material; what is not as the newest version becomes the next one."""
-    return MaterialEntry(**_put(request, response, who, "materials", name, shared, material), entry=material)
+    """Write a material. A change creates the next version."""
+    return MaterialEntry(**_put(request, response, caller, "materials", name, shared, material), entry=material)
 
 
 @router.delete("/materials/{name}", operation_id="deleteMaterial", status_code=204, responses=ONE)
-def delete_material(request: Request, who: Who, name: Name, shared: Shared = False) -> None:
-    """Remove a material with all its versions from the library; jobs keep what they used."""
-    _library(request).delete(_owner(who, shared), "materials", name)
+def delete_material(request: Request, caller: Caller, name: Name, shared: Shared = False) -> None:
+    """Delete a material with all its versions. Jobs keep the versions that they used."""
+    _library(request).delete(_owner(caller, shared), "materials", name)

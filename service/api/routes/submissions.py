@@ -1,4 +1,4 @@
-"""POST /v1/jobs, /v1/zones, /v1/verifications: the same chain, whole or cut short; each answers 202 with a job."""
+"""POST /v1/jobs, /v1/zones, /v1/verifications: each queues a job for all or part of the pipeline, and answers 202."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ IdempotencyKey = Annotated[str | None, Header(
 ERRORS = responses(ServiceError, StepError, SetupError, ProgramError, RequestError, KeyConflictError, TooLargeError,
                    UnauthorizedError, RateError, MethodError, UnavailableError)
 ACCEPTED: dict[int | str, dict[str, Any]] = {202: {
-    "description": "The job; its path stands in Location.",
+    "description": "The job; its path is in Location.",
     "headers": {"Location": {"description": "Path of the job.", "schema": {"type": "string"}}}}}
 
 
 def multipart(with_program: bool) -> dict[str, Any]:
-    """OpenAPI request body of a submission: ``setup`` is typed, so clients build it from classes."""
+    """OpenAPI request body of a submission: ``setup`` is typed, so that clients build it from classes."""
     properties: dict[str, Any] = {
         "part": {"type": "string", "format": "binary", "description": "The STEP file (ISO 10303-21)."},
         "setup": {"$ref": "#/components/schemas/Setup"},
@@ -46,28 +46,30 @@ def multipart(with_program: bool) -> dict[str, Any]:
                 "setup": {"contentType": "application/json"}}
     if with_program:
         properties["program"] = {"type": "string", "format": "binary",
-                                 "description": "The NC program of a control that machine.dialects of the setup names; "
-                                                "Siemens and Heidenhain programs are known by their own words. Or "
-                                                "STEP-NC, AP238 or ISO 14649, known by the FILE_SCHEMA of its header."}
+                                 "description": "The NC program, for a control that machine.dialects of the setup "
+                                                "names; Siemens and Heidenhain programs are also recognized by their "
+                                                "words. Or STEP-NC, AP238 or ISO 14649, recognized by the FILE_SCHEMA "
+                                                "of its header."}
         encoding["program"] = {"contentType": "text/plain, model/step, application/octet-stream"}
     required = list(properties)
     properties["stock"] = {
         "type": "string", "format": "binary",
-        "description": "The STEP file of the blank; sent where the setup says stock.kind 'step', and only then."}
+        "description": "The STEP file of the blank; required where the setup has stock.kind 'step', not allowed "
+                       "otherwise."}
     encoding["stock"] = {"contentType": "model/step, application/step, application/octet-stream"}
     if with_program:
         properties["spindle_tool"] = {
             "type": "integer", "minimum": 0, "maximum": 999999, "default": 0,
-            "description": "T number of the tool that stands in the spindle, its length offset on, before the first "
-                           "line of the program; 0 for none."}
+            "description": "T number of the tool in the spindle before the first line of the program, with its length "
+                           "offset on; 0: none."}
     properties["deadline_s"] = {
         "type": "number", "minimum": DEADLINE_S[0], "maximum": DEADLINE_S[1],
-        "description": "Seconds from now by which the job has to have ended; one that has not is stopped and fails "
-                       "with deadline_exceeded. No part of the content."}
+        "description": "Seconds from now until which the job must end. A job that takes longer is stopped and fails "
+                       "with deadline_exceeded. Not part of the content hash."}
     properties["webhook_url"] = {
         "type": "string", "format": "uri", "maxLength": 2000,
-        "description": "Called once with a POST when the job has ended: signed, tried again until it is answered with "
-                       "2xx (docs/service.md). Only to origins that the service allows. No part of the content."}
+        "description": "Receives one signed POST when the job has ended, repeated until the answer is 2xx "
+                       "(docs/service.md). The service must allow its origin. Not part of the content hash."}
     schema = {"type": "object", "title": "VerificationSubmission" if with_program else "Submission",
               "properties": properties, "required": required, "additionalProperties": False}
     return {"requestBody": {"required": True, "content": {"multipart/form-data": {
@@ -89,15 +91,15 @@ async def _submit(request: Request, response: Response, kind: str, principal: st
 @router.post("/jobs", status_code=status.HTTP_202_ACCEPTED, operation_id="createJob", summary="Plan and prove a part",
              responses=ACCEPTED | ERRORS, openapi_extra=multipart(False))
 async def create_job(request: Request, response: Response, principal: Submitter, key: IdempotencyKey = None) -> Job:
-    """Queue the whole chain: zones, tool paths, program, proof."""
+    """Queue a plan with its proof: zones, tool paths, programs, simulation."""
     return await _submit(request, response, "plan", principal, key)
 
 
-@router.post("/zones", status_code=status.HTTP_202_ACCEPTED, operation_id="createZones", summary="Dry check of a part",
-             responses=ACCEPTED | ERRORS, openapi_extra=multipart(False))
+@router.post("/zones", status_code=status.HTTP_202_ACCEPTED, operation_id="createZones",
+             summary="Quick check of a part", responses=ACCEPTED | ERRORS, openapi_extra=multipart(False))
 async def create_zones(request: Request, response: Response, principal: Submitter,
                        key: IdempotencyKey = None) -> Job:
-    """Queue the decomposition alone: reach, remainder, the tool to buy."""
+    """Queue only the decomposition: reachable area, remainder, and the tools to add."""
     return await _submit(request, response, "zones", principal, key)
 
 
@@ -105,5 +107,5 @@ async def create_zones(request: Request, response: Response, principal: Submitte
              summary="Prove a program", responses=ACCEPTED | ERRORS, openapi_extra=multipart(True))
 async def create_verification(request: Request, response: Response, principal: Submitter,
                               key: IdempotencyKey = None) -> Job:
-    """Queue the proof of a program, also a foreign one, against part and setup."""
+    """Queue the proof of a program, which may come from another CAM system, against part and setup."""
     return await _submit(request, response, "verify", principal, key)

@@ -1,7 +1,7 @@
-"""The page: the list of jobs at ``/``, one job at ``/v1/jobs/{id}/view``, and the files it is made of.
+"""The web page: the list of jobs at ``/``, one job at ``/v1/jobs/{id}/view``, and the files of the page.
 
-The page itself is public, as it holds nothing of any job: it asks the interface for what it shows, with the key of
-whoever looks at it. So it stands beside the contract of the interface, not in it.
+The page itself is public, since it contains no data of a job. It requests its data from the HTTP interface with the key
+of its user. So it is not part of the OpenAPI document.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ def view_job(job_id: str) -> Response:
 
 @router.get("/")
 def list_page() -> Response:
-    """The page with the list of jobs and the form for a new one."""
+    """The page with the list of jobs and the form for a new job."""
     return page()
 
 
 @router.get("/assets/{name}")
 def page_asset(request: Request, name: str) -> Response:
-    """A file the page loads."""
+    """A file that the page loads."""
     return asset(request, name)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from examples.family.thesis import Kind, surface
+from examples.family.thesis import ThesisSurface, surface
 from geometry.errors import GeometryError, InputError
 from geometry.mesh import TriangleMesh
 from geometry.stl import StlForm, read_stl, stl_bytes, write_stl
 
-MESH = surface(Kind.CONVEX).discretised(0.1, 0.1)
+MESH = surface(ThesisSurface.CONVEX).discretised(0.1, 0.1)
 
 
 @pytest.mark.parametrize(("form", "off"), [(StlForm.BINARY, 4e-6), (StlForm.TEXT, 5.1e-9)])

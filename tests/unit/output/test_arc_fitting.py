@@ -10,16 +10,15 @@ import numpy as np
 import pytest
 
 from geometry.errors import ProgramError
-from output.arc_fitting import BLOCK, MOST_RADIUS, MOST_SWEEP, SAG, fitted, stretches
+from output.arc_fitting import BLOCK, MAX_ARC_RADIUS, MAX_SWEEP, SAG, fitted, stretches
 from output.gcode.dialects import DIALECTS, Switches
 from output.gcode.program_writer import write_program
-from output.linuxcnc import write_linuxcnc
 from output.program_grid import GRID, GridArc, pieces, to_grid
 from output.stepnc.ap238 import write_stepnc_aim
 from output.stepnc.iso14649 import write_stepnc_arm
 from tests.arc_plans import HALF, SHAPES, cutting, dense, off, round_clamped, round_plan, turn
 from tests.golden_file import assert_golden
-from tests.synthetic_plan import BALL, clamped, leaning, step
+from tests.synthetic_plan import BALL, clamped, leaning, step, write_linuxcnc
 from toolpath.linking.lead_arcs import arc_onto
 from toolpath.workingsteps import TrajectoryKind
 from verify.comparison.program_equivalence import difference
@@ -107,8 +106,8 @@ def test_words_that_every_control_takes():
     assert len(arcs) >= 25
     for arc in arcs:
         ra, rb = (math.dist(p[:2], arc.centre) * GRID for p in (arc.start, arc.end))
-        assert abs(ra - rb) <= 1.5e-4 and 0.05 <= ra <= MOST_RADIUS + GRID
-        assert math.dist(arc.start[:2], arc.end[:2]) >= 200 and abs(arc.sweep) <= MOST_SWEEP + 1e-6
+        assert abs(ra - rb) <= 1.5e-4 and 0.05 <= ra <= MAX_ARC_RADIUS + GRID
+        assert math.dist(arc.start[:2], arc.end[:2]) >= 200 and abs(arc.sweep) <= MAX_SWEEP + 1e-6
         assert (arc.sweep > 0.0) is arc.left
 
 

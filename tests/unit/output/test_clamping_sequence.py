@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from geometry.errors import OutputError
-from output.clamping_sequence import Leg, home_of, sections
+from output.clamping_sequence import Leg, clamped_steps, home_of
 from output.inverse_kinematics import RotaryMachine
-from output.linuxcnc import write_linuxcnc
 from output.stepnc.common import _curves
-from tests.synthetic_plan import clamped
+from tests.synthetic_plan import clamped, write_linuxcnc
 from toolpath.workingsteps import Trajectory, TrajectoryKind
 from verify.gcode.reader import read_program
 from verify.kinematics import KINDS, Kinematics
@@ -90,7 +89,7 @@ def test_a_tool_is_changed_above_the_ball_with_the_axes_at_zero():
     change = [k for k, line in enumerate(lines) if " M6" in line]
     assert len(change) == 2
     home = home_of(plan.clamping)
-    before = sections(plan)[1].after[-1]
+    before = clamped_steps(plan)[1].after[-1]
     assert np.allclose(before.tips[-1], home) and np.allclose(before.turns[-1], 0.0)
     assert lines[change[1] - 4:change[1] - 1] == ["", "M5", "M9"] and lines[change[1] - 5] == "M429"
     after = [line for line in lines[change[1]:change[1] + 8] if line.startswith(("G", "M"))]
@@ -152,7 +151,7 @@ def test_the_place_of_the_rotary_axes_is_chosen_for_the_whole_step():
     step = replace(plan.steps[0], trajectories=(Trajectory(TrajectoryKind.CUT, tips, 500.0, axes),))
     clamping = replace(plan.clamping, machine=RotaryMachine("table-table-AC", limits=np.radians(
         [[-60.0, 60.0], [-190.0, 190.0]])))
-    (section,) = sections(replace(plan, steps=(step,), clamping=clamping))
+    (section,) = clamped_steps(replace(plan, steps=(step,), clamping=clamping))
     turns = np.vstack([leg.turns for leg in section.legs])
     assert np.abs(turns[:, 1]).max() <= np.radians(190.0) + 1e-9
     wanted_axes = axes @ plan.clamping.frames[step.access].rotation
@@ -174,7 +173,7 @@ def test_parts_of_a_pass_over_the_pole_go_on_from_one_another(at):
     machine = RotaryMachine("table-table-AC", limits=np.radians([[-5.0, 110.0], [-360.0, 360.0]]))
     job = replace(plan, steps=(replace(plan.steps[0], trajectories=cuts),),
                   clamping=replace(plan.clamping, machine=machine))
-    (section,) = sections(job)
+    (section,) = clamped_steps(job)
     before, *legs = [section.before[-2], *section.legs]
     assert np.degrees(np.vstack([leg.turns for leg in legs])[:, 0]).min() >= -5.0
     for one, other in zip([before, *legs], legs, strict=False):

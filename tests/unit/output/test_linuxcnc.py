@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from geometry.errors import OutputError
-from output.linuxcnc import LINE, path_tolerance, write_linuxcnc
+from output.gcode.dialects.linuxcnc import LinuxCnc
+from output.gcode.program_writer import path_tolerance
 from tests.golden_file import assert_golden
-from tests.synthetic_plan import BALL, CLEAR, FLAT, line, long_plan, plan, step, tiny
+from tests.synthetic_plan import BALL, CLEAR, FLAT, line, long_plan, plan, step, tiny, write_linuxcnc
 from toolpath.workingsteps import Trajectory, TrajectoryKind
 
 WORD = re.compile(r"([A-Z])(-?\d+\.?\d*)")
@@ -49,7 +50,7 @@ def test_every_line_is_short_ascii_without_nested_comments():
     text = write_linuxcnc(plan())
     assert text.isascii()
     lines = text.splitlines()
-    assert max(map(len, lines)) <= LINE
+    assert max(map(len, lines)) <= LinuxCnc.line
     assert lines[0] == lines[-1] == "%"
     for block in lines:
         if "(" in block or ")" in block:
@@ -77,7 +78,7 @@ def test_header_says_how_deep_the_tip_goes():
 
 def test_long_labels_are_wrapped():
     text = write_linuxcnc(plan(labels={"note": "word " * 100}))
-    assert max(map(len, text.splitlines())) <= LINE
+    assert max(map(len, text.splitlines())) <= LinuxCnc.line
     assert text.count("word") == 100
 
 

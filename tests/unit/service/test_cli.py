@@ -230,7 +230,7 @@ def test_what_a_verification_found_is_said_in_words():
         "unproved: 8 findings", "  coverage      1  coverage 0.5 is below",
         "  gouge         7  line 12: T1 cuts 0.1 mm",
         "  coverage   50.00 % of the judged area within the budget", "  deepest    0.2 mm cut into the part",
-        "  machined   12.5 mm3 stand, nodes 0.2 mm apart", "  files      deviation.png, report.json",
+        "  machined   12.5 mm3 remain, nodes 0.2 mm apart", "  files      deviation.png, report.json",
         "  took       3.2 s"]
     assert verification_summary({"state": "proved", "findings": []}, 1.0).startswith("proved: no findings\n")
 

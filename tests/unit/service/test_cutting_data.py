@@ -12,7 +12,7 @@ from benchmarks.passes import feeds_sweep
 from benchmarks.passes.feeds_sweep import MACHINES, OVERRIDES, faults, varied
 from examples.demo import demo_setup
 from schemas.materials import MATERIALS
-from service.cutting_data import MOST_THINNING, chip_thinning, cutting_data
+from service.cutting_data import MAX_CHIP_THINNING, chip_thinning, cutting_data
 from service.from_wire import parse_setup, tool_bodies
 from service.pipeline import cut_table
 from service.stages.cautions import bent, dry, limited, uncut_centres
@@ -46,7 +46,7 @@ def test_a_thin_chip_is_measured_on_the_path_of_a_tooth():
     assert (radius - before) / fz == pytest.approx(math.sin(phi), rel=1e-4)
     assert chip_thinning(0.0, 1.0, phi) == pytest.approx(1.0 / math.sin(phi))
     assert chip_thinning(0.0, None, 0.5 * math.pi) == chip_thinning(0.0, None, math.pi) == 1.0
-    assert chip_thinning(0.0, None, 0.01) == chip_thinning(2.0, 1e-6) == chip_thinning(2.0, 0.0) == MOST_THINNING
+    assert chip_thinning(0.0, None, 0.01) == chip_thinning(2.0, 1e-6) == chip_thinning(2.0, 0.0) == MAX_CHIP_THINNING
 
 
 def test_finishing_keeps_the_figures_of_the_table_and_layers_of_a_ball_count_their_depth():

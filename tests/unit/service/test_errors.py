@@ -4,7 +4,7 @@ import pytest
 
 import geometry.errors as cam
 import service.errors as own
-from service.errors import ERROR_TABLE, mapping_of, problem_document
+from service.errors import ERROR_TABLE, error_mapping, problem_document
 
 
 def _tree(cls):
@@ -26,7 +26,7 @@ def test_exit_codes_follow_whose_fault_it_is():
             assert (int(row.status), row.exit_code) == (422, 2)
         assert row.exit_code in (1, 2, 3) and 400 <= row.status < 600
         assert row.slug == row.slug.lower() and row.title[0].isupper()
-    assert mapping_of(cam.InternalError("x")).exit_code == 1
+    assert error_mapping(cam.InternalError("x")).exit_code == 1
 
 
 @pytest.mark.parametrize("cls", list(ERROR_TABLE))

@@ -74,7 +74,7 @@ def test_a_plan_and_what_proofs_found_come_back(planned_step):
 
 def test_a_tool_other_than_the_one_that_is_known_is_not_named_by_its_id(planned_step):
     known = Known({"ToolBody": {planned_step.tool.id: replace(planned_step.tool, diameter=99.0)}})
-    with pytest.raises(TypeError, match="another than the one that is known"):
+    with pytest.raises(TypeError, match="differs from the known one"):
         pack(planned_step, known)
 
 

@@ -43,7 +43,7 @@ def test_beyond_loopback_a_key_is_needed(host, refused, tmp_path):
     if not refused:
         engine._check_exposure()
         return
-    with pytest.raises(SetupError, match="no usable key") as caught:
+    with pytest.raises(SetupError, match="no valid key") as caught:
         engine._check_exposure()
     assert caught.value.code == "exposed_without_key"
     told = Engine(Settings(host=host, data_dir=tmp_path, auth="keys"), "none")

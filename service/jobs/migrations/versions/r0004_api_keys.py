@@ -28,5 +28,5 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Drop the table: nobody gets in afterwards but by loopback."""
+    """Drop the table; afterwards only loopback has access."""
     op.drop_table("api_keys")

@@ -1,4 +1,4 @@
-"""When the files of a job were let go of."""
+"""Time at which the files of a job expired."""
 
 from __future__ import annotations
 

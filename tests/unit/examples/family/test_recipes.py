@@ -12,8 +12,8 @@ from examples.demo import write_demo
 from examples.family.freewall import FreeWall
 from examples.family.gaps import channels
 from examples.family.joins import fork, join, within_hub
-from examples.family.layout import HubDisc, Layout, LayoutError, Plate, WindowSpec, check
-from examples.family.profiles import BENDS, OPEN_TYPES, Profile, bends, clear, draw_closed, draw_open, skew, spline
+from examples.family.layout import HubDisc, LayoutError, PartLayout, Plate, WindowSpec, check
+from examples.family.profiles import BENDS, OPEN_TYPES, DrawnProfile, bends, clear, draw_closed, draw_open, skew, spline
 from examples.family.recipes import NUMBERS, RECIPES, FamilyPart, draw_layout, make_part
 from examples.family.walls import LEFT, RIGHT, WallSpec
 
@@ -167,7 +167,7 @@ def test_overrides_and_refusals():
     assert all(1.99 <= gaps[k, k + 1] <= 4.01 for k in range(2))
     block = WallSpec("straight", np.array([[-20.0, 0.0], [20.0, 0.0]]), 4.0, 8.0, (6.0, 6.0))
     with pytest.raises(LayoutError, match="block"):
-        check(Layout("bad", Plate((-30, -10, 30, 10), 4.0), [block]))
+        check(PartLayout("bad", Plate((-30, -10, 30, 10), 4.0), [block]))
 
 
 def test_every_recipe_is_drawn_for_several_seeds():
@@ -264,7 +264,7 @@ def test_mixed_gaps_are_distances_of_the_wall_solids(mixed):
 
 def ring(radius: float) -> FreeWall:
     angle = np.arange(10) * 2 * np.pi / 10
-    profile = Profile("oval", radius * np.column_stack([np.cos(angle), np.sin(angle)]), closed=True)
+    profile = DrawnProfile("oval", radius * np.column_stack([np.cos(angle), np.sin(angle)]), closed=True)
     return FreeWall("closed", profile.control, 4.0, 10.0, (2.0, 2.0), profile=profile)
 
 
@@ -278,7 +278,7 @@ def test_gap_of_nested_rings_and_of_a_ring_with_itself():
 
 def test_a_wall_that_rays_only_graze_stops_them():
     def straight(a: tuple[float, float], b: tuple[float, float]) -> FreeWall:
-        line = Profile(None, np.linspace(a, b, 10))
+        line = DrawnProfile(None, np.linspace(a, b, 10))
         return FreeWall("straight", line.control, 4.0, 10.0, (2.0, 2.0), profile=line)
 
     pair = [straight((-15, 0), (15, 0)), straight((-15, 18), (15, 18))]
@@ -304,7 +304,7 @@ def test_free_walls_are_valid_whatever_their_faces(options):
 
 def test_a_fork_ends_in_every_wall_it_names():
     x = np.linspace(-25, 25, 10)[:, None]
-    lines = [Profile(None, np.column_stack([x, np.full_like(x, y)])) for y in (0.0, 10.0)]
+    lines = [DrawnProfile(None, np.column_stack([x, np.full_like(x, y)])) for y in (0.0, 10.0)]
     walls = [FreeWall("straight", p.control, 4.0, 12.0, (2.0, 2.0), profile=p) for p in lines]
     spec = fork(walls, 0, LEFT, 0.5, 10.0, spread=0.5, width=1.4, depth=1.6)
     assert spec.indices == (0, 1) and spec.visible.geom_type == "Polygon"
@@ -317,7 +317,7 @@ def test_a_hub_that_swallows_a_connection_or_an_end_of_it_is_noticed():
     x = np.linspace(-15, 15, 10)
 
     def straight(y: float, thickness: float) -> FreeWall:
-        line = Profile(None, np.column_stack([x, np.full(10, y)]))
+        line = DrawnProfile(None, np.column_stack([x, np.full(10, y)]))
         return FreeWall("straight", line.control, 4.0, 12.0, (thickness, thickness), profile=line)
 
     walls = [straight(y, 2.0) for y in (0.0, 8.0)]
@@ -355,7 +355,7 @@ class Corner:
 @pytest.mark.parametrize(("u", "width", "passes"), [(0.5, 4.0, True), (0.5, 17.0, False), (0.12, 4.0, False)])
 def test_an_opening_goes_all_the_way_through_its_wall(u, width, passes):
     window = WindowSpec(0, Corner(), u, width, (5.0, 8.0))
-    assert window.fits(Layout("", Plate((-5, -5, 25, 25), 4.0), [Corner()], []), []) == passes
+    assert window.fits(PartLayout("", Plate((-5, -5, 25, 25), 4.0), [Corner()], []), []) == passes
 
 
 def test_joins_find_the_other_stretch_of_the_same_wall():

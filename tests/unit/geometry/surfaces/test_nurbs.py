@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import BSpline
 
 from benchmarks.passes.faceting import facet_deviation, steps_for_chord
-from examples.family.thesis import Kind, control_points, surface
+from examples.family.thesis import ThesisSurface, control_points, surface
 from geometry.errors import GeometryError
 from geometry.mesh import TriangleMesh
 from geometry.setup_frame import SetupFrame
@@ -51,12 +51,12 @@ def inner(surface, count=400, seed=1):
 
 def test_open_uniform_knots_are_those_of_equation_3_7():
     assert open_uniform_knots(5, 4).tolist() == [0, 0, 0, 0, 1, 2, 2, 2, 2]
-    assert surface(Kind.CONVEX).domain.tolist() == [[0, 0], [2, 2]]
+    assert surface(ThesisSurface.CONVEX).domain.tolist() == [[0, 0], [2, 2]]
 
 
 def test_a_surface_meets_its_corner_points_and_lies_between_its_control_points():
-    s = surface(Kind.CONCAVE)
-    net = control_points(Kind.CONCAVE)
+    s = surface(ThesisSurface.CONCAVE)
+    net = control_points(ThesisSurface.CONCAVE)
     assert np.allclose(s.points([[0, 0], [0, 2], [2, 0], [2, 2]]), net[[0, 0, -1, -1], [0, -1, 0, -1]], atol=1e-13)
     z = s.points(inner(s))[:, 2]
     assert net[..., 2].min() < z.min() and z.max() < net[..., 2].max()
@@ -133,7 +133,7 @@ def test_facets_at_a_pole_are_single_and_steps_divide_evenly():
 
 
 def test_foot_points_inside_on_borders_and_at_corners():
-    s = surface(Kind.CONVEX)
+    s = surface(ThesisSurface.CONVEX)
     uv = inner(s)
     near = foot_points(s, s.points(uv) + 0.7 * s.normals(uv))
     assert np.abs(near.uv - uv).max() < 1e-8 and np.abs(near.distance - 0.7).max() < 1e-12
@@ -152,7 +152,7 @@ def test_facets_of_a_cylinder_leave_it_by_the_sagitta():
     assert facet_deviation(s, shifted).outside == pytest.approx(0.05, abs=1e-9)
 
 
-@pytest.mark.parametrize("make", [cylinder, octant, lambda: surface(Kind.CONCAVE), random_surface])
+@pytest.mark.parametrize("make", [cylinder, octant, lambda: surface(ThesisSurface.CONCAVE), random_surface])
 @pytest.mark.parametrize("chord", [0.05, 0.02])
 def test_steps_for_a_chord_keep_it_without_waste(make, chord):
     s = make()
@@ -177,7 +177,7 @@ BAD = [
 
 @pytest.mark.parametrize(("change", "subject", "words"), BAD, ids=[s for _, s, _ in BAD])
 def test_bad_surfaces_say_what_where_and_what_to_do(change, subject, words):
-    good = {"control": control_points(Kind.CONVEX), "knots_u": open_uniform_knots(5, 4),
+    good = {"control": control_points(ThesisSurface.CONVEX), "knots_u": open_uniform_knots(5, 4),
             "knots_v": open_uniform_knots(5, 4), "orders": (4, 4), "weights": None, "side": 1}
     with pytest.raises(GeometryError) as caught:
         NurbsSurface(**{**good, **change})
@@ -187,7 +187,7 @@ def test_bad_surfaces_say_what_where_and_what_to_do(change, subject, words):
 
 
 def test_parameters_and_steps_out_of_range_are_refused():
-    s = surface(Kind.CONVEX)
+    s = surface(ThesisSurface.CONVEX)
     for call, code in ((lambda: s.points([[0, 0], [2.1, 0]]), "outside_domain"),
                        (lambda: s.points([[0, np.nan]]), "bad_array"),
                        (lambda: s.discretised(0.0, 1.0), "bad_step"), (lambda: s.discretised(1e-5, 1e-5), "bad_step"),

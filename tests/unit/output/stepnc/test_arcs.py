@@ -10,12 +10,12 @@ import pytest
 
 from geometry.errors import ProgramError
 from output.arc_fitting import SAG, fitted
-from output.linuxcnc import write_linuxcnc
 from output.stepnc.ap238 import write_stepnc_aim
 from output.stepnc.iso14649 import write_stepnc_arm
 from output.workplan import Ap238
 from tests.arc_plans import HALF, SHAPES, cutting, round_clamped, round_plan
 from tests.broken_stepnc import broken
+from tests.synthetic_plan import write_linuxcnc
 from verify.comparison.stepnc_agreement import check_agreement
 from verify.gcode.reader import read_program
 from verify.stepnc.part21 import Part21File

@@ -17,7 +17,7 @@ import service.jobs.database
 from service.jobs.attempt import WorkConfig, _Attempt, run_job
 from service.jobs.database import AWAY, connect, migrate
 from service.jobs.job_store import JobStore, NewJob
-from service.jobs.supervisor import Limits
+from service.jobs.supervisor import ProcessLimits
 from service.logs import configure
 
 
@@ -54,7 +54,7 @@ def test_a_worker_logs_as_the_service_does_and_shows_no_variables(tmp_path, capf
     url = f"sqlite:///{tmp_path / 'x.db'}"
     migrate(url)
     job = JobStore(connect(url)).create(NewJob("plan", "p", "c", "a" * 64, "b" * 64, "{}", {}))[0]["id"]
-    config = WorkConfig(url, str(tmp_path), Limits(1, 1), 20.0, log_format="json")
+    config = WorkConfig(url, str(tmp_path), ProcessLimits(1, 1), 20.0, log_format="json")
     structlog.reset_defaults()  # as in the process of a worker
     try:
         assert run_job(job, 1, config.as_dict()) == "unfit"  # the folder has no such part
@@ -75,7 +75,7 @@ def test_no_free_connection_is_a_database_that_is_away_and_stops_no_job():
         raise PoolTimeoutError("QueuePool limit of size 5 overflow 10 reached")
 
     store = SimpleNamespace(is_held=busy, renew=busy, progress=busy, resumed=busy)
-    attempt = _Attempt(store, None, WorkConfig("", "", Limits(1, 1), 20.0), {"id": "j", "attempt": 1}, "worker-1")
+    attempt = _Attempt(store, None, WorkConfig("", "", ProcessLimits(1, 1), 20.0), {"id": "j", "attempt": 1}, "worker-1")
     assert attempt._keep() is True
     attempt._progress("asleep", 0.5)
     attempt._resumed({})

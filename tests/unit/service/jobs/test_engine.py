@@ -5,7 +5,7 @@ import time
 import pytest
 
 from service.errors import UnavailableError
-from service.jobs.engine import MERCY_S, Engine
+from service.jobs.engine import ENDLESS_GRACE_S, Engine
 from service.settings import Settings
 
 
@@ -56,9 +56,9 @@ def test_what_was_not_seen_for_a_while_is_not_told(engine):
 @pytest.mark.parametrize("by_s", [3600, -3600])
 def test_for_a_lease_after_the_clock_was_set_no_lease_counts_as_run_out(engine, monkeypatch, by_s):
     clock, elapsed = time.time, time.monotonic
-    assert engine._mercy_s() == 0.0
+    assert engine._lease_grace_s() == 0.0
     monkeypatch.setattr(time, "time", lambda: clock() + by_s)
-    assert engine._mercy_s() == MERCY_S == engine._mercy_s()
+    assert engine._lease_grace_s() == ENDLESS_GRACE_S == engine._lease_grace_s()
     monkeypatch.setattr(time, "time", lambda: clock() + by_s + 6)
     monkeypatch.setattr(time, "monotonic", lambda: elapsed() + 6)
-    assert engine._mercy_s() == 0.0
+    assert engine._lease_grace_s() == 0.0

@@ -118,7 +118,7 @@ def test_a_repeat_is_answered_when_the_queue_is_full(store):
             store.check_room("p", key, room)
         with pytest.raises(RateError, match="1 of your jobs"):
             store.create(new(key=key), room)
-    with pytest.raises(RateError, match="1 jobs are waiting"):
+    with pytest.raises(RateError, match="1 jobs are already waiting"):
         store.check_room("q", "k", room)
 
 
@@ -194,9 +194,9 @@ def test_a_claim_that_no_worker_takes_up_costs_no_attempt(store):
 def test_a_lease_that_ran_out_while_nobody_could_renew_it_counts_for_longer(store):
     job = store.create(new())[0]["id"]
     store.claim("first", -1.0, 3)
-    assert store.claim("second", 30, 3, mercy_s=60) is None and store.give_up(1, 30, mercy_s=60) == 0
+    assert store.claim("second", 30, 3, lease_grace_s=60) is None and store.give_up(1, 30, lease_grace_s=60) == 0
     assert store.renew(job, "first", 30) and store.claim("second", 30, 3) is None
-    assert store.renew(job, "first", -61) and store.claim("second", 30, 3, mercy_s=60)["claims"] == 2
+    assert store.renew(job, "first", -61) and store.claim("second", 30, 3, lease_grace_s=60)["claims"] == 2
 
 
 def test_a_lease_that_ends_far_ahead_was_given_before_the_clock_was_set_back(store, monkeypatch):
@@ -205,7 +205,7 @@ def test_a_lease_that_ends_far_ahead_was_given_before_the_clock_was_set_back(sto
     monkeypatch.setattr(time, "time", lambda: true() + 3600)
     assert store.claim("dead", 30, 3)["id"] == job
     monkeypatch.setattr(time, "time", true)
-    assert store.claim("other", 30, 3, mercy_s=1e9) is None  # who lives can renew meanwhile
+    assert store.claim("other", 30, 3, lease_grace_s=1e9) is None  # who lives can renew meanwhile
     assert store.running(30) == 0 and store.running(30, 1e9) == 1
     assert store.claim("other", 30, 3)["claims"] == 2
 
@@ -269,7 +269,8 @@ def test_a_key_that_becomes_free_in_between_makes_a_new_job(store, monkeypatch):
 
 def test_folders_that_are_made_for_a_file_are_flushed_too(tmp_path, monkeypatch):
     flushed, sync = [], service.files.sync_folder
-    monkeypatch.setattr(service.jobs.artifacts, "sync_folder", lambda f: (flushed.append(f), sync(f)))
+    for module in (service.files, service.jobs.artifacts):
+        monkeypatch.setattr(module, "sync_folder", lambda f: (flushed.append(f), sync(f)))
     files = Artifacts(tmp_path / "data")
     sha, _ = files.put_blob([b"abc"])
     assert flushed == [files.root, files.root / "blobs", files.root / "blobs" / sha[:2]]

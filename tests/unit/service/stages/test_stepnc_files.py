@@ -7,12 +7,11 @@ from dataclasses import replace
 import pytest
 
 from geometry.errors import InternalError, ResourceError
-from output.linuxcnc import write_linuxcnc
 from service.stages import stepnc_files as stepnc
 from service.stages.access_plan import Program
 from service.stages.stepnc_files import stepnc_files, stepnc_under_way
 from tests.pocket_case import SETUP, block
-from tests.synthetic_plan import BALL, line, plan, step
+from tests.synthetic_plan import BALL, line, plan, step, write_linuxcnc
 from toolpath.workingsteps import TrajectoryKind
 
 

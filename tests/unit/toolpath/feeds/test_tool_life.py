@@ -9,12 +9,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from output.clamping_sequence import sections
-from output.linuxcnc import write_linuxcnc
+from output.clamping_sequence import clamped_steps
 from output.stepnc.ap238 import write_stepnc_aim
 from output.stepnc.iso14649 import write_stepnc_arm
 from service.stages.cautions import lives_ended
 from tests import synthetic_plan as made
+from tests.synthetic_plan import write_linuxcnc
 from toolpath.feeds.tool_life import minutes_in_cut, with_fresh_cutters, worn
 from toolpath.workingsteps import Trajectory, TrajectoryKind, trajectory_seconds
 
@@ -151,9 +151,9 @@ def test_where_the_machine_turns_the_cutter_is_changed_above_the_ball():
         clear = whole.clamping.frames[s.access].clearance
         parts += with_fresh_cutters([s], {s.tool.id: 1e-6}, clear, worn(parts))
     assert len(parts) > 1 and any(s.fresh for s in parts)
-    for s in sections(replace(whole, steps=tuple(parts))):
+    for s in clamped_steps(replace(whole, steps=tuple(parts))):
         assert s.fresh or not s.step.fresh
-    walked = sections(replace(whole, steps=tuple(parts)))
+    walked = clamped_steps(replace(whole, steps=tuple(parts)))
     assert all(a.last == b.fresh for a, b in zip(walked, walked[1:], strict=False))
     text = write_linuxcnc(replace(whole, steps=tuple(parts)))
     assert text.count("T0 M6") == sum(s.fresh for s in parts)

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from geometry.errors import InternalError, ProgramError
-from output.linuxcnc import write_linuxcnc
 from output.stepnc.ap238 import stream_stepnc_aim, write_stepnc_aim
 from output.stepnc.iso14649 import stream_stepnc_arm, write_stepnc_arm
 from output.stepnc.part21 import quoted
 from output.workplan import Ap238, StockBox
 from tests.pocket_case import OTHER, SETUP, TOOL, ZONES, block, program, scored, text
-from tests.synthetic_plan import BALL, clamped, full, line, long_plan, plan, shaped, step, tiny
+from tests.synthetic_plan import BALL, clamped, full, line, long_plan, plan, shaped, step, tiny, write_linuxcnc
 from toolpath.workingsteps import Trajectory, TrajectoryKind
 from verify.comparison.stepnc_agreement import check_agreement
 from verify.gcode.reader import read_program

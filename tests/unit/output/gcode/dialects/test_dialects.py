@@ -12,11 +12,10 @@ from geometry.errors import OutputError, ProgramError, VerificationError
 from output.arc_fitting import fitted
 from output.gcode.dialects import DIALECTS, Switches
 from output.gcode.program_writer import write_program
-from output.inverse_kinematics import RotaryMachine, said_limits
-from output.linuxcnc import write_linuxcnc
+from output.inverse_kinematics import RotaryMachine, program_limits
 from tests.arc_plans import HALF, round_clamped, round_plan
 from tests.golden_file import assert_golden
-from tests.synthetic_plan import clamped, long_plan, plan, tiny
+from tests.synthetic_plan import clamped, long_plan, plan, tiny, write_linuxcnc
 from toolpath.workingsteps import TrajectoryKind
 from verify.comparison.program_equivalence import difference
 from verify.gcode.dialects import DIALECTS as READ
@@ -404,7 +403,7 @@ def test_the_sense_of_iso_841():
     assert np.allclose(got, [-np.sin(c) * tilted[1], np.cos(c) * tilted[1], tilted[2]], atol=1e-12)
     same = RotaryMachine("table-table-AC", None, None, True, (-1, -1))
     assert np.allclose(same.axes(same.words(np.array([[a, c]])))[0], got, atol=1e-12)
-    assert said_limits(np.array([[-30.0, 110.0], [-360.0, 360.0]]), (-1, 1)).tolist() == [[-110, 30], [-360, 360]]
+    assert program_limits(np.array([[-30.0, 110.0], [-360.0, 360.0]]), (-1, 1)).tolist() == [[-110, 30], [-360, 360]]
 
 
 def test_rotary_axes_of_a_heidenhain_go_the_shorter_way():

@@ -8,9 +8,8 @@ import pytest
 
 from output.gcode.dialects.base import Dialect, Switches
 from output.gcode.program_writer import write_program
-from output.linuxcnc import write_linuxcnc
 from tests.arc_plans import round_plan
-from tests.synthetic_plan import clamped, plan
+from tests.synthetic_plan import clamped, plan, write_linuxcnc
 from verify.comparison.program_equivalence import difference
 from verify.gcode.dialects import CONTROLS
 from verify.gcode.dialects import __name__ as home
