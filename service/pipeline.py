@@ -23,14 +23,7 @@ from geometry.sampling import SurfaceSamples
 from output.arc_fitting import SHARE as ARCS
 from schemas.setup import Lean, Setup
 from service.checkpoint_store import Kept
-from service.cutting_data import STEP_DOWN, bending, cutting_data, rates_of
-from service.from_wire import (
-    check_plannable,
-    check_spindle_tool,
-    machine_kinematics,
-    rotary_limits,
-    tool_bodies,
-)
+from service.from_wire import check_plannable, check_spindle_tool
 from service.pictures.proof_picture import MAP_NAME, draw_proof
 from service.report import report as reporting
 from service.setup_sheet.setup_sheet import sheet_files
@@ -48,15 +41,7 @@ from service.stages.cautions import (
 )
 from service.stages.machined_mesh import MESH_NAME, MeshWish, machined_part
 from service.stages.preparation import Prepared, prepare, table_height
-from service.stages.programs import (
-    access_of,
-    fixture_boxes,
-    gauge_lengths,
-    programs_of,
-    proof_frame,
-    turning_of,
-    with_figures,
-)
+from service.stages.programs import access_of, fixture_boxes, programs_of, proof_frame, turning_of, with_figures
 from service.stages.proof_samples import Score, score
 from service.stages.replanning import PLANS, Attempt, Learned, learned, worth_another
 from service.stages.result_files import Files, clear_results, deliver, json_bytes
@@ -70,10 +55,9 @@ from toolpath.feeds.tool_life import with_fresh_cutters, worn
 from toolpath.passes.pass_family import Target
 from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_checkpoint import Keeper
-from toolpath.plan_settings import CutData, Leaned, Pattern, PlanSettings
+from toolpath.plan_settings import Leaned, Pattern, PlanSettings
 from toolpath.planning.job_plan import Plan, plan_job
 from toolpath.stock.stock_map import StockMap
-from toolpath.tool_deflection import effective_diameter
 from verify.comparison.program_equivalence import carried
 from verify.gcode.dialects import dialect_of
 from verify.model import NcProgram, Proof, ProofSetup, ScoredSamples
@@ -83,10 +67,8 @@ from zones.reach.access_view import View
 Progress = Callable[[str, float], None]
 Planner = Callable[..., Plan]
 RAMP_ANGLE = np.radians(3.0)
-LINK_FEED = 3000.0  # mm/min, feed moves in air
 STOCK_STEP = 0.08  # mm, the planner's stock lattice; wider where that would take more than STOCK_CELLS
 STOCK_CELLS = 4e6
-TOLD_APART = 0.15  # of the radius of a tool, between places of the stock: at the edge 32 degrees of it
 ABOVE = 1.0  # mm between the height rapids may go down to and the clearance plane
 PREPARED, PROVED = 0.28, 0.96  # shares of the work done
 FIRST_SHARE, PLAN_SHARE = 0.9, 0.7  # of what is left to a proof: of a plan and its proof; of these: of the plan
@@ -116,12 +98,14 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     out.mkdir(parents=True, exist_ok=True)
     clear_results(out)
     ready = prepare(part_path, setup, progress, blank_path=blank_path)
-    cautions = [*limited(setup), *dry(setup), *thin_walls(ready)]
+    inputs = ready.inputs
+    cautions = [*limited(inputs), *dry(inputs), *thin_walls(ready)]
     ready = replace(ready, warnings=(*ready.warnings, *sentences(cautions)))
     ready, trimmed, scored = _trimmed_and_scored(part_path, ready)
     checks = scored.checks(ready)
     first, look = ready.views[0], proof_frame(ready)
     dense = look.into(scored.samples, first)
+    judged_by = proof_setup(ready, look)
     resumed = Resumed(kept or Kept(), ready, checks, dense)
     told, begun = Learned(), PREPARED
     sides: list[Side] = []
@@ -139,7 +123,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
         written = programs_of(ready, sides, trimmed)
         programs = [p.given() for p in written]
         proof = resumed.proof(programs, zone, partial(
-            prove, programs, look.part, tool_bodies(setup), proof_setup(ready, look), ScoredSamples(dense, zone),
+            prove, programs, look.part, inputs.bodies, judged_by, ScoredSamples(dense, zone),
             [z.id for z in ready.zones], span.proving))
         more = learned(told, Attempt(sides, written, ready.zones, scored.zone, zone, look, proof))
         found.append(sum(proof.counts.values()))
@@ -148,8 +132,8 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
         # an access is planned from what those before it leave: those up to the first that is told something stay
         sides, told, begun = list(takewhile(partial(_untold, told, more), sides)), more, ended
     stated = in_setup_frame(look, proof)
-    late = [*unheld(stated.support), *bent(made.steps), *lives_ended(setup, made.steps),
-            *uncut_centres(setup, made.steps), *upright(_leaned(setup.operations.lean), made.zones, made.steps)]
+    late = [*unheld(stated.support), *bent(made.steps), *lives_ended(inputs, made.steps),
+            *uncut_centres(inputs, made.steps), *upright(_leaned(inputs.operations.lean), made.zones, made.steps)]
     cautions = [*cautions, *late]
     ready = replace(ready, warnings=(*ready.warnings, *told.notes, *sentences(late)))
     report, rest, stays = reporting.job_report(ready, made, stated, scored.samples, scored.labels, zone,
@@ -157,24 +141,24 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     if report["state"] == "proved":
         # of every control's program one was simulated, before its figures were known; what is delivered is the same
         final = with_figures(written, report)
-        report["proof"]["notes"] += _carried(ready, look, written, final)
+        report["proof"]["notes"] += _carried(ready, look, judged_by, written, final)
         written = final
     clean = written if report["state"] == "proved" else []
-    with stepnc_under_way(clean, look.part, tool_bodies(setup), proof_setup(ready, look), out) as stepnc:
+    with stepnc_under_way(clean, look.part, inputs.bodies, judged_by, out) as stepnc:
         progress("report", PROVED)
         files: Files = {}
         if report["state"] == "proved":
             for p in written:
                 files.update({name: ("program", dialect, p.access, text.encode()) for dialect, name, text in p.files()})
         files["zones.json"] = ("zones", "", None, json_bytes(reporting.zones_document(report)))
-        page = plan_view(ready, look, scored, zone, rest, stays, proof, programs, proof_setup(ready, look), report)
+        page = plan_view(ready, look, scored, zone, rest, stays, proof, programs, judged_by, report)
         if page:
             _preview(ready, page[VIEW_NAME][3], report, out / "preview.png")
             files["preview.png"] = ("preview", "", None, (out / "preview.png").read_bytes())
-        _deviation(ready, look, dense, proof, report, out / MAP_NAME)
+        _deviation(ready, look, dense, proof, judged_by, report, out / MAP_NAME)
         files[MAP_NAME] = ("deviation", "", None, (out / MAP_NAME).read_bytes())
         if mesh is not None and programs:
-            figures, data = machined_part(mesh, programs, look.part, tool_bodies(setup), proof_setup(ready, look),
+            figures, data = machined_part(mesh, programs, look.part, inputs.bodies, judged_by,
                                           lambda f: progress("mesh", PROVED + (1.0 - PROVED) * f))
             report["machined"] = {"file": MESH_NAME, "access": first.id, **figures}
             files[MESH_NAME] = ("machined", "", None, data)
@@ -190,7 +174,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
 def _trimmed_and_scored(part_path: Path, ready: Prepared) -> tuple[Prepared, Mapping[str, Sequence[Faces]], Score]:
     """The exact faces, which another process reads meanwhile, and the samples of the proof."""
     with ThreadPoolExecutor(1) as pool:
-        faces = pool.submit(trimmed_faces, part_path, ready) if ready.setup.operations.finishing else None
+        faces = pool.submit(trimmed_faces, part_path, ready) if ready.inputs.operations.finishing else None
         scored = score(ready)
     try:
         return ready, faces.result() if faces is not None else {}, scored
@@ -199,11 +183,10 @@ def _trimmed_and_scored(part_path: Path, ready: Prepared) -> tuple[Prepared, Map
         return replace(ready, warnings=(*ready.warnings, warning)), {}, scored
 
 
-def _carried(ready: Prepared, look: Look, written: Sequence[Program], final: Sequence[Program]) -> list[str]:
+def _carried(ready: Prepared, look: Look, judged_by: ProofSetup, written: Sequence[Program], final: Sequence[Program]) -> list[str]:
     """Hold the programs as they are delivered, of all controls, against those that are proved; returns notes."""
-    tools, setup = tool_bodies(ready.setup), proof_setup(ready, look)
     return [note for p, f in zip(written, final, strict=True)
-            for note in carried(p.given(), [f.given(), *f.twins()], look.part, tools, setup)]
+            for note in carried(p.given(), [f.given(), *f.twins()], look.part, ready.inputs.bodies, judged_by)]
 
 
 def _untold(told: Learned, more: Learned, side: Side) -> bool:
@@ -238,7 +221,7 @@ def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[st
     On a machine with rotary axes, where all accesses are one program, from what the accesses before leave; else from
     the whole blank, for who knows in which order programs are run. Heights are those of the whole blank in any case.
     """
-    turned, steps = ready.setup.machine.kind == "5-axis", sum(len(s.made.steps) for s in before)
+    turned, steps = ready.inputs.turns, sum(len(s.made.steps) for s in before)
     if view.id not in blanks:
         blanks[view.id] = planning_stock(ready, view)
     stock = blanks[view.id].copied()
@@ -249,12 +232,11 @@ def _side(ready: Prepared, view: View, checks: list[Target], trimmed: Mapping[st
         stock.left_by([(s.left, s.view.rotation @ view.rotation.T) for s in before if s.left is not None], lowest)
     mine = [k for k, z in enumerate(ready.zones) if z.access == view.id]
     zones = [ready.zones[k] for k in mine]
-    made = planner(zones, [checks[k] for k in mine], view.fields, cut_table(ready.setup), stock, settings,
+    made = planner(zones, [checks[k] for k in mine], view.fields, ready.inputs.cut_table, stock, settings,
                    lambda f: tell(0.98 * f), first_step=steps + 1, trimmed=trimmed, keeper=keeper)
     stock.settle(last=True)
-    lives = {t.id: t.life_min for t in ready.setup.tools if t.life_min is not None}
     used = worn(t for s in before for t in s.made.steps)
-    made = Plan(tuple(with_fresh_cutters(made.steps, lives, settings.clearance, used)), made.zones)
+    made = Plan(tuple(with_fresh_cutters(made.steps, ready.inputs.tool_lives, settings.clearance, used)), made.zones)
     if turned:
         made = Plan(tuple(replace(s, access=view.id) for s in made.steps), made.zones)
     return Side(view, made, settings.clearance, stock if turned else None)
@@ -272,7 +254,8 @@ def zones_only(part_path: Path, setup: Setup, progress: Progress, blank_path: Pa
     """
     check_plannable(setup)
     ready = prepare(part_path, setup, progress, blank_path=blank_path)
-    ready = replace(ready, warnings=(*ready.warnings, *sentences([*limited(setup), *dry(setup), *thin_walls(ready)])))
+    cautions = [*limited(ready.inputs), *dry(ready.inputs), *thin_walls(ready)]
+    ready = replace(ready, warnings=(*ready.warnings, *sentences(cautions)))
     out = reporting.dry_report(ready)
     progress("done", 1.0)
     return out
@@ -312,69 +295,46 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
     dense = look.into(score(ready).samples, ready.views[0])
     spoken = dialect or dialect_of(program_text, ending, setup.machine.dialects)
     given = [NcProgram("program", program_text, dialect=spoken)]
-    proof = prove(given, look.part, tool_bodies(setup), proof_setup(ready, look, foreign=True),
+    tools, judged_by = ready.inputs.bodies, proof_setup(ready, look, foreign=True)
+    proof = prove(given, look.part, tools, judged_by,
                   ScoredSamples(dense, np.zeros(len(dense), np.int32)), [], lambda f: progress("prove", 0.3 + 0.5 * f),
                   spindle_tool=spindle_tool)
     report = reporting.verification_report(ready, in_setup_frame(look, proof), dense)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         files: Files = {}
-        _deviation(ready, look, dense, proof, report, out / MAP_NAME)
+        _deviation(ready, look, dense, proof, judged_by, report, out / MAP_NAME)
         files[MAP_NAME] = ("deviation", "", view.id, (out / MAP_NAME).read_bytes())
         if mesh is not None:
-            figures, data = machined_part(mesh, given, look.part, tool_bodies(setup),
-                                          proof_setup(ready, look, foreign=True),
+            figures, data = machined_part(mesh, given, look.part, tools, judged_by,
                                           lambda f: progress("mesh", 0.8 + 0.2 * f), spindle_tool=spindle_tool)
             report["machined"] = {"file": MESH_NAME, "access": view.id, **figures}
             files[MESH_NAME] = ("machined", "", view.id, data)
-        files.update(verification_view(ready, look, dense, proof, given, proof_setup(ready, look, foreign=True), report,
-                                       spindle_tool))
+        files.update(verification_view(ready, look, dense, proof, given, judged_by, report, spindle_tool))
         deliver(out, report, files)
     progress("done", 1.0)
     return report
 
 
-def cut_table(setup: Setup) -> dict[str, CutData]:
-    """Speeds, feeds and layer depths by tool id; layers are slots, as far as the engaged angle is not bounded."""
-    out = {}
-    for tool, body in zip(setup.tools, tool_bodies(setup), strict=True):
-        depth = STEP_DOWN[tool.kind] * tool.diameter_mm
-        link = min(LINK_FEED, setup.machine.max_feed_mm_min or LINK_FEED)
-        engaged = math.radians(180.0 if tool.max_engagement_deg is None else tool.max_engagement_deg)
-        rough, fine = (cutting_data(setup.material, tool, setup.machine, d) for d in (depth, None))
-        finish = CutData(fine.spindle_rpm, fine.feed, fine.plunge_feed, link, depth, engaged,
-                         bending=bending(setup, tool, body, fine, None))
-        layers = CutData(rough.spindle_rpm, rough.feed, rough.plunge_feed, link, depth, engaged, finish,
-                         bending(setup, tool, body, rough, depth))
-        slot = effective_diameter(body.diameter, body.corner_radius, depth)
-        out[tool.id] = layers.under(depth, 0.5 * slot * (1.0 - math.cos(engaged)))
-    return out
-
-
 def planning_stock(ready: Prepared, view: View) -> StockMap:
     """The stock the planner starts from: the largest the setup allows."""
     lo, hi = ready.blank.corners(view.rotation)
-    step = max(min(STOCK_STEP, _told_apart(ready.setup)), float(np.sqrt(np.prod(hi[:2] - lo[:2]) / STOCK_CELLS)))
+    step = max(min(STOCK_STEP, ready.inputs.engagement_spacing), float(np.sqrt(np.prod(hi[:2] - lo[:2]) / STOCK_CELLS)))
     return ready.blank.planned(view, step)
-
-
-def _told_apart(setup: Setup) -> float:
-    """mm between places of the stock at which engaged angles can be told; inf where no tool has a limit of them."""
-    return min((TOLD_APART * 0.5 * t.diameter_mm for t in setup.tools if (t.max_engagement_deg or 180.0) < 180.0),
-               default=math.inf)
 
 
 def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
     """Tolerances and heights of the plan."""
-    q, ops = ready.setup.quality, ready.setup.operations
+    inputs = ready.inputs
+    q, ops = inputs.quality, inputs.operations
     tops = [stock.highest, float(view.part.bounds[1, 2]) + q.stock_allowance_mm]
     tops.extend(float(f[1, 2]) for f in fixture_boxes(ready, view))
-    floor = float(np.ceil(10.0 * (max(tops) + ready.setup.clearance_mm.rapid + 0.1)) / 10.0)
-    chord = q.chordal_tolerance_mm * (1.0 - (ARCS if ready.setup.machine.arcs else 0.0))
+    floor = float(np.ceil(10.0 * (max(tops) + inputs.clearances.rapid + 0.1)) / 10.0)
+    chord = q.chordal_tolerance_mm * (1.0 - (ARCS if inputs.machine.arcs else 0.0))
     return PlanSettings(q.scallop_height_mm, chord, q.stock_allowance_mm, ready.lift, floor + ABOVE,
                         floor, float(RAMP_ANGLE), ops.roughing, ops.finishing, ops.cut_direction != "conventional",
                         ops.cut_direction == "either", Pattern(ops.pattern), turning_of(ready, view),
-                        rates=rates_of(ready.setup), semi_finishing=ops.semi_finishing,
+                        rates=inputs.rates, semi_finishing=ops.semi_finishing,
                         leaned=_leaned(ops.lean))
 
 
@@ -392,34 +352,31 @@ def proof_setup(ready: Prepared, view: View | Look, *, foreign: bool = False) ->
 
     foreign : of programs that were not planned here: a table nobody told of is not held against them
     """
-    s = ready.setup
-    c, q = s.clearance_mm, s.quality
+    inputs = ready.inputs
+    c, q, machine = inputs.clearances, inputs.quality, inputs.machine
     # its height is one of the setup frame: a program read in the frame of an oblique access is not held against it
-    tabled = (s.machine.kind == "5-axis" and np.array_equal(view.rotation, np.eye(3))
-              and not (foreign and s.machine.table_z_mm is None))
+    tabled = (inputs.turns and np.array_equal(view.rotation, np.eye(3))
+              and not (foreign and machine.table_z_mm is None))
     cylinder, upwards = ready.blank.proof_cylinder(view.rotation)
     return ProofSetup(
-        stock_kind=s.stock.kind, margin=s.stock.margin_mm, uncertainty=ready.blank.beyond,
+        stock_kind=inputs.stock.kind, margin=inputs.stock.margin_mm, uncertainty=ready.blank.beyond,
         stock_box=ready.blank.proof_box(view.rotation), stock_cylinder=cylinder, stock_axis=upwards,
         stock_mesh=ready.blank.proof_mesh(view.rotation),
         fixtures=fixture_boxes(ready, view), clearance_neck=c.neck,
         clearance_shank=c.shank, clearance_holder=c.holder, clearance_rapid=c.rapid,
         scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,
         stock_allowance=q.stock_allowance_mm, ramp_angle=float(RAMP_ANGLE),
-        rapid_feed=rates_of(s).rapid, acceleration=rates_of(s).acceleration,
+        rapid_feed=inputs.rates.rapid, acceleration=inputs.rates.acceleration,
         work_offset=access_of(ready, view).work_offset,
-        travel=None if s.machine.travel_mm is None else np.array(s.machine.travel_mm, dtype=np.float64),
-        gauge_length=gauge_lengths(s),
-        line_spacing=min(ProofSetup.line_spacing, _told_apart(s)),
-        dogleg=s.machine.rapid_motion == "dogleg", max_feed=s.machine.max_feed_mm_min,
-        max_engaged={body.number: math.radians(t.max_engagement_deg)
-                     for t, body in zip(s.tools, tool_bodies(s), strict=True) if t.max_engagement_deg is not None},
-        max_rpm={body.number: min(limits) for t, body in zip(s.tools, tool_bodies(s), strict=True)
-                 if (limits := [x for x in (t.max_rpm, s.machine.max_rpm) if x is not None])},
-        table=table_height(s, ready.blank) if tabled else None,
-        table_known=s.machine.table_z_mm is not None, free_ratio=FREE_RATIO, walls_in_turn=in_turn(ready),
-        kinematics=machine_kinematics(s.machine), rotary_limits=rotary_limits(s.machine),
-        rotary_rate=None if s.machine.rotary_rate_deg_min is None else float(np.radians(s.machine.rotary_rate_deg_min)))
+        travel=None if machine.travel_mm is None else np.array(machine.travel_mm, dtype=np.float64),
+        gauge_length=inputs.gauge_lengths,
+        line_spacing=min(ProofSetup.line_spacing, inputs.engagement_spacing),
+        dogleg=machine.rapid_motion == "dogleg", max_feed=machine.max_feed_mm_min,
+        max_engaged=inputs.max_engaged, max_rpm=inputs.max_rpm,
+        table=table_height(inputs, ready.blank) if tabled else None,
+        table_known=machine.table_z_mm is not None, free_ratio=FREE_RATIO, walls_in_turn=in_turn(ready),
+        kinematics=inputs.kinematics, rotary_limits=inputs.rotary_limits,
+        rotary_rate=None if machine.rotary_rate_deg_min is None else float(np.radians(machine.rotary_rate_deg_min)))
 
 
 def _preview(ready: Prepared, view: bytes | Path, report: dict[str, Any], path: Path) -> None:
@@ -427,12 +384,12 @@ def _preview(ready: Prepared, view: bytes | Path, report: dict[str, Any], path: 
              "of what is in reach": f"{100 * report['reach_coverage']:.1f} %",
              "machining time": f"{report['machining_time_s'] / 60:.0f} min"}
     data = view if isinstance(view, bytes) else view.read_bytes()
-    draw_preview(data, path, ready.setup.labels.get("order") or "zonemill", facts)
+    draw_preview(data, path, ready.inputs.labels.get("order") or "zonemill", facts)
 
 
-def _deviation(ready: Prepared, view: Look, samples: SurfaceSamples, proof: Proof, report: dict[str, Any],
-               path: Path) -> None:
+def _deviation(ready: Prepared, view: Look, samples: SurfaceSamples, proof: Proof, judged_by: ProofSetup,
+               report: dict[str, Any], path: Path) -> None:
     """Draw the deviation map in the frame of a view; samples and findings of the proof are in that frame."""
-    order = ready.setup.labels.get("order")
-    draw_proof(view.part, samples, proof, proof_setup(ready, view), report["state"], report["coverage"] or 0.0, path,
+    order = ready.inputs.labels.get("order")
+    draw_proof(view.part, samples, proof, judged_by, report["state"], report["coverage"] or 0.0, path,
                f"Deviation from the part{f': {order}' if order else ''}")

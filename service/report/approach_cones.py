@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from service.stages.preparation import Prepared, clearances
+from service.stages.preparation import Prepared
 from zones.reach.approach_cones import Cone, approach, directions_over_hemisphere, zone_cone
 from zones.zoning.zones import ZoneArea
 
@@ -26,8 +26,8 @@ def cone_of(ready: Prepared, zone: ZoneArea) -> Cone | None:
         return None
     few = view.samples.subset(zone.samples[rows])
     directions = directions_over_hemisphere(CONE_DIRECTIONS)
-    got = approach(view.obstacles, zone.tool, clearances(ready.setup), few.points, few.normals, directions,
-                   ready.lift, ready.setup.quality.stock_allowance_mm, zone.tips[rows])
+    got = approach(view.obstacles, zone.tool, ready.inputs.clearances, few.points, few.normals, directions,
+                   ready.lift, ready.inputs.quality.stock_allowance_mm, zone.tips[rows])
     cone = zone_cone(got, few.area, directions, holds_first=True)
     return None if cone is None else Cone(view.back(cone.axis), cone.half_angle, cone.share, cone.resolution)
 

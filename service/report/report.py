@@ -11,11 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
-from schemas.setup import setup_sha256
-from service.from_wire import rotary_machine
 from service.report import approach_cones, tool_offers
 from service.stages.cautions import Caution
-from service.stages.preparation import Prepared, clearances
+from service.stages.preparation import Prepared
 from service.version import VERSION
 from toolpath.planning.job_plan import Plan
 from toolpath.planning.zone_finishing import ZonePlan
@@ -69,7 +67,7 @@ def _shape(ready: Prepared) -> dict[str, Any]:
 
 def accesses_of(ready: Prepared) -> list[dict[str, Any]]:
     """The tool axes of a job, and how the rotary axes stand for them."""
-    machine, given = rotary_machine(ready.setup.machine), {a.id for a in ready.setup.access}
+    machine, given = ready.inputs.rotary, {a.id for a in ready.inputs.accesses}
     out = []
     for v in ready.views:
         turn = None if machine is None else [r(a) for a in np.degrees(
@@ -151,9 +149,9 @@ def dry_report(ready: Prepared) -> dict[str, Any]:
     rest = ~ready.zoning.taken
     first = ready.views[0]
     items = explain(first.samples.subset(rest), first.labels.subset(rest), ready.views, ready.decomposition, ready.lift,
-                    clear=clearances(ready.setup))
+                    clear=ready.inputs.clearances)
     return {**_shape(ready), **_areas(ready), "zones": [_zone(ready, z) for z in ready.zones],
-            "remainder": _remainder(ready, items), "proposal": tool_offers.as_dict(ready.setup, tool_offers.offers(ready))}
+            "remainder": _remainder(ready, items), "proposal": tool_offers.as_dict(ready.inputs, tool_offers.offers(ready))}
 
 
 def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples, labels: Labels,
@@ -175,7 +173,7 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
     proved = np.asarray(proof.proved, dtype=np.bool_)
     rest = ~proved & (zone == 0)
     items = explain(dense.subset(rest), labels.subset(rest), ready.views, ready.decomposition, ready.lift,
-                    given_up[rest], clear=clearances(ready.setup))
+                    given_up[rest], clear=ready.inputs.clearances)
     area = dense.area
     total, done = float(area.sum()), float(area[proved].sum())
     # what a tool of the setup could touch: proved, claimed, or left by the passes although a tool gets there
@@ -188,11 +186,11 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
     steps = {s.id: s for s in made.steps}
     report = {
         **_shape(ready), **_areas(ready), "state": "unproved" if findings else "proved", "complete": not remainder,
-        "labels": dict(ready.setup.labels),
+        "labels": dict(ready.inputs.labels),
         "inputs": _inputs(ready),
         "zones": [_planned(ready, z, plans.get(z.id), steps, proof) for z in ready.zones],
         "steps": [_step(s) for s in made.steps], "remainder": remainder,
-        "proposal": tool_offers.as_dict(ready.setup, tool_offers.offers(ready)), "findings": findings,
+        "proposal": tool_offers.as_dict(ready.inputs, tool_offers.offers(ready)), "findings": findings,
         "finding_counts": _counted(proof, unmet), "coverage": r(coverage, 6),
         "reach_coverage": r(done / reach, 6) if reach > 0 else 0.0,
         "machining_time_s": r(proof.spent.seconds, 1), "time": _time(proof),
@@ -211,7 +209,7 @@ def _unmet(ready: Prepared, made: Plan, coverage: float, remainder: list[dict[st
     if not made.steps:
         would: dict[str, Any] = next((x["would_need"] for x in remainder if x["would_need"].get("diameter_mm")), {})
         return [_of_job("nothing_cut", "no tool of the setup can cut anything of what was asked for", would_need=would)]
-    return _too_little(coverage, ready.setup.quality.coverage_min)
+    return _too_little(coverage, ready.inputs.quality.coverage_min)
 
 
 def _too_little(coverage: float, least: float) -> list[dict[str, Any]]:
@@ -237,7 +235,7 @@ def _planned(ready: Prepared, zone: ZoneArea, plan: ZonePlan | None, steps: dict
     out = _zone(ready, zone)
     result = proof.zones.get(zone.id)
     mine = [s for s in steps.values() if s.zone == zone.id]
-    out["scallop_mm"] = {"requested": ready.setup.quality.scallop_height_mm, "p50": None, "p99": None, "max": None}
+    out["scallop_mm"] = {"requested": ready.inputs.quality.scallop_height_mm, "p50": None, "p99": None, "max": None}
     out["passes"], out["cutting_length_mm"], out["machining_time_s"], out["steps"] = 0, 0.0, 0.0, []
     if plan is not None:
         out.update(strategy=plan.strategy, side_step_mm=r(plan.side_step), passes=plan.passes,
@@ -279,7 +277,7 @@ def _bend(bend: Bend | None) -> dict[str, Any]:
 
 
 def _tools(ready: Prepared, proof: Proof, steps: Sequence[Workingstep]) -> list[dict[str, Any]]:
-    out, lives = [], {t.id: t.life_min for t in ready.setup.tools}
+    out, lives = [], {t.id: t.life_min for t in ready.inputs.tools}
     for f in ready.views[0].fields.values():
         t = f.tool
         mine = [s for s in steps if s.tool.id == t.id]
@@ -292,7 +290,7 @@ def _tools(ready: Prepared, proof: Proof, steps: Sequence[Workingstep]) -> list[
                     "slenderness": r(slender, 2), "deflection_mm": r(max(bent), 5) if bent else None,
                     "engagement_deg": None if engaged is None else
                     {"max": r(math.degrees(engaged.most), 2), "p99": r(math.degrees(engaged.p99), 2)},
-                    "neck_clearance_mm": r(t.neck_clearance(ready.setup.clearance_mm.neck))})
+                    "neck_clearance_mm": r(t.neck_clearance(ready.inputs.clearances.neck))})
     return out
 
 
@@ -319,7 +317,7 @@ def deviation(proof: Proof) -> list[dict[str, Any]]:
 
 def _inputs(ready: Prepared) -> dict[str, str]:
     """Hashes of what went in; of the blank where it is a file."""
-    out = {"part_sha256": ready.part.sha256, "setup_sha256": setup_sha256(ready.setup)}
+    out = {"part_sha256": ready.part.sha256, "setup_sha256": ready.inputs.sha256}
     return out if ready.blank.solid is None else {**out, "stock_sha256": ready.blank.solid.sha256}
 
 
@@ -328,7 +326,7 @@ def verification_report(ready: Prepared, proof: Proof, dense: SurfaceSamples) ->
     total = float(dense.area.sum())
     done = float(dense.area[np.asarray(proof.proved, dtype=np.bool_)].sum())
     coverage = done / total if total else 0.0
-    unmet = _too_little(coverage, ready.setup.quality.coverage_min)
+    unmet = _too_little(coverage, ready.inputs.quality.coverage_min)
     if proof.cutting_length <= 0.0:
         unmet.append(_of_job("nothing_cut", "the program takes no stock off"))
     findings = [*(f.as_dict() for f in proof.findings), *unmet]

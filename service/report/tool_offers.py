@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.tool_body import ToolBody
-from schemas.setup import Setup
 from schemas.tools import Tool
-from service.from_wire import tool_bodies
-from service.stages.preparation import Prepared, clearances, tip_field
+from service.stages.job_inputs import JobInputs
+from service.stages.preparation import Prepared, tip_field
 from zones.reach.access_reach import Reach
 from zones.reach.access_view import View
 from zones.reach.tip_field import TipField, touchable
@@ -68,7 +67,7 @@ def offers(ready: Prepared) -> Offers:
     """
     rest = ~ready.zoning.taken & (ready.samples.area > 0)
     asked = _asked(ready, np.flatnonzero(rest))
-    found = _numbered(ready.setup, [(v.id, t) for v, _, p in asked for t in p.tools])
+    found = _numbered(ready.inputs, [(v.id, t) for v, _, p in asked for t in p.tools])
     area, zoning = ready.samples.area, ready.zoning
     added = [_added(ready, view, found, rest) for view in ready.views]
     while found:
@@ -93,14 +92,14 @@ def _asked(ready: Prepared, rest: NDArray[np.int64]) -> list[tuple[View, NDArray
         last = k == len(ready.views) - 1
         here = in_sight(view.samples.subset(rest), view.obstacles) | last
         mine, rest = rest[here], rest[~here]
-        buyer = Buyer(view, ready.lift, clearances(ready.setup))
+        buyer = Buyer(view, ready.lift, ready.inputs.clearances)
         out.append((view, mine, propose(view.samples.subset(mine), buyer)))
     return out
 
 
-def _numbered(setup: Setup, tools: Sequence[tuple[str, ProposedTool]]) -> list[Offer]:
+def _numbered(inputs: JobInputs, tools: Sequence[tuple[str, ProposedTool]]) -> list[Offer]:
     """The tools with numbers above all of the setup; ids 'P' and that number, which leave the default numbers alone."""
-    bodies = {b.id: b for b in tool_bodies(setup)}
+    bodies = {b.id: b for b in inputs.bodies}
     number = max(b.number for b in bodies.values())
     out = []
     for access, t in tools:
@@ -117,7 +116,7 @@ def _added(ready: Prepared, view: View, found: Sequence[Offer], rest: NDArray[np
     standing = next(iter(view.fields.values())).standing
     out = {}
     for o in found:
-        limit = tip_field(ready.setup, ready.blank, view.rotation, standing, view.part.bounds, o.body)
+        limit = tip_field(ready.inputs, ready.blank, view.rotation, standing, view.part.bounds, o.body)
         few = touchable(limit, s.points[rows], s.normals[rows], ready.lift)
         reach = Reach(np.zeros(len(s), np.bool_), np.zeros(len(s), np.bool_), np.zeros((len(s), 3)))
         reach.by_cutter[rows], reach.by_tool[rows], reach.tips[rows] = few
@@ -131,7 +130,7 @@ def _again(ready: Prepared, ids: Container[str], added: Sequence[Mapping[str, _A
     views = [replace(v, fields={**v.fields, **{t: a.limit for t, a in n.items()}})
              for v, n in zip(ready.views, new, strict=True)]
     known = [{**r, **{t: a.reach for t, a in n.items()}} for r, n in zip(ready.zoning.reach, new, strict=True)]
-    return build_zones(views, ready.decomposition, ready.setup.quality.scallop_height_mm, ready.lift, known=known)
+    return build_zones(views, ready.decomposition, ready.inputs.quality.scallop_height_mm, ready.lift, known=known)
 
 
 def _worth_it(found: Sequence[Offer]) -> list[Offer]:
@@ -158,7 +157,7 @@ def _stays(asked: Sequence[tuple[View, NDArray[np.int64], Proposal]], area: NDAr
     return {k: v * total / whole for k, v in sorted(stays.items())} if whole > 0.0 else {}
 
 
-def as_dict(setup: Setup, found: Offers) -> dict[str, Any]:
+def as_dict(inputs: JobInputs, found: Offers) -> dict[str, Any]:
     """The proposal of a report: one list of tools, what they empty, what stays by reason; mm and mm²."""
     tools = []
     for o in found.tools:
@@ -166,15 +165,15 @@ def as_dict(setup: Setup, found: Offers) -> dict[str, Any]:
         lengths = {k: round(getattr(t, k), 4) for k in LENGTHS}
         tools.append({"kind": t.kind, **lengths, "slenderness": round(t.neck_length_mm / t.diameter_mm, 2),
                       "instead_of": t.instead_of or None, "like": t.holder_of, "access": o.access,
-                      "area_mm2": round(o.area_mm2, 3), "tool": _entry(setup, o)})
+                      "area_mm2": round(o.area_mm2, 3), "tool": _entry(inputs, o)})
     return {"tools": tools, "emptied_mm2": round(found.emptied_mm2, 3),
             "stays_mm2": {k: round(v, 3) for k, v in found.stays_mm2.items()}}
 
 
-def _entry(setup: Setup, offer: Offer) -> dict[str, Any]:
+def _entry(inputs: JobInputs, offer: Offer) -> dict[str, Any]:
     """The tool as an entry of ``tools`` of a setup, in the holder of the tool at hand it resembles."""
     t = offer.proposed
-    like = next(x for x in setup.tools if x.id == t.holder_of)
+    like = next(x for x in inputs.tools if x.id == t.holder_of)
     lengths = {k: round(getattr(t, k), 4) for k in LENGTHS}
     assert like.gauge_length_mm is not None and like.stickout_mm is not None  # every Tool fills both in
     gauge = like.gauge_length_mm - like.stickout_mm + t.stickout_mm

@@ -16,12 +16,11 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
 from geometry.mesh import F64, TriangleMesh
+from geometry.setup_frame import Placement
 from geometry.tool_body import ToolBody
 from output.gcode.dialects import DIALECTS, Switches
 from output.gcode.program_writer import label_number, lowest_tip
 from output.workplan import Workplan
-from schemas.setup import Setup
-from service.from_wire import material_name, tool_bodies
 from service.pictures.clamping_picture import Clamped, bar_mesh, box_mesh, clamp_picture, corners_of
 from service.pictures.tool_drawing import draw_tool, svg_of
 from service.setup_sheet.model import Block, Facts, Lines, Picture, Section, Sheet, Table, ToolCard
@@ -41,8 +40,9 @@ from service.setup_sheet.tables import (
     zones_table,
 )
 from service.stages.access_plan import Look, Program
+from service.stages.job_inputs import JobInputs
 from service.stages.preparation import Prepared
-from service.stages.programs import access_of, gauge_lengths, proof_frame
+from service.stages.programs import access_of, proof_frame
 from service.stages.result_files import Files, listed
 from toolpath.workingsteps import Workingstep
 
@@ -80,17 +80,17 @@ def sheet_of(ready: Prepared, written: Sequence[Program], report: Mapping[str, A
 
     deviation : PNG of the map of the deviations, or None
     """
-    setup = ready.setup
+    inputs = ready.inputs
     proved = report["state"] == "proved"
     count = sum(report["finding_counts"].values())
     verdict = ("The programs were simulated, and the proof found nothing." if proved else
                f"Nothing may be run: the proof has {count} finding{'' if count == 1 else 's'}, and no program was "
                "written. What follows is what was planned.")
-    title = setup.labels.get("order") or "zonemill job"
+    title = inputs.labels.get("order") or "zonemill job"
     findings = findings_section(report)
-    sections = [job_section(report, setup, material_name(setup)), *([] if proved else [findings]),
+    sections = [job_section(report, inputs), *([] if proved else [findings]),
                 cautions_section(report), *_clampings(ready, written, report),
-                _tools(setup, report), _steps(setup, written, report),
+                _tools(inputs, report), _steps(inputs, written, report),
                 Section("zones", "Zones", (zones_table(report), Lines("How to read it", ZONE_WORDS))),
                 Section("remainder", "Remainder", (remainder_table(report),)), *([findings] if proved else []),
                 proof_section(report), Section("files", "Files", (files_table(report),))]
@@ -106,39 +106,39 @@ def sheet_of(ready: Prepared, written: Sequence[Program], report: Mapping[str, A
 def _clampings(ready: Prepared, written: Sequence[Program], report: Mapping[str, Any]) -> list[Section]:
     """A part that is turned by hand has a picture for each time it is clamped; where nothing is cut, for the first."""
     names = list(dict.fromkeys(p.access for p in written)) or [ready.views[0].id]
-    looks = [proof_frame(ready)] if ready.setup.machine.kind == "5-axis" else [Look.of(ready.view(n)) for n in names]
+    looks = [proof_frame(ready)] if ready.inputs.turns else [Look.of(ready.view(n)) for n in names]
     return [_clamping(ready, look, [p for p in written if len(looks) == 1 or p.access == look.id], report,
                       len(looks) > 1) for look in looks]
 
 
 def _clamping(ready: Prepared, look: Look, programs: Sequence[Program], report: Mapping[str, Any],
               several: bool) -> Section:
-    setup, turns = ready.setup, ready.setup.machine.kind == "5-axis"
+    inputs, turns = ready.inputs, ready.inputs.turns
     access = access_of(ready, look)
     held = Clamped(look.part, _blank_mesh(ready, look.rotation), not ready.blank.stands_alone,
-                   tuple(corners_of(np.array(f.box_mm)) @ look.rotation.T for f in setup.fixtures),
+                   tuple(corners_of(box) @ look.rotation.T for box in inputs.fixtures),
                    access.work_offset,
                    tuple((v.id, look.rotation @ v.direction) for v in ready.views if turns or v.id == look.id))
     names, listed_names = [n for p in programs for _, n, _ in p.files()], {f["name"] for f in report["files"]}
     blank = ready.blank.corners(look.rotation)
-    axes = look.rotation @ _setup_axes(setup)
+    axes = look.rotation @ _setup_axes(inputs.placement)
     frame = "the frame of the setup" if turns else f"the frame of access {look.id}"
     pairs = [
         ("Programs", ", ".join(n for n in names if n in listed_names) or "none written"),
         ("Work offset", access.work_offset),
-        ("Program zero", f"{place(setup.placement.origin_mm)} in the coordinates of the part's file, in which X of the "
+        ("Program zero", f"{place(inputs.placement.origin)} in the coordinates of the part's file, in which X of the "
                          f"program is {_direction(axes[0].tolist())} and Z is {_direction(axes[2].tolist())}"),
         *([] if turns else [("Tool axis", f"{look.id}: {_direction(look.rotation[2].tolist())} of the setup is Z of "
                                           "the program")]),
         ("Part", f"{_box(look.part.bounds)} in {frame}"),
-        (f"Blank, {setup.stock.kind.replace('_', ' ')}", _box(blank) + _round(ready, look.rotation) + (
+        (f"Blank, {inputs.stock.kind.replace('_', ' ')}", _box(blank) + _round(ready, look.rotation) + (
             "" if ready.blank.stands_alone else f": the part grown by {number(ready.blank.margin)}") + (
             f"; the real one may stand {number(ready.blank.uncertainty)} beyond" if ready.blank.uncertainty else "")),
         *_heights([p.work for p in programs])]
     picture = clamp_picture(held, f"{look.id if several else 'Clamping'}: seen from the front right")
     blocks: list[Block] = [Picture(picture, _seen(held, blank)), Facts(tuple(pairs))]
     if turns:
-        blocks.append(_turned(report, (setup.machine.kinematics or "")[-2:]))
+        blocks.append(_turned(report, (inputs.machine.kinematics or "")[-2:]))
     fixtures = tuple((f"fixture {k}", *(f"{number(a)} to {number(b)}" for a, b in zip(*box.tolist(), strict=True)))
                      for k, box in enumerate((np.array([c.min(axis=0), c.max(axis=0)]) for c in held.fixtures), 1))
     blocks.append(Table("Fixtures: boxes in the frame of the program that nothing may touch, mm",
@@ -148,9 +148,9 @@ def _clamping(ready: Prepared, look: Look, programs: Sequence[Program], report: 
     return Section(f"clamping-{look.id}", title, tuple(blocks))
 
 
-def _setup_axes(setup: Setup) -> F64:
+def _setup_axes(placement: Placement) -> F64:
     """(3, 3), unit: X, Y and Z of the setup frame as rows, in the coordinates of the part's file."""
-    x, z = (np.array(v) / np.linalg.norm(v) for v in (setup.placement.x_axis, setup.placement.z_axis))
+    x, z = (np.array(v) / np.linalg.norm(v) for v in (placement.x_axis, placement.z_axis))
     return np.array([x, np.cross(z, x), z])
 
 
@@ -218,15 +218,15 @@ def _blank_mesh(ready: Prepared, rotation: F64) -> TriangleMesh:
     return box_mesh(corners_of(blank.bounds) @ rotation.T)
 
 
-def _tools(setup: Setup, report: Mapping[str, Any]) -> Section:
+def _tools(inputs: JobInputs, report: Mapping[str, Any]) -> Section:
     used = list(dict.fromkeys(s["tool"] for s in report["steps"]))
-    bodies, gauges = {b.id: b for b in tool_bodies(setup)}, gauge_lengths(setup)
-    cards = [_card(setup, bodies[name], gauges[bodies[name].number], report) for name in used]
-    return Section("tools", "Tools", (tools_table(report, setup, used), *cards))
+    bodies, gauges = {b.id: b for b in inputs.bodies}, inputs.gauge_lengths
+    cards = [_card(inputs, bodies[name], gauges[bodies[name].number], report) for name in used]
+    return Section("tools", "Tools", (tools_table(report, inputs, used), *cards))
 
 
-def _card(setup: Setup, body: ToolBody, gauge: float, report: Mapping[str, Any]) -> ToolCard:
-    tool = next(t for t in setup.tools if t.id == body.id)
+def _card(inputs: JobInputs, body: ToolBody, gauge: float, report: Mapping[str, Any]) -> ToolCard:
+    tool = next(t for t in inputs.tools if t.id == body.id)
     fact = next(t for t in report["tools"] if t["id"] == body.id)
     segments = tuple((f"Holder {k}", f"Ø{number(h.diameter)}" + (
         f" to {number(h.diameter_top)}" if h.diameter_top != h.diameter else "") + f", {number(h.length)} long")
@@ -246,7 +246,7 @@ def _card(setup: Setup, body: ToolBody, gauge: float, report: Mapping[str, Any])
     return ToolCard(heading, draw_tool(body, gauge), Facts(pairs), mind)
 
 
-def _steps(setup: Setup, written: Sequence[Program], report: Mapping[str, Any]) -> Section:
+def _steps(inputs: JobInputs, written: Sequence[Program], report: Mapping[str, Any]) -> Section:
     planned, labels, programs = {}, {}, {}
     for p in written:
         for s in p.work.steps:
@@ -255,7 +255,7 @@ def _steps(setup: Setup, written: Sequence[Program], report: Mapping[str, Any]) 
             planned[s.id] = (s.access or p.access, s.top, s.bottom)
             if p.work.restart and report["state"] == "proved":
                 labels[s.id] = _label(p, s)
-    table = steps_table(report, planned, labels, programs, {b.id: b.number for b in tool_bodies(setup)})
+    table = steps_table(report, planned, labels, programs, {b.id: b.number for b in inputs.bodies})
     note = "Heights are in the frame of the program; of a tool axis that leans they are along it."
     words = "A program can be started at the label of any step, when all steps before it have been cut."
     begun = (words,) if labels else ()

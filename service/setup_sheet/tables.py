@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from output.header_text import decimal
-from schemas.setup import Setup
 from service.setup_sheet.model import Facts, Lines, Section, Table
+from service.stages.job_inputs import JobInputs
 
 NONE = "-"
 SHORT_LABEL = 8  # characters of a label that fit into a narrow column
@@ -49,16 +49,16 @@ def ranged(values: Sequence[float | None], digits: int = 0) -> str:
     return NONE if not words else words[0] if words[0] == words[-1] else f"{words[0]} to {words[-1]}"
 
 
-def job_section(report: Mapping[str, Any], setup: Setup, material: str) -> Section:
+def job_section(report: Mapping[str, Any], inputs: JobInputs) -> Section:
     """What the job is and what it takes."""
     labels = [(f"Label {key}", value) for key, value in sorted(report["labels"].items())]
-    part, time, machine = report["part"], report["time"], setup.machine
+    part, time, machine = report["part"], report["time"], inputs.machine
     size = [b - a for a, b in zip(*part["bbox_mm"], strict=True)]
     programs = [f["name"] for f in report["files"] if f["kind"] == "program"]
     axes = machine.kind if machine.kinematics is None else f"{machine.kind}, {machine.kinematics}"
     return Section("job", "Job", (Facts((
         *labels,
-        ("Material", material),
+        ("Material", inputs.material_name),
         ("Machine", f"{axes}; {', '.join(machine.dialects)}"),
         ("Units", "mm, mm/min, 1/min, degrees"),
         ("Coolant", machine.coolant),
@@ -119,9 +119,9 @@ def _many(f: Mapping[str, Any]) -> str:
     return str(f.get("count", 1))
 
 
-def tools_table(report: Mapping[str, Any], setup: Setup, used: Sequence[str]) -> Table:
+def tools_table(report: Mapping[str, Any], inputs: JobInputs, used: Sequence[str]) -> Table:
     """All tools of the setup: those in use in the order the programs take them, then the rest."""
-    facts, tools = {t["id"]: t for t in report["tools"]}, {t.id: t for t in setup.tools}
+    facts, tools = {t["id"]: t for t in report["tools"]}, {t.id: t for t in inputs.tools}
     rows = []
     for name in [*used, *(t for t in tools if t not in used)]:
         tool, fact = tools[name], facts[name]

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from schemas.setup import Setup
 from service.cutting_data import cutting_data
+from service.stages.job_inputs import JobInputs
 from service.stages.preparation import Prepared
 from toolpath.feeds.tool_life import minutes_in_cut
 from toolpath.linking.ramp_entry import LEAST_RUN
@@ -68,11 +68,11 @@ def _rounded(value: float) -> float | None:
     return round(value, 5) + 0.0 if math.isfinite(value) else None
 
 
-def limited(setup: Setup) -> list[Caution]:
+def limited(inputs: JobInputs) -> list[Caution]:
     """Speeds and feeds of tools that tool or machine do not allow, in the order of the tools."""
     out = []
-    for tool in setup.tools:
-        for field, asked, limit in cutting_data(setup.material, tool, setup.machine).cut_back:
+    for tool in inputs.tools:
+        for field, asked, limit in cutting_data(inputs.material, tool, inputs.machine).cut_back:
             whose = "machine.max_feed_mm_min"
             if field == "spindle_rpm":
                 whose = "its max_rpm" if limit == tool.max_rpm else "machine.max_rpm"
@@ -82,19 +82,19 @@ def limited(setup: Setup) -> list[Caution]:
     return out
 
 
-def dry(setup: Setup) -> list[Caution]:
+def dry(inputs: JobInputs) -> list[Caution]:
     """Tools that cut without coolant at figures that are meant for it."""
     out = []
-    for tool in setup.tools if setup.machine.coolant == "off" else ():
+    for tool in inputs.tools if inputs.machine.coolant == "off" else ():
         if tool.spindle_rpm is None or tool.feed_mm_min is None:
-            speed = cutting_data(setup.material, tool, setup.machine).cutting_speed
+            speed = cutting_data(inputs.material, tool, inputs.machine).cutting_speed
             out.append(Caution("dry", (tool.id,),
                                f"tool {tool.id} cuts dry, at {speed:.0f} m/min, and its speed or feed is a figure for "
                                "coolant", speed, math.nan, "give its spindle_rpm and feed_mm_min for dry cutting"))
     return out
 
 
-def uncut_centres(setup: Setup, steps: Sequence[Workingstep]) -> list[Caution]:
+def uncut_centres(inputs: JobInputs, steps: Sequence[Workingstep]) -> list[Caution]:
     """Tools that do not cut to the centre and go down into stock: nothing here knows how wide their core is."""
     used = {s.tool.id: s.tool for s in steps if s.operation != "finishing"}
     return [Caution("center_cutting", (tool.id,),
@@ -102,7 +102,7 @@ def uncut_centres(setup: Setup, steps: Sequence[Workingstep]) -> list[Caution]:
                     f"may be {LEAST_RUN * used[tool.id].radius:.2f} mm long where there is no more room",
                     LEAST_RUN * used[tool.id].radius, tool.diameter_mm,
                     "look at its first cuts in closed pockets, drill them first, or take one that cuts to the centre")
-            for tool in setup.tools if not tool.center_cutting and tool.id in used]
+            for tool in inputs.tools if not tool.center_cutting and tool.id in used]
 
 
 def upright(asked: Leaned | None, zones: Sequence[ZonePlan], steps: Sequence[Workingstep]) -> list[Caution]:
@@ -182,10 +182,10 @@ def bent(steps: Sequence[Workingstep]) -> list[Caution]:
     return out
 
 
-def lives_ended(setup: Setup, steps: Sequence[Workingstep]) -> list[Caution]:
+def lives_ended(inputs: JobInputs, steps: Sequence[Workingstep]) -> list[Caution]:
     """Tools that take more than one cutter, and steps that one cutter does not last for, in the order of the tools."""
     out = []
-    for tool in setup.tools:
+    for tool in inputs.tools:
         mine = [s for s in steps if s.tool.id == tool.id]
         if tool.life_min is None or not mine:
             continue

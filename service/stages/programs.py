@@ -21,10 +21,7 @@ from output.gcode.program_writer import write_program
 from output.gcode.proof_header import AWAITED, filled
 from output.header_text import decimal
 from output.workplan import FIRST_NUMBER, Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
-from schemas.setup import Access, Setup, setup_sha256
-from service.cutting_data import rates_of
-from service.from_wire import rotary_machine, tool_bodies
-from service.report import report as reporting
+from schemas.setup import Access
 from service.stages.access_plan import Look, Program, Side
 from service.stages.blank_model import turned_box
 from service.stages.preparation import TABLE_SPARE, Prepared, table_height
@@ -43,7 +40,7 @@ NO_HOLDER = 200.0  # mm by which a shank is taken to go on where the setup names
 
 def fixture_boxes(ready: Prepared, view: View | Look) -> tuple[np.ndarray, ...]:
     """Boxes (2, 3) that hold the fixtures in the frame of a view, mm."""
-    return tuple(turned_box(np.array(f.box_mm, dtype=np.float64), view.rotation) for f in ready.setup.fixtures)
+    return tuple(turned_box(box, view.rotation) for box in ready.inputs.fixtures)
 
 
 def access_of(ready: Prepared, view: View | Look) -> Access:
@@ -54,7 +51,7 @@ def access_of(ready: Prepared, view: View | Look) -> Access:
 def proof_frame(ready: Prepared) -> Look:
     """The frame programs are proved in: of the first access, on a machine with rotary axes that of the setup."""
     first = Look.of(ready.views[0])
-    if ready.setup.machine.kind != "5-axis":
+    if not ready.inputs.turns:
         return first
     turn = np.eye(3)
     return first if np.array_equal(first.rotation, turn) else Look(first.id, turn, ready.part)
@@ -69,7 +66,7 @@ def programs_of(ready: Prepared, sides: Sequence[Side],
     cutting = [s for s in sides if s.made.steps]
     if not cutting:
         return []
-    if ready.setup.machine.kind == "5-axis":
+    if ready.inputs.turns:
         work = replace(clamped_workplan(ready, cutting), surfaces=_surfaces(ready, cutting, trimmed or {}))
         return _written(ready, ready.views[0].id, work)
     out = []
@@ -86,10 +83,10 @@ def _written(ready: Prepared, access: str, work: Workplan, end: str = "", turn: 
 
     The one that is simulated is the first that says how far the path may be left: that is in the error bound then.
     """
-    machine = ready.setup.machine
+    machine = ready.inputs.machine
     switches = Switches(machine.high_speed, machine.haas_tcp, machine.heidenhain_plane, machine.siemens_cycle800)
     if machine.arcs:
-        work = fitted(work, ARCS * ready.setup.quality.chordal_tolerance_mm)
+        work = fitted(work, ARCS * ready.inputs.quality.chordal_tolerance_mm)
     dialects = {d: DIALECTS[d](switches) for d in machine.dialects}
     first = next((d for d, control in dialects.items() if control.bounds_path), machine.dialects[0])
     index = [view.id for view in ready.views].index(access)
@@ -152,24 +149,24 @@ def workplan(ready: Prepared, side: Side) -> Workplan:
 
 def clamped_workplan(ready: Prepared, sides: Sequence[Side]) -> Workplan:
     """The plans of all accesses one after the other, as the writers want it on a machine with rotary axes."""
-    setup, first = ready.setup, ready.views[0]
+    inputs, first = ready.inputs, ready.views[0]
     look = Look(first.id, np.eye(3), ready.part)
-    machine = rotary_machine(setup.machine)
+    machine = inputs.rotary
     if machine is None:
         raise InternalError("a machine without rotary axes has no clamping")
     spare = ready.blank.beyond
     boxes = [ready.blank.corners(look.rotation) + [[-spare], [spare]], ready.part.bounds, *fixture_boxes(ready, look)]
     low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
-    radius = 0.5 * float(np.linalg.norm(high - low)) + setup.clearance_mm.rapid
+    radius = 0.5 * float(np.linalg.norm(high - low)) + inputs.clearances.rapid
     frames = {s.view.id: Frame(s.view.rotation, s.clearance) for s in sides}
     rises = [float(s.view.rotation[2, 2]) for s in sides]
     rises += [float((t.axes @ s.view.rotation)[:, 2].min()) for s in sides for step in s.made.steps
               for t in step.trajectories if t.axes is not None]
     leans = float(np.arccos(np.clip(min(rises), -1.0, 1.0)))
     centre = 0.5 * (low + high)
-    lift = room_to_turn(centre[2], radius, leans, tool_bodies(setup),
-                        table_height(setup, ready.blank) + setup.clearance_mm.rapid)
-    clamping = Clamping(machine, frames, centre + [0.0, 0.0, lift], radius + lift, gauge_lengths(setup))
+    lift = room_to_turn(centre[2], radius, leans, inputs.bodies,
+                        table_height(inputs, ready.blank) + inputs.clearances.rapid)
+    clamping = Clamping(machine, frames, centre + [0.0, 0.0, lift], radius + lift, inputs.gauge_lengths)
     words = ("fixed tool axes, one after the other, each from what those before leave",)
     steps = tuple(t for s in sides for t in s.made.steps)
     work = _workplan(ready, steps, look, float(home_of(clamping)[2]), access_of(ready, first), words)
@@ -178,13 +175,13 @@ def clamped_workplan(ready: Prepared, sides: Sequence[Side]) -> Workplan:
 
 def turning_of(ready: Prepared, view: View) -> Turning | None:
     """What the rotary axes can do in the frame of a view; None on a machine without, or where they only index."""
-    setup, turn = ready.setup, view.rotation
-    machine = rotary_machine(setup.machine)
-    if machine is None or not setup.machine.simultaneous:
+    inputs, turn = ready.inputs, view.rotation
+    machine = inputs.rotary
+    if machine is None or not inputs.machine.simultaneous:
         return None
-    longest, tolerance = max(gauge_lengths(setup).values()), 0.5 * setup.quality.chordal_tolerance_mm
+    longest, tolerance = max(inputs.gauge_lengths.values()), 0.5 * inputs.quality.chordal_tolerance_mm
 
-    rate, fastest = setup.machine.rotary_rate_deg_min, rates_of(setup).rapid
+    rate, fastest = inputs.machine.rotary_rate_deg_min, inputs.rates.rapid
 
     def along(tips: F64, axes: F64) -> tuple[F64, F64, F64] | None:
         try:
@@ -195,12 +192,12 @@ def turning_of(ready: Prepared, view: View) -> Turning | None:
         if rate is not None:
             least = np.degrees(np.abs(np.diff(turns, axis=0)).max(axis=1)) / rate
         if machine.pivots is not None:
-            for gauge in {*gauge_lengths(setup).values()}:
+            for gauge in {*inputs.gauge_lengths.values()}:
                 gone = np.abs(np.diff(machine.joints(way, turns, gauge), axis=0)).max(axis=1)
                 least = np.maximum(least, gone / fastest)
         return way @ turn.T, machine.axes(turns) @ turn.T, RATE_SPARE * least
 
-    table = table_height(setup, ready.blank) + setup.clearance_mm.rapid + TABLE_SPARE
+    table = table_height(inputs, ready.blank) + inputs.clearances.rapid + TABLE_SPARE
     return Turning(lambda axes: machine.stands(axes @ turn), along, turn[:, 2], table)
 
 
@@ -235,23 +232,23 @@ def room_to_turn(height: float, radius: float, leans: float, tools: Sequence[Too
 def _workplan(ready: Prepared, steps: tuple[Workingstep, ...], look: Look, clearance: float, access: Access,
               words: tuple[str, ...]) -> Workplan:
     """What both kinds of plan say; clearance is the height of the clearance plane, mm."""
-    setup = ready.setup
+    inputs = ready.inputs
     used = {s.tool.id for s in steps}
     if ready.blank.solid is not None:
         words = (*words, f"stock sha256 {ready.blank.solid.sha256}")
     lo, hi = ready.blank.corners(look.rotation)
-    shapes = Ap238(setup.machine.ap238) is Ap238.CC2
-    gauges = gauge_lengths(setup)
-    return Workplan(setup.labels.get("order") or "zonemill job", steps,
-                    tuple(t for t in tool_bodies(setup) if t.id in used), clearance, access.work_offset,
-                    StockBox(lo, hi), reporting.material_name(setup), ready.part.sha256, setup_sha256(setup), VERSION,
-                    dict(setup.labels), (*words, *(f"warning: {w}" for w in ready.warnings)),
+    shapes = Ap238(inputs.machine.ap238) is Ap238.CC2
+    gauges = inputs.gauge_lengths
+    return Workplan(inputs.labels.get("order") or "zonemill job", steps,
+                    tuple(t for t in inputs.bodies if t.id in used), clearance, access.work_offset,
+                    StockBox(lo, hi), inputs.material_name, ready.part.sha256, inputs.sha256, VERSION,
+                    dict(inputs.labels), (*words, *(f"warning: {w}" for w in ready.warnings)),
                     stock_words=_stock_words(ready), cylinder=_cylinder(ready, look),
                     stock_mesh=ready.blank.proof_mesh(look.rotation) if shapes else None,
-                    part_mesh=look.part.mesh if shapes else None, ap238=Ap238(setup.machine.ap238),
-                    coolant=setup.machine.coolant == "flood",
+                    part_mesh=look.part.mesh if shapes else None, ap238=Ap238(inputs.machine.ap238),
+                    coolant=inputs.machine.coolant == "flood",
                     assemblies={b.number: Assembly(gauges[b.number], t.flutes, t.life_min)
-                                for t, b in zip(setup.tools, tool_bodies(setup), strict=True)})
+                                for t, b in zip(inputs.tools, inputs.bodies, strict=True)})
 
 
 def _stock_words(ready: Prepared) -> str:
@@ -279,16 +276,9 @@ def _surfaces(ready: Prepared, sides: Sequence[Side],
     out: dict[int, NurbsSurface] = {}
     for side in sides:
         turn = np.eye(4)
-        if ready.setup.machine.kind == "5-axis":
+        if ready.inputs.turns:
             turn[:3, :3] = side.view.rotation.T
         for zone in ready.zones:
             for face in trimmed.get(zone.id, ()) if zone.access == side.view.id else ():
                 out.update({one.face: one.surface.moved(turn) for one in exact_faces(face)})
     return out
-
-
-def gauge_lengths(setup: Setup) -> dict[int, float]:
-    """mm from the spindle face to the tip, by T number."""
-    return {body.number: t.gauge_length_mm if t.gauge_length_mm is not None else
-            body.stickout + sum(h.length for h in body.holder)
-            for t, body in zip(setup.tools, tool_bodies(setup), strict=True)}

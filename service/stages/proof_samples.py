@@ -79,7 +79,7 @@ class Score:
 def score(ready: Prepared) -> Score:
     """Sample the machinable area for the proof and hand every sample to the zone whose tool can touch it."""
     first = ready.views[0]
-    triangles = machinable_triangles(first.part, ready.decomposition, ready.setup, ready.seen_from @ first.rotation.T)
+    triangles = machinable_triangles(first.part, ready.decomposition, ready.inputs, ready.seen_from @ first.rotation.T)
     mesh = first.part.mesh
     dense = with_surface_normals(sample_surface(mesh, PROOF_DENSITY, seed=PROOF_SEED, triangles=triangles), mesh)
     zone, tips = np.zeros(len(dense), np.int32), np.zeros((len(dense), 3))

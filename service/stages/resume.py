@@ -30,7 +30,6 @@ import structlog
 from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
-from schemas.setup import setup_sha256
 from service.checkpoint_store import Kept
 from service.serialization import Known, pack, unpack
 from service.stages.access_plan import Side
@@ -136,7 +135,7 @@ class Resumed:
     def _prepared(self) -> str:
         """Digest of the job as prepared here."""
         mesh, first = self.ready.part.mesh, self.ready.samples
-        told: list[str | NDArray[Any]] = [code_version(), _computing(), setup_sha256(self.ready.setup)]
+        told: list[str | NDArray[Any]] = [code_version(), _computing(), self.ready.inputs.sha256]
         told += [mesh.vertices, mesh.faces, first.points, first.normals]
         for v in self.ready.views:
             told += [v.id, v.rotation]

@@ -12,7 +12,7 @@ from geometry.mesh import F64, I32
 from geometry.part import EdgeKind
 from geometry.step_import.face_surfaces import read_patches
 from geometry.trimming.trim import trim_faces
-from service.stages.preparation import Prepared, placement_of
+from service.stages.preparation import Prepared
 from toolpath.passes.trimmed_faces import Faces, SmoothFaces, TrimmedFace
 from toolpath.strategies.isoparametric import suits
 from zones.machinable_area import Form
@@ -30,14 +30,13 @@ def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
     path : the STEP file ``ready`` was read from
     """
     curved = {f.number for f in ready.part.faces if f.surface != "plane"}
-    leans = ready.setup.machine.kind == "5-axis" and ready.setup.machine.simultaneous
+    leans = ready.inputs.turns and ready.inputs.machine.simultaneous
     wanted = [z for z in ready.zones if z.form is not Form.LEVEL and suits(z.tool) or leans and z.form is Form.STEEP]
     flat = {f for z in wanted if leans and z.form is Form.STEEP for f in z.faces} - curved
     numbers = sorted({f for z in wanted for f in z.faces} & curved | flat)
     if not numbers:
         return {}
-    setup = ready.setup
-    exact = read_patches(path, numbers, placement=placement_of(setup), solid=setup.part.solid)
+    exact = read_patches(path, numbers, placement=ready.inputs.placement, solid=ready.inputs.solid)
     pieces = trim_faces(ready.part, numbers, _whole, WIDE)[0]
     uv = np.array(ready.part.uv)
     for f, patch in exact.items():

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from service.from_wire import rotary_machine
 from service.stages.cautions import MOST_RATIO, walls_to_cut
 from service.stages.preparation import Prepared
 from toolpath.counterexamples import HighWall
@@ -27,8 +26,8 @@ def in_turn(ready: Prepared) -> bool:
 
     Only where all is cut along one axis: what several accesses leave each other no plan knows.
     """
-    one_way = len(ready.views) == 1 and rotary_machine(ready.setup.machine) is None
-    return ready.setup.operations.walls_in_turn and one_way
+    one_way = len(ready.views) == 1 and ready.inputs.rotary is None
+    return ready.inputs.operations.walls_in_turn and one_way
 
 
 def band_planes(ready: Prepared, view: View, unheld: Sequence[HighWall] = ()) -> tuple[float, ...]:

@@ -12,7 +12,6 @@ from geometry.errors import CamError
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.sampling import SurfaceSamples
 from geometry.tool_body import ToolBody
-from service.from_wire import tool_bodies
 from service.report.report import REMAINDER_FLOOR_MM2
 from service.stages.access_plan import Look
 from service.stages.preparation import Prepared
@@ -60,7 +59,7 @@ def _plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int3
     label = np.where(zone > 0, zone.astype(np.int64) - 1, len(zones) + len(entries))
     label[rest] = len(zones) + _entries(scored.samples.subset(rest), stays, len(entries))
     names = [{"zone": z["id"]} for z in zones] + [{"remainder": k} for k in range(len(entries))] + [{"other": True}]
-    read = read_all(programs, look.part, tool_bodies(ready.setup), setup, 0, lambda _share: None)
+    read = read_all(programs, look.part, ready.inputs.bodies, setup, 0, lambda _share: None)
     way = way_of(read, programs, look.rotation, report["steps"])
     return _file(ready, look.into(scored.samples, ready.views[0]), look, label, names, proof, setup, way, read,
                  report, open_=report["state"] == "proved")
@@ -74,7 +73,7 @@ def verification_view(ready: Prepared, look: Look, samples: SurfaceSamples, proo
     samples : of the proof, in the frame of ``look``; report : whose places are in the setup frame
     """
     def made() -> Files:
-        read = read_all(programs, look.part, tool_bodies(ready.setup), setup, spindle_tool, lambda _share: None)
+        read = read_all(programs, look.part, ready.inputs.bodies, setup, spindle_tool, lambda _share: None)
         way = way_of(read, programs, look.rotation)
         label = np.zeros(len(samples), np.int64)
         return _file(ready, samples, look, label, [{"other": True}], proof, setup, way, read, report, open_=True)
@@ -118,7 +117,7 @@ def _file(ready: Prepared, samples: SurfaceSamples, look: Look, label: I64, name
     path, longer, steps, grid = path_chunks(way, low, open_=open_)
     chunks: list[Chunk] = [*mesh, edge_chunk(part, low, EDGE_SPACING), *path]
     if len(way.end):
-        chunks.append(stock_chunk(read, look.part, tool_bodies(ready.setup), setup, look, open_=open_))
+        chunks.append(stock_chunk(read, look.part, ready.inputs.bodies, setup, look, open_=open_))
     chunks += [*finer, *longer]
     head = {
         "version": VIEW_VERSION, "made_by": VERSION, "kind": "plan" if "zones" in report else "verify",
@@ -132,7 +131,7 @@ def _file(ready: Prepared, samples: SurfaceSamples, look: Look, label: I64, name
         "connections": [_named(ready, c.id, c.faces) | {"walls": list(c.walls)} for c in d.connections],
         "remainder": [{k: e[k] for k in ("reason", "area_mm2", "faces", "would_need", "tool_at_hand", "why_left",
                                          "at_mm")} for e in report.get("remainder", ())],
-        "tools": [tool_shape(t) for t in tool_bodies(ready.setup)], "steps": steps,
+        "tools": [tool_shape(t) for t in ready.inputs.bodies], "steps": steps,
         "programs": list(way.names), "seconds": round(float(way.ended[-1]), 3 if open_ else 0) if len(way.ended) else 0,
         "findings": [_finding(f, way, open_) for f in report["findings"]], "found": report["finding_counts"],
         **_minded(report),

@@ -22,6 +22,7 @@ from service.setup_sheet.pdf import latin, pdf_of
 from service.setup_sheet.setup_sheet import sheet_files
 from service.stages.access_plan import Program
 from service.stages.blank_model import blank_of
+from service.stages.job_inputs import JobInputs
 from service.stages.result_files import Files
 from tests.synthetic_plan import plan, step
 from toolpath.workingsteps import Workingstep
@@ -123,8 +124,8 @@ def block() -> Part:
 def made(state: str = "proved", findings: list[dict[str, Any]] | None = None, cut: bool = True) -> dict[str, bytes]:
     setup, part = parse_setup(json.dumps(SETUP)), block()
     view = SimpleNamespace(id="A1", rotation=np.eye(3), part=part, direction=np.array([0.0, 0.0, 1.0]))
-    ready = SimpleNamespace(setup=setup, part=part, blank=blank_of(setup, part), views=(view,), accesses=setup.access,
-                            view=lambda _name: view)
+    ready = SimpleNamespace(inputs=JobInputs.of(setup), part=part, blank=blank_of(setup, part), views=(view,),
+                            accesses=setup.access, view=lambda _name: view)
     work = plan(*steps(), restart=True)
     report = report_of(state, findings or [])
     if not cut:
@@ -234,8 +235,8 @@ def test_a_part_that_is_turned_by_hand_is_shown_as_it_lies_each_time():
     for access in setup.access:
         turn = access_rotation(access.direction)
         views[access.id] = SimpleNamespace(id=access.id, rotation=turn, part=turned(part, turn), direction=turn[2])
-    ready = SimpleNamespace(setup=setup, part=part, blank=blank_of(setup, part), views=tuple(views.values()),
-                            accesses=setup.access, view=lambda name: views[name])
+    ready = SimpleNamespace(inputs=JobInputs.of(setup), part=part, blank=blank_of(setup, part),
+                            views=tuple(views.values()), accesses=setup.access, view=lambda name: views[name])
     first, second, third = steps()
     written = [Program("A1", plan(first), "G21\n"), Program("A2", plan(second, clearance_plane=33.0), "G21\n", ".A2"),
                Program("A2", plan(third, clearance_plane=33.0), "G21\n", ".A2.part2")]
@@ -255,8 +256,8 @@ def test_a_part_that_is_turned_by_hand_is_shown_as_it_lies_each_time():
 def test_each_control_has_its_own_label():
     setup, part = parse_setup(json.dumps(SETUP)), block()
     view = SimpleNamespace(id="A1", rotation=np.eye(3), part=part, direction=np.array([0.0, 0.0, 1.0]))
-    ready = SimpleNamespace(setup=setup, part=part, blank=blank_of(setup, part), views=(view,), accesses=setup.access,
-                            view=lambda _name: view)
+    ready = SimpleNamespace(inputs=JobInputs.of(setup), part=part, blank=blank_of(setup, part), views=(view,),
+                            accesses=setup.access, view=lambda _name: view)
     for others, told in (({"haas": "", "siemens": ""}, "N200, STEP_S02"), ({"siemens": "", "heidenhain": ""},
                          'N200, STEP_S02, LBL "S02"'), ({"haas": ""}, "N200")):
         written = [Program("A1", plan(*steps(), restart=True), "G21\n", dialect="fanuc", others=others)]
