@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
 from service.report import approach_cones, tool_offers
-from service.stages.cautions import Caution
+from service.stages.cautions import JobCaution
 from service.stages.preparation import Prepared
 from service.version import VERSION
 from toolpath.planning.job_plan import Plan
@@ -156,7 +156,7 @@ def dry_report(ready: Prepared) -> dict[str, Any]:
 
 def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples, labels: Labels,
                zone: NDArray[np.int32], given_up: NDArray[np.bool_],
-               cautions: Sequence[Caution] = ()) -> tuple[dict[str, Any], NDArray[np.bool_], list[Remainder]]:
+               cautions: Sequence[JobCaution] = ()) -> tuple[dict[str, Any], NDArray[np.bool_], list[Remainder]]:
     """report.json without its files, which proof samples stay uncut, and why.
 
     A sample is proved, or a zone answers for it (then it is a finding), or it stands in the remainder.

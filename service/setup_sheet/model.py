@@ -66,7 +66,7 @@ Block = Facts | Table | Lines | Picture | ToolCard
 
 
 @dataclass(frozen=True)
-class Section:
+class SheetSection:
     """A heading with what stands below it. key : its anchor."""
 
     key: str
@@ -75,14 +75,14 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Sheet:
+class SetupSheet:
     """A whole sheet. proved : the job is; verdict : that in a sentence; foot : at the end of every page."""
 
     title: str
     proved: bool
     verdict: str
     foot: str
-    sections: tuple[Section, ...]
+    sections: tuple[SheetSection, ...]
 
 
-__all__ = ["Block", "Facts", "Lines", "Picture", "Section", "Sheet", "Table", "ToolCard"]
+__all__ = ["Block", "Facts", "Lines", "Picture", "SheetSection", "SetupSheet", "Table", "ToolCard"]

@@ -15,7 +15,7 @@ from PIL import Image
 from output.header_text import ascii_text
 from output.stepnc.part21 import time_stamp
 from service.pictures.tool_drawing import HEIGHT, LETTER, WIDTH, ToolDrawing
-from service.setup_sheet.model import Block, Facts, Lines, Picture, Section, Sheet, Table, ToolCard
+from service.setup_sheet.model import Block, Facts, Lines, Picture, SetupSheet, SheetSection, Table, ToolCard
 
 MARGIN, FOOT = 12.0, 14.0  # mm
 INK, QUIET, BAD, GOOD = (20, 24, 29), (74, 82, 92), (163, 13, 23), (11, 90, 42)
@@ -42,7 +42,7 @@ def latin(text: str) -> str:
 class _Pages(FPDF):
     """A4 pages that say on each of them what they belong to."""
 
-    def __init__(self, sheet: Sheet) -> None:
+    def __init__(self, sheet: SetupSheet) -> None:
         super().__init__("portrait", "mm", "A4")
         self.sheet = sheet
         self.set_margin(MARGIN)
@@ -88,7 +88,7 @@ class _Pages(FPDF):
             self.add_page()
 
 
-def pdf_of(sheet: Sheet) -> bytes:
+def pdf_of(sheet: SetupSheet) -> bytes:
     """The sheet as a PDF; the same sheet gives the same bytes.
 
     Raises
@@ -115,7 +115,7 @@ def _head(p: _Pages) -> None:
     p.multi_cell(0, 6, latin(p.sheet.verdict), fill=True, align="L", new_x="LMARGIN", new_y="NEXT")
 
 
-def _section(p: _Pages, section: Section) -> None:
+def _section(p: _Pages, section: SheetSection) -> None:
     first = section.blocks[0]
     p.need(_height(p, first) + 20.0 if isinstance(first, Picture) else LEAST_BELOW)
     p.ln(4)

@@ -1,6 +1,6 @@
 """Setup sheet of a job, as a web page and as a PDF: what planner and machinist have to know before the spindle turns.
 
-Both are made of one ``service.setup_sheet.model.Sheet``, so that they say the same. It holds no line of a program, and of a
+Both are made of one ``service.setup_sheet.model.SetupSheet``, so that they say the same. It holds no line of a program, and of a
 job that is not proved it says so before all else. No clock and no random number: the same input gives the same bytes.
 """
 
@@ -23,7 +23,7 @@ from output.gcode.program_writer import label_number, lowest_tip
 from output.workplan import Workplan
 from service.pictures.clamping_picture import Clamped, bar_mesh, box_mesh, clamp_picture, corners_of
 from service.pictures.tool_drawing import draw_tool, svg_of
-from service.setup_sheet.model import Block, Facts, Lines, Picture, Section, Sheet, Table, ToolCard
+from service.setup_sheet.model import Block, Facts, Lines, Picture, SetupSheet, SheetSection, Table, ToolCard
 from service.setup_sheet.pdf import pdf_of
 from service.setup_sheet.tables import (
     NONE,
@@ -39,7 +39,7 @@ from service.setup_sheet.tables import (
     tools_table,
     zones_table,
 )
-from service.stages.access_plan import Look, Program
+from service.stages.access_plan import ProofFrame, WrittenProgram
 from service.stages.job_inputs import JobInputs
 from service.stages.preparation import Prepared
 from service.stages.programs import access_of, proof_frame
@@ -55,7 +55,7 @@ ZONE_WORDS = (
 HTML_NAME, PDF_NAME = "sheet.html", "sheet.pdf"
 
 
-def sheet_files(ready: Prepared, written: Sequence[Program], report: Mapping[str, Any], files: Files) -> Files:
+def sheet_files(ready: Prepared, written: Sequence[WrittenProgram], report: Mapping[str, Any], files: Files) -> Files:
     """Both forms of the sheet of a job.
 
     written : the programs, also those of an unproved job, of which nothing is told but heights
@@ -74,8 +74,8 @@ def _bytes_of(files: Files, kind: str) -> bytes | None:
     return next((data for of, _, _, data in files.values() if of == kind and isinstance(data, bytes)), None)
 
 
-def sheet_of(ready: Prepared, written: Sequence[Program], report: Mapping[str, Any],
-             deviation: bytes | None) -> Sheet:
+def sheet_of(ready: Prepared, written: Sequence[WrittenProgram], report: Mapping[str, Any],
+             deviation: bytes | None) -> SetupSheet:
     """What stands on the sheet of a job.
 
     deviation : PNG of the map of the deviations, or None
@@ -91,51 +91,51 @@ def sheet_of(ready: Prepared, written: Sequence[Program], report: Mapping[str, A
     sections = [job_section(report, inputs), *([] if proved else [findings]),
                 cautions_section(report), *_clampings(ready, written, report),
                 _tools(inputs, report), _steps(inputs, written, report),
-                Section("zones", "Zones", (zones_table(report), Lines("How to read it", ZONE_WORDS))),
-                Section("remainder", "Remainder", (remainder_table(report),)), *([findings] if proved else []),
-                proof_section(report), Section("files", "Files", (files_table(report),))]
+                SheetSection("zones", "Zones", (zones_table(report), Lines("How to read it", ZONE_WORDS))),
+                SheetSection("remainder", "Remainder", (remainder_table(report),)), *([findings] if proved else []),
+                proof_section(report), SheetSection("files", "Files", (files_table(report),))]
     if deviation is not None:
-        sections.append(Section("deviation", "Deviation from the part", (Picture(
+        sections.append(SheetSection("deviation", "Deviation from the part", (Picture(
             deviation, "The part coloured by what the proof measured: red where it is cut too deep, green within the "
             "budget, blue where stock is left, hatched where no tool got."),)))
     sha = report["inputs"]
     foot = f"{report['state']}; part {sha['part_sha256'][:16]}, setup {sha['setup_sha256'][:16]}; {title}"
-    return Sheet(f"Setup sheet: {title}", proved, verdict, foot, tuple(sections))
+    return SetupSheet(f"Setup sheet: {title}", proved, verdict, foot, tuple(sections))
 
 
-def _clampings(ready: Prepared, written: Sequence[Program], report: Mapping[str, Any]) -> list[Section]:
+def _clampings(ready: Prepared, written: Sequence[WrittenProgram], report: Mapping[str, Any]) -> list[SheetSection]:
     """A part that is turned by hand has a picture for each time it is clamped; where nothing is cut, for the first."""
     names = list(dict.fromkeys(p.access for p in written)) or [ready.views[0].id]
-    looks = [proof_frame(ready)] if ready.inputs.turns else [Look.of(ready.view(n)) for n in names]
-    return [_clamping(ready, look, [p for p in written if len(looks) == 1 or p.access == look.id], report,
-                      len(looks) > 1) for look in looks]
+    frames = [proof_frame(ready)] if ready.inputs.turns else [ProofFrame.of(ready.view(n)) for n in names]
+    return [_clamping(ready, frame, [p for p in written if len(frames) == 1 or p.access == frame.id], report,
+                      len(frames) > 1) for frame in frames]
 
 
-def _clamping(ready: Prepared, look: Look, programs: Sequence[Program], report: Mapping[str, Any],
-              several: bool) -> Section:
+def _clamping(ready: Prepared, frame: ProofFrame, programs: Sequence[WrittenProgram], report: Mapping[str, Any],
+              several: bool) -> SheetSection:
     inputs, turns = ready.inputs, ready.inputs.turns
-    access = access_of(ready, look)
-    held = Clamped(look.part, _blank_mesh(ready, look.rotation), not ready.blank.stands_alone,
-                   tuple(corners_of(box) @ look.rotation.T for box in inputs.fixtures),
+    access = access_of(ready, frame)
+    held = Clamped(frame.part, _blank_mesh(ready, frame.rotation), not ready.blank.stands_alone,
+                   tuple(corners_of(box) @ frame.rotation.T for box in inputs.fixtures),
                    access.work_offset,
-                   tuple((v.id, look.rotation @ v.direction) for v in ready.views if turns or v.id == look.id))
+                   tuple((v.id, frame.rotation @ v.direction) for v in ready.views if turns or v.id == frame.id))
     names, listed_names = [n for p in programs for _, n, _ in p.files()], {f["name"] for f in report["files"]}
-    blank = ready.blank.corners(look.rotation)
-    axes = look.rotation @ _setup_axes(inputs.placement)
-    frame = "the frame of the setup" if turns else f"the frame of access {look.id}"
+    blank = ready.blank.corners(frame.rotation)
+    axes = frame.rotation @ _setup_axes(inputs.placement)
+    frame = "the frame of the setup" if turns else f"the frame of access {frame.id}"
     pairs = [
         ("Programs", ", ".join(n for n in names if n in listed_names) or "none written"),
         ("Work offset", access.work_offset),
         ("Program zero", f"{place(inputs.placement.origin)} in the coordinates of the part's file, in which X of the "
                          f"program is {_direction(axes[0].tolist())} and Z is {_direction(axes[2].tolist())}"),
-        *([] if turns else [("Tool axis", f"{look.id}: {_direction(look.rotation[2].tolist())} of the setup is Z of "
+        *([] if turns else [("Tool axis", f"{frame.id}: {_direction(frame.rotation[2].tolist())} of the setup is Z of "
                                           "the program")]),
-        ("Part", f"{_box(look.part.bounds)} in {frame}"),
-        (f"Blank, {inputs.stock.kind.replace('_', ' ')}", _box(blank) + _round(ready, look.rotation) + (
+        ("Part", f"{_box(frame.part.bounds)} in {frame}"),
+        (f"Blank, {inputs.stock.kind.replace('_', ' ')}", _box(blank) + _round(ready, frame.rotation) + (
             "" if ready.blank.stands_alone else f": the part grown by {number(ready.blank.margin)}") + (
             f"; the real one may stand {number(ready.blank.uncertainty)} beyond" if ready.blank.uncertainty else "")),
         *_heights([p.work for p in programs])]
-    picture = clamp_picture(held, f"{look.id if several else 'Clamping'}: seen from the front right")
+    picture = clamp_picture(held, f"{frame.id if several else 'Clamping'}: seen from the front right")
     blocks: list[Block] = [Picture(picture, _seen(held, blank)), Facts(tuple(pairs))]
     if turns:
         blocks.append(_turned(report, (inputs.machine.kinematics or "")[-2:]))
@@ -144,8 +144,8 @@ def _clamping(ready: Prepared, look: Look, programs: Sequence[Program], report: 
     blocks.append(Table("Fixtures: boxes in the frame of the program that nothing may touch, mm",
                         ("fixture", "X", "Y", "Z"), fixtures, (1.0, 1.5, 1.5, 1.5),
                         none="The setup names no fixture: none is kept clear of."))
-    title = f"Clamping and program zero, {look.id}" if several else "Clamping and program zero"
-    return Section(f"clamping-{look.id}", title, tuple(blocks))
+    title = f"Clamping and program zero, {frame.id}" if several else "Clamping and program zero"
+    return SheetSection(f"clamping-{frame.id}", title, tuple(blocks))
 
 
 def _setup_axes(placement: Placement) -> F64:
@@ -218,11 +218,11 @@ def _blank_mesh(ready: Prepared, rotation: F64) -> TriangleMesh:
     return box_mesh(corners_of(blank.bounds) @ rotation.T)
 
 
-def _tools(inputs: JobInputs, report: Mapping[str, Any]) -> Section:
+def _tools(inputs: JobInputs, report: Mapping[str, Any]) -> SheetSection:
     used = list(dict.fromkeys(s["tool"] for s in report["steps"]))
     bodies, gauges = {b.id: b for b in inputs.bodies}, inputs.gauge_lengths
     cards = [_card(inputs, bodies[name], gauges[bodies[name].number], report) for name in used]
-    return Section("tools", "Tools", (tools_table(report, inputs, used), *cards))
+    return SheetSection("tools", "Tools", (tools_table(report, inputs, used), *cards))
 
 
 def _card(inputs: JobInputs, body: ToolBody, gauge: float, report: Mapping[str, Any]) -> ToolCard:
@@ -246,7 +246,7 @@ def _card(inputs: JobInputs, body: ToolBody, gauge: float, report: Mapping[str, 
     return ToolCard(heading, draw_tool(body, gauge), Facts(pairs), mind)
 
 
-def _steps(inputs: JobInputs, written: Sequence[Program], report: Mapping[str, Any]) -> Section:
+def _steps(inputs: JobInputs, written: Sequence[WrittenProgram], report: Mapping[str, Any]) -> SheetSection:
     planned, labels, programs = {}, {}, {}
     for p in written:
         for s in p.work.steps:
@@ -259,10 +259,10 @@ def _steps(inputs: JobInputs, written: Sequence[Program], report: Mapping[str, A
     note = "Heights are in the frame of the program; of a tool axis that leans they are along it."
     words = "A program can be started at the label of any step, when all steps before it have been cut."
     begun = (words,) if labels else ()
-    return Section("steps", "Steps", (table, Lines("How to read it", (note, *begun))))
+    return SheetSection("steps", "Steps", (table, Lines("How to read it", (note, *begun))))
 
 
-def _label(program: Program, step: Workingstep) -> str:
+def _label(program: WrittenProgram, step: Workingstep) -> str:
     """The label of a step on each control, told once where several have the same."""
     said = (DIALECTS[d](Switches()).label(step.id, label_number(program.work, step))[0].rstrip(":")
             for d, _, _ in program.files())
@@ -278,7 +278,7 @@ def _template() -> Template:
     return env.get_template("template.html")
 
 
-def html_of(sheet: Sheet) -> bytes:
+def html_of(sheet: SetupSheet) -> bytes:
     """The sheet as one page that asks for nothing from elsewhere; every word of the user's is escaped."""
     return (_template().render(sheet=sheet).rstrip() + "\n").encode()
 

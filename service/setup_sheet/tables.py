@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from output.header_text import decimal
-from service.setup_sheet.model import Facts, Lines, Section, Table
+from service.setup_sheet.model import Facts, Lines, SheetSection, Table
 from service.stages.job_inputs import JobInputs
 
 NONE = "-"
@@ -49,14 +49,14 @@ def ranged(values: Sequence[float | None], digits: int = 0) -> str:
     return NONE if not words else words[0] if words[0] == words[-1] else f"{words[0]} to {words[-1]}"
 
 
-def job_section(report: Mapping[str, Any], inputs: JobInputs) -> Section:
+def job_section(report: Mapping[str, Any], inputs: JobInputs) -> SheetSection:
     """What the job is and what it takes."""
     labels = [(f"Label {key}", value) for key, value in sorted(report["labels"].items())]
     part, time, machine = report["part"], report["time"], inputs.machine
     size = [b - a for a, b in zip(*part["bbox_mm"], strict=True)]
     programs = [f["name"] for f in report["files"] if f["kind"] == "program"]
     axes = machine.kind if machine.kinematics is None else f"{machine.kind}, {machine.kinematics}"
-    return Section("job", "Job", (Facts((
+    return SheetSection("job", "Job", (Facts((
         *labels,
         ("Material", inputs.material_name),
         ("Machine", f"{axes}; {', '.join(machine.dialects)}"),
@@ -81,7 +81,7 @@ def files_table(report: Mapping[str, Any]) -> Table:
     return Table("Files", ("file", "what it is", "access", "sha256 begins"), tuple(rows), (3.0, 3.0, 1.0, 2.2))
 
 
-def cautions_section(report: Mapping[str, Any]) -> Section:
+def cautions_section(report: Mapping[str, Any]) -> SheetSection:
     """What the machinist is to mind although it is no finding."""
     told = [(c["kind"].replace("_", " "), ", ".join(c["subjects"]) or NONE, c["message"], c["remedy"])
             for c in report["warnings"]]
@@ -92,10 +92,10 @@ def cautions_section(report: Mapping[str, Any]) -> Section:
                   none="No caution.")
     lists = (("Of the part and the plan", others), ("Notes of the proof", notes))
     more = [Lines(title, lines) for title, lines in lists if lines]
-    return Section("mind", "To be minded", (table, *more))
+    return SheetSection("mind", "To be minded", (table, *more))
 
 
-def findings_section(report: Mapping[str, Any]) -> Section:
+def findings_section(report: Mapping[str, Any]) -> SheetSection:
     """What the proof found."""
     counts = report["finding_counts"]
     rows = tuple((f["kind"], f["message"], _where(f), place(f.get("point")), _many(f)) for f in report["findings"])
@@ -106,7 +106,7 @@ def findings_section(report: Mapping[str, Any]) -> Section:
         frozenset({4}), none="The proof found nothing.")]
     if more > 0:
         blocks.append(Lines("More", (f"{more} more are counted only: {', '.join(told)}",)))
-    return Section("findings", "Findings of the proof", tuple(blocks))
+    return SheetSection("findings", "Findings of the proof", tuple(blocks))
 
 
 def _where(f: Mapping[str, Any]) -> str:
@@ -210,7 +210,7 @@ def needed(item: Mapping[str, Any]) -> str:
     return ", ".join(w for w in words if w) or "no tool would"
 
 
-def proof_section(report: Mapping[str, Any]) -> Section:
+def proof_section(report: Mapping[str, Any]) -> SheetSection:
     """How well it was looked."""
     proof, time = report["proof"], report["time"]
     facts = Facts((
@@ -220,7 +220,7 @@ def proof_section(report: Mapping[str, Any]) -> Section:
         ("Length in cut", f"{number(proof['cutting_length_mm'], 0)} mm"),
         ("Time in air", f"{minutes(time['in_air_s'])} min, {minutes(time['rapid_s'])} of them rapids; "
                         f"{time['retracts']} times up")))
-    return Section("proof", "The proof", (facts,))
+    return SheetSection("proof", "The proof", (facts,))
 
 
 __all__ = ["NONE", "SHORT_SHA", "cautions_section", "files_table", "findings_section", "job_section", "minutes",

@@ -19,7 +19,7 @@ from zones.reach.access_view import View, turned_samples
 
 
 @dataclass(frozen=True, eq=False)
-class Side:
+class AccessPlan:
     """What was planned along one access, in its frame, with its clearance plane there, mm.
 
     left : the stock as it leaves it, for what is planned after it; None where every access begins with the whole blank
@@ -27,14 +27,14 @@ class Side:
     """
 
     view: View
-    made: Plan
+    plan: Plan
     clearance: float
     left: StockMap | None
     name: str = ""
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class ProofFrame:
     """The frame a proof is carried out in.
 
     id       : of the access whose frame it is, or of the first where it is the setup's
@@ -47,7 +47,7 @@ class Look:
     part: Part
 
     @classmethod
-    def of(cls, view: View) -> Look:
+    def of(cls, view: View) -> ProofFrame:
         """The frame of an access."""
         return cls(view.id, view.rotation, view.part)
 
@@ -59,7 +59,7 @@ class Look:
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class WrittenProgram:
     """One finished program with the plan it was written from.
 
     access : id of its access where it is the program of one of several, else of the first
@@ -102,13 +102,13 @@ class Program:
         return [NcProgram(self._named(d), t, self.turn, self.work.work_offset, d) for d, t in self.others.items()]
 
 
-def in_setup_frame(look: Look, proof: Proof) -> Proof:
+def in_setup_frame(frame: ProofFrame, proof: Proof) -> Proof:
     """The proof with the places of its findings, and of what walls lacked support, in the setup frame."""
-    if np.array_equal(look.rotation, np.eye(3)):
+    if np.array_equal(frame.rotation, np.eye(3)):
         return proof
-    support = replace(proof.support, at=_turned(proof.support.at, look.rotation))
+    support = replace(proof.support, at=_turned(proof.support.at, frame.rotation))
     return replace(proof, support=support, findings=tuple(
-        replace(f, point=_turned(f.point, look.rotation), tip=_turned(f.tip, look.rotation)) for f in proof.findings))
+        replace(f, point=_turned(f.point, frame.rotation), tip=_turned(f.tip, frame.rotation)) for f in proof.findings))
 
 
 Place = tuple[float, float, float]
@@ -121,4 +121,4 @@ def _turned(place: Place | None, rotation: F64) -> Place | None:
     return x, y, z
 
 
-__all__ = ["Look", "Program", "Side", "in_setup_frame"]
+__all__ = ["ProofFrame", "WrittenProgram", "AccessPlan", "in_setup_frame"]

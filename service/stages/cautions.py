@@ -35,7 +35,7 @@ MOST_RATIO = 10.0
 
 
 @dataclass(frozen=True)
-class Caution:
+class JobCaution:
     """One of them.
 
     kind      : 'limited', 'dry', 'thin_wall', 'support', 'deflection', 'tool_life', 'center_cutting' or 'upright'
@@ -68,7 +68,7 @@ def _rounded(value: float) -> float | None:
     return round(value, 5) + 0.0 if math.isfinite(value) else None
 
 
-def limited(inputs: JobInputs) -> list[Caution]:
+def limited(inputs: JobInputs) -> list[JobCaution]:
     """Speeds and feeds of tools that tool or machine do not allow, in the order of the tools."""
     out = []
     for tool in inputs.tools:
@@ -77,27 +77,27 @@ def limited(inputs: JobInputs) -> list[Caution]:
             if field == "spindle_rpm":
                 whose = "its max_rpm" if limit == tool.max_rpm else "machine.max_rpm"
             message = f"tool {tool.id}: {field} {asked:g} is more than {whose} {limit:g}"
-            out.append(Caution("limited", (tool.id,), message, asked, limit,
+            out.append(JobCaution("limited", (tool.id,), message, asked, limit,
                                f"it runs at {limit:g}; ask for no more, or correct the limit"))
     return out
 
 
-def dry(inputs: JobInputs) -> list[Caution]:
+def dry(inputs: JobInputs) -> list[JobCaution]:
     """Tools that cut without coolant at figures that are meant for it."""
     out = []
     for tool in inputs.tools if inputs.machine.coolant == "off" else ():
         if tool.spindle_rpm is None or tool.feed_mm_min is None:
             speed = cutting_data(inputs.material, tool, inputs.machine).cutting_speed
-            out.append(Caution("dry", (tool.id,),
+            out.append(JobCaution("dry", (tool.id,),
                                f"tool {tool.id} cuts dry, at {speed:.0f} m/min, and its speed or feed is a figure for "
                                "coolant", speed, math.nan, "give its spindle_rpm and feed_mm_min for dry cutting"))
     return out
 
 
-def uncut_centres(inputs: JobInputs, steps: Sequence[Workingstep]) -> list[Caution]:
+def uncut_centres(inputs: JobInputs, steps: Sequence[Workingstep]) -> list[JobCaution]:
     """Tools that do not cut to the centre and go down into stock: nothing here knows how wide their core is."""
     used = {s.tool.id: s.tool for s in steps if s.operation != "finishing"}
-    return [Caution("center_cutting", (tool.id,),
+    return [JobCaution("center_cutting", (tool.id,),
                     f"tool {tool.id} does not cut to its centre, and its ways down into stock, of 3 degrees at most, "
                     f"may be {LEAST_RUN * used[tool.id].radius:.2f} mm long where there is no more room",
                     LEAST_RUN * used[tool.id].radius, tool.diameter_mm,
@@ -105,7 +105,7 @@ def uncut_centres(inputs: JobInputs, steps: Sequence[Workingstep]) -> list[Cauti
             for tool in inputs.tools if not tool.center_cutting and tool.id in used]
 
 
-def upright(asked: Leaned | None, zones: Sequence[ZonePlan], steps: Sequence[Workingstep]) -> list[Caution]:
+def upright(asked: Leaned | None, zones: Sequence[ZonePlan], steps: Sequence[Workingstep]) -> list[JobCaution]:
     """Zones finished by an upright tool, or mostly so, although it is asked to lean there, each with the reasons."""
     out = []
     for z in zones:
@@ -121,7 +121,7 @@ def upright(asked: Leaned | None, zones: Sequence[ZonePlan], steps: Sequence[Wor
         else:
             continue
         why = "; ".join(told[:MOST_REASONS]) or without
-        out.append(Caution("upright", (z.zone.id, z.zone.tool.id),
+        out.append(JobCaution("upright", (z.zone.id, z.zone.tool.id),
                            f"zone {z.zone.id}: tool {z.zone.tool.id} is asked to lean and {found} ({why})",
                            way, MOSTLY * whole,
                            "give it a slimmer or longer tool, another lean, or leave it as it is"))
@@ -134,7 +134,7 @@ def walls_to_cut(ready: Prepared) -> list[Wall]:
     return [w for w in ready.decomposition.walls if cut & set(w.faces)]
 
 
-def thin_walls(ready: Prepared) -> list[Caution]:
+def thin_walls(ready: Prepared) -> list[JobCaution]:
     """Walls to be cut that are more than ``MOST_RATIO`` times as high as thick, each once, where it is worst."""
     view = ready.views[0]
     out = []
@@ -142,13 +142,13 @@ def thin_walls(ready: Prepared) -> list[Caution]:
         x, y, z = view.back(np.array(s.at)).tolist()
         message = (f"wall {s.wall} is {s.thickness:.2f} mm thick and {s.height:.2f} high near X{x:.2f} Y{y:.2f} "
                    f"Z{z:.2f}: {s.ratio:.1f} to 1 (limit {MOST_RATIO:g} to 1), so it gives way and swings")
-        out.append(Caution("thin_wall", (s.wall,), message, s.ratio, MOST_RATIO,
+        out.append(JobCaution("thin_wall", (s.wall,), message, s.ratio, MOST_RATIO,
                            "hold it or fill the room beside it, cut both its sides down in turn, or make it thicker",
                            (x, y, z)))
     return out
 
 
-def unheld(support: Support) -> list[Caution]:
+def unheld(support: Support) -> list[JobCaution]:
     """That thin walls are finished without support, where the proof of a job does not hold that against it.
 
     support : of the proof, its place in the setup frame
@@ -157,11 +157,11 @@ def unheld(support: Support) -> list[Caution]:
         return []
     message = (f"thin walls are finished where they are free for up to {support.most:.1f} times their thickness "
                f"(limit {support.limit:g} times), at {support.over} of {support.places} places")
-    return [Caution("support", (), message, support.most, support.limit,
+    return [JobCaution("support", (), message, support.most, support.limit,
                     "hold them or fill the room beside them, or cut their two sides down in turn", support.at)]
 
 
-def bent(steps: Sequence[Workingstep]) -> list[Caution]:
+def bent(steps: Sequence[Workingstep]) -> list[JobCaution]:
     """Tools that would bend too far, in layers and in finishing, each with the worst of its steps."""
     groups: dict[tuple[str, str], list[tuple[Workingstep, Bend]]] = {}
     for s in steps:
@@ -178,11 +178,11 @@ def bent(steps: Sequence[Workingstep]) -> list[Caution]:
         else:
             remedy = f"its feed is eased to {100.0 * bend.share:.0f} %, with {bend.deflection:.3f} mm; a shorter or " \
                      "thicker tool needs no easing"
-        out.append(Caution("deflection", (tool, *(s.id for s, _ in group)), message, bend.full, bend.limit, remedy))
+        out.append(JobCaution("deflection", (tool, *(s.id for s, _ in group)), message, bend.full, bend.limit, remedy))
     return out
 
 
-def lives_ended(inputs: JobInputs, steps: Sequence[Workingstep]) -> list[Caution]:
+def lives_ended(inputs: JobInputs, steps: Sequence[Workingstep]) -> list[JobCaution]:
     """Tools that take more than one cutter, and steps that one cutter does not last for, in the order of the tools."""
     out = []
     for tool in inputs.tools:
@@ -194,20 +194,20 @@ def lives_ended(inputs: JobInputs, steps: Sequence[Workingstep]) -> list[Caution
             total = float(sum(minutes_in_cut(s).sum() for s in mine))
             message = (f"tool {tool.id} is in cut for {total:.3g} min and lasts for {tool.life_min:g}: the program "
                        f"stops for a fresh cutter before {', '.join(asked)}")
-            out.append(Caution("tool_life", (tool.id, *asked), message, total, tool.life_min,
+            out.append(JobCaution("tool_life", (tool.id, *asked), message, total, tool.life_min,
                                f"have {len(asked) + 1} cutters at hand"))
         for step, minutes in [(s.id, float(minutes_in_cut(s).sum())) for s in mine]:
             if minutes > tool.life_min * (1.0 + 1e-9):
                 message = f"{step} keeps tool {tool.id} in cut for {minutes:.3g} min (limit {tool.life_min:g} min)"
-                out.append(Caution("tool_life", (tool.id, step), message, minutes, tool.life_min,
+                out.append(JobCaution("tool_life", (tool.id, step), message, minutes, tool.life_min,
                                    "the tool never goes up in it, so no cutter is changed; take one that lasts longer"))
     return out
 
 
-def sentences(cautions: Sequence[Caution]) -> tuple[str, ...]:
+def sentences(cautions: Sequence[JobCaution]) -> tuple[str, ...]:
     """The sentences of cautions."""
     return tuple(c.sentence for c in cautions)
 
 
-__all__ = ["Caution", "bent", "limited", "lives_ended", "sentences", "thin_walls", "uncut_centres", "unheld",
+__all__ = ["JobCaution", "bent", "limited", "lives_ended", "sentences", "thin_walls", "uncut_centres", "unheld",
            "walls_to_cut"]

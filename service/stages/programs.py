@@ -22,7 +22,7 @@ from output.gcode.proof_header import AWAITED, filled
 from output.header_text import decimal
 from output.workplan import FIRST_NUMBER, Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
 from schemas.setup import Access
-from service.stages.access_plan import Look, Program, Side
+from service.stages.access_plan import AccessPlan, ProofFrame, WrittenProgram
 from service.stages.blank_model import turned_box
 from service.stages.preparation import TABLE_SPARE, Prepared, table_height
 from service.stages.trimmed_faces import exact_faces
@@ -38,32 +38,32 @@ PARTS, LAST_NUMBER = 100, 7000  # from 8000 on numbers may be locked
 NO_HOLDER = 200.0  # mm by which a shank is taken to go on where the setup names no holder
 
 
-def fixture_boxes(ready: Prepared, view: View | Look) -> tuple[np.ndarray, ...]:
+def fixture_boxes(ready: Prepared, view: View | ProofFrame) -> tuple[np.ndarray, ...]:
     """Boxes (2, 3) that hold the fixtures in the frame of a view, mm."""
     return tuple(turned_box(box, view.rotation) for box in ready.inputs.fixtures)
 
 
-def access_of(ready: Prepared, view: View | Look) -> Access:
+def access_of(ready: Prepared, view: View | ProofFrame) -> Access:
     """The access a view or a frame belongs to."""
     return next(a for a in ready.accesses if a.id == view.id)
 
 
-def proof_frame(ready: Prepared) -> Look:
+def proof_frame(ready: Prepared) -> ProofFrame:
     """The frame programs are proved in: of the first access, on a machine with rotary axes that of the setup."""
-    first = Look.of(ready.views[0])
+    first = ProofFrame.of(ready.views[0])
     if not ready.inputs.turns:
         return first
     turn = np.eye(3)
-    return first if np.array_equal(first.rotation, turn) else Look(first.id, turn, ready.part)
+    return first if np.array_equal(first.rotation, turn) else ProofFrame(first.id, turn, ready.part)
 
 
-def programs_of(ready: Prepared, sides: Sequence[Side],
-                trimmed: Mapping[str, Sequence[Faces]] | None = None) -> list[Program]:
+def programs_of(ready: Prepared, access_plans: Sequence[AccessPlan],
+                trimmed: Mapping[str, Sequence[Faces]] | None = None) -> list[WrittenProgram]:
     """The programs: one of each access that has steps, on a machine with rotary axes one of them all.
 
     trimmed : exact faces by zone, in the frame of its access, which the features of STEP-NC are made of
     """
-    cutting = [s for s in sides if s.made.steps]
+    cutting = [s for s in access_plans if s.plan.steps]
     if not cutting:
         return []
     if ready.inputs.turns:
@@ -78,7 +78,8 @@ def programs_of(ready: Prepared, sides: Sequence[Side],
     return out
 
 
-def _written(ready: Prepared, access: str, work: Workplan, end: str = "", turn: F64 | None = None) -> list[Program]:
+def _written(ready: Prepared, access: str, work: Workplan, end: str = "",
+             turn: F64 | None = None) -> list[WrittenProgram]:
     """The program of a plan for every control of the machine; several in order where one would be too large.
 
     The one that is simulated is the first that says how far the path may be left: that is in the error bound then.
@@ -96,11 +97,12 @@ def _written(ready: Prepared, access: str, work: Workplan, end: str = "", turn: 
     for k, part in enumerate([work] if limit is None else parts_of(work, list(dialects.values()), int(1000 * limit))):
         part = replace(part, number=program_number(index, k), number_words=f"access {access} part {k + 1}")
         texts = {d: write_program(part, control) for d, control in dialects.items()}
-        out.append(Program(access, part, texts.pop(first), f"{end}.part{k + 1}" if k else end, turn, first, texts))
+        part_end = f"{end}.part{k + 1}" if k else end
+        out.append(WrittenProgram(access, part, texts.pop(first), part_end, turn, first, texts))
     return out
 
 
-def with_figures(written: Sequence[Program], report: Mapping[str, Any]) -> list[Program]:
+def with_figures(written: Sequence[WrittenProgram], report: Mapping[str, Any]) -> list[WrittenProgram]:
     """Proved programs with the figures of their proof in the headers, to be read once more before they count.
 
     report : of the job
@@ -137,30 +139,31 @@ def program_number(access: int, part: int) -> int:
     return FIRST_NUMBER + (PARTS * access + part) % LAST_NUMBER
 
 
-def workplan(ready: Prepared, side: Side) -> Workplan:
+def workplan(ready: Prepared, access_plan: AccessPlan) -> Workplan:
     """The plan of one access as the writers want it."""
-    view = side.view
+    view = access_plan.view
     comments: tuple[str, ...] = ()
     if len(ready.views) > 1:
         d = " ".join(f"{v:.6g}" for v in view.direction)
         comments = (f"access {view.id}, tool axis {d} in the setup frame; stock of the whole blank",)
-    return _workplan(ready, side.made.steps, Look.of(view), side.clearance, access_of(ready, view), comments)
+    return _workplan(ready, access_plan.plan.steps, ProofFrame.of(view), access_plan.clearance, access_of(ready, view),
+                     comments)
 
 
-def clamped_workplan(ready: Prepared, sides: Sequence[Side]) -> Workplan:
+def clamped_workplan(ready: Prepared, access_plans: Sequence[AccessPlan]) -> Workplan:
     """The plans of all accesses one after the other, as the writers want it on a machine with rotary axes."""
     inputs, first = ready.inputs, ready.views[0]
-    look = Look(first.id, np.eye(3), ready.part)
+    frame = ProofFrame(first.id, np.eye(3), ready.part)
     machine = inputs.rotary
     if machine is None:
         raise InternalError("a machine without rotary axes has no clamping")
     spare = ready.blank.beyond
-    boxes = [ready.blank.corners(look.rotation) + [[-spare], [spare]], ready.part.bounds, *fixture_boxes(ready, look)]
+    boxes = [ready.blank.corners(frame.rotation) + [[-spare], [spare]], ready.part.bounds, *fixture_boxes(ready, frame)]
     low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
     radius = 0.5 * float(np.linalg.norm(high - low)) + inputs.clearances.rapid
-    frames = {s.view.id: Frame(s.view.rotation, s.clearance) for s in sides}
-    rises = [float(s.view.rotation[2, 2]) for s in sides]
-    rises += [float((t.axes @ s.view.rotation)[:, 2].min()) for s in sides for step in s.made.steps
+    frames = {s.view.id: Frame(s.view.rotation, s.clearance) for s in access_plans}
+    rises = [float(s.view.rotation[2, 2]) for s in access_plans]
+    rises += [float((t.axes @ s.view.rotation)[:, 2].min()) for s in access_plans for step in s.plan.steps
               for t in step.trajectories if t.axes is not None]
     leans = float(np.arccos(np.clip(min(rises), -1.0, 1.0)))
     centre = 0.5 * (low + high)
@@ -168,8 +171,8 @@ def clamped_workplan(ready: Prepared, sides: Sequence[Side]) -> Workplan:
                         table_height(inputs, ready.blank) + inputs.clearances.rapid)
     clamping = Clamping(machine, frames, centre + [0.0, 0.0, lift], radius + lift, inputs.gauge_lengths)
     words = ("fixed tool axes, one after the other, each from what those before leave",)
-    steps = tuple(t for s in sides for t in s.made.steps)
-    work = _workplan(ready, steps, look, float(home_of(clamping)[2]), access_of(ready, first), words)
+    steps = tuple(t for s in access_plans for t in s.plan.steps)
+    work = _workplan(ready, steps, frame, float(home_of(clamping)[2]), access_of(ready, first), words)
     return replace(work, clamping=clamping)
 
 
@@ -229,23 +232,23 @@ def room_to_turn(height: float, radius: float, leans: float, tools: Sequence[Too
     return float(np.max(np.maximum(short, 0.0) / (1.0 + up)))
 
 
-def _workplan(ready: Prepared, steps: tuple[Workingstep, ...], look: Look, clearance: float, access: Access,
+def _workplan(ready: Prepared, steps: tuple[Workingstep, ...], frame: ProofFrame, clearance: float, access: Access,
               words: tuple[str, ...]) -> Workplan:
     """What both kinds of plan say; clearance is the height of the clearance plane, mm."""
     inputs = ready.inputs
     used = {s.tool.id for s in steps}
     if ready.blank.solid is not None:
         words = (*words, f"stock sha256 {ready.blank.solid.sha256}")
-    lo, hi = ready.blank.corners(look.rotation)
+    lo, hi = ready.blank.corners(frame.rotation)
     shapes = Ap238(inputs.machine.ap238) is Ap238.CC2
     gauges = inputs.gauge_lengths
     return Workplan(inputs.labels.get("order") or "zonemill job", steps,
                     tuple(t for t in inputs.bodies if t.id in used), clearance, access.work_offset,
                     StockBox(lo, hi), inputs.material_name, ready.part.sha256, inputs.sha256, VERSION,
                     dict(inputs.labels), (*words, *(f"warning: {w}" for w in ready.warnings)),
-                    stock_words=_stock_words(ready), cylinder=_cylinder(ready, look),
-                    stock_mesh=ready.blank.proof_mesh(look.rotation) if shapes else None,
-                    part_mesh=look.part.mesh if shapes else None, ap238=Ap238(inputs.machine.ap238),
+                    stock_words=_stock_words(ready), cylinder=_cylinder(ready, frame),
+                    stock_mesh=ready.blank.proof_mesh(frame.rotation) if shapes else None,
+                    part_mesh=frame.part.mesh if shapes else None, ap238=Ap238(inputs.machine.ap238),
                     coolant=inputs.machine.coolant == "flood",
                     assemblies={b.number: Assembly(gauges[b.number], t.flutes, t.life_min)
                                 for t, b in zip(inputs.tools, inputs.bodies, strict=True)})
@@ -261,24 +264,24 @@ def _stock_words(ready: Prepared) -> str:
     return "" if blank.box is not None else f"part grown by {blank.margin:g} mm"
 
 
-def _cylinder(ready: Prepared, look: Look) -> StockCylinder | None:
+def _cylinder(ready: Prepared, frame: ProofFrame) -> StockCylinder | None:
     """The blank in a frame, where it is a cylinder."""
     bar = ready.blank.bar
     if bar is None:
         return None
-    low, high = bar.ends(look.rotation)
+    low, high = bar.ends(frame.rotation)
     return StockCylinder(low, (high - low) / bar.height, bar.radius, bar.height)
 
 
-def _surfaces(ready: Prepared, sides: Sequence[Side],
+def _surfaces(ready: Prepared, access_plans: Sequence[AccessPlan],
               trimmed: Mapping[str, Sequence[Faces]]) -> dict[int, NurbsSurface]:
-    """Exact faces by number: of one side in its frame, on a machine that turns of all of them in the setup's."""
+    """Exact faces by number: of one access in its frame, or of all accesses in the setup frame on a machine that turns."""
     out: dict[int, NurbsSurface] = {}
-    for side in sides:
+    for access_plan in access_plans:
         turn = np.eye(4)
         if ready.inputs.turns:
-            turn[:3, :3] = side.view.rotation.T
+            turn[:3, :3] = access_plan.view.rotation.T
         for zone in ready.zones:
-            for face in trimmed.get(zone.id, ()) if zone.access == side.view.id else ():
+            for face in trimmed.get(zone.id, ()) if zone.access == access_plan.view.id else ():
                 out.update({one.face: one.surface.moved(turn) for one in exact_faces(face)})
     return out

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from service.stages.access_plan import Look, Program, Side
+from service.stages.access_plan import AccessPlan, ProofFrame, WrittenProgram
 from toolpath.counterexamples import CLOSER, NONE, Counterexamples, HighWall
 from toolpath.workingsteps import Workingstep
 from verify.model import Finding, FindingKind, Proof
@@ -30,7 +30,7 @@ STEP = re.compile(r"^[\d ]*[(;] ?(S\d+[a-z]*)\b", re.IGNORECASE)  # the comment 
 
 
 @dataclass(frozen=True, eq=False)
-class Learned:
+class ProofFeedback:
     """What proofs found so far.
 
     found : Counterexamples by access id, in the frame of the access
@@ -49,22 +49,23 @@ class Learned:
 class Attempt:
     """A plan and its proof.
 
-    sides    : as planned; programs : written from them
-    zones    : of the job; owner : (n,) int32, sample -> its zone from 1, before any was given up
-    answered : (n,) int32, the same without what the plan gave up
-    look     : frame of the proof; proof : in it
+    access_plans : plans of the accesses; programs : written from them
+    zones        : of the job
+    owner        : (n,) int32, index: zone of each sample of the proof, from 1, before the plan gave up any
+    answered     : (n,) int32, index: the same without the samples that the plan gave up
+    frame        : frame of the proof; proof : in it
     """
 
-    sides: Sequence[Side]
-    programs: Sequence[Program]
+    access_plans: Sequence[AccessPlan]
+    programs: Sequence[WrittenProgram]
     zones: Sequence[ZoneArea]
     owner: NDArray[np.int32]
     answered: NDArray[np.int32]
-    look: Look
+    frame: ProofFrame
     proof: Proof
 
 
-def learned(before: Learned, tried: Attempt) -> Learned | None:
+def learned(before: ProofFeedback, tried: Attempt) -> ProofFeedback | None:
     """What to plan with next; None where the proof found nothing, or something that planning again is no answer to.
 
     A place at which the tool dug is gone to with care next time, one at which too much of it was in stock in skims; one
@@ -82,16 +83,17 @@ def learned(before: Learned, tried: Attempt) -> Learned | None:
         if f.kind is FindingKind.RESIDUAL and f.depth > 0.0:
             continue  # all of them are told below, sample by sample
         step = _step_of(f, tried.programs)
-        side = None if step is None else _side_of(step, tried.sides)
-        if step is not None and side is not None and f.kind is FindingKind.SUPPORT and f.point is not None:
-            out[side.view.id] = _held(before.along(side.view.id), out.get(side.view.id, NONE), f, tried, side)
+        planned = None if step is None else _access_plan_of(step, tried.access_plans)
+        if step is not None and planned is not None and f.kind is FindingKind.SUPPORT and f.point is not None:
+            old = out.get(planned.view.id, NONE)
+            out[planned.view.id] = _held(before.along(planned.view.id), old, f, tried, planned)
             notes.append(f"planned again, in lower bands ({step.id}): {f.message}")
             continue
-        if step is None or side is None or f.tip is None or f.kind not in (
+        if step is None or planned is None or f.tip is None or f.kind not in (
                 FindingKind.PLUNGE, FindingKind.ENGAGEMENT, *MET):
             return None
-        tip = np.array(f.tip) @ tried.look.rotation @ side.view.rotation.T
-        old = out.get(side.view.id, NONE)
+        tip = np.array(f.tip) @ tried.frame.rotation @ planned.view.rotation.T
+        old = out.get(planned.view.id, NONE)
         careful = f.kind is FindingKind.PLUNGE and step.strategy != "flank" and old.care(step.tool, tip[None]) == 1.0
         thin = f.kind is FindingKind.ENGAGEMENT and step.strategy != "flank" and not old.crowds(step.tool, tip[None])[0]
         how = "with care" if careful else "in skims" if thin else "and kept away"
@@ -101,7 +103,7 @@ def learned(before: Learned, tried: Attempt) -> Learned | None:
             old = replace(old, packed=_with(old.packed, step.tool.id, tip))
         else:
             old = replace(old, barred=_with(old.barred, step.tool.id, tip))
-        out[side.view.id] = old
+        out[planned.view.id] = old
         x, y, z = f.point or f.tip
         notes.append(f"planned again, {how} near X{x:.2f} Y{y:.2f} Z{z:.2f} "
                      f"({step.id}): {f.message}")
@@ -120,7 +122,7 @@ def learned(before: Learned, tried: Attempt) -> Learned | None:
                          "planned")
         if len(again):
             notes.append(f"planned again, {len(again)} places of {zone.id} given up: more stayed there again")
-    return Learned(out, tuple(notes))
+    return ProofFeedback(out, tuple(notes))
 
 
 def worth_another(found: Sequence[int], plans: int = PLANS) -> bool:
@@ -133,23 +135,24 @@ def worth_another(found: Sequence[int], plans: int = PLANS) -> bool:
     return made < plans or (1 < made < plans + FURTHER and 2 * found[-1] <= found[-2])
 
 
-def _held(before: Counterexamples, old: Counterexamples, f: Finding, tried: Attempt, side: Side) -> Counterexamples:
+def _held(before: Counterexamples, old: Counterexamples, f: Finding, tried: Attempt,
+          planned: AccessPlan) -> Counterexamples:
     """With a wall that a finding says was finished without support; it counts as thinner the second time."""
-    top = float((np.array(f.point) @ tried.look.rotation @ side.view.rotation.T)[2])
+    top = float((np.array(f.point) @ tried.frame.rotation @ planned.view.rotation.T)[2])
     thin = f.limit / tried.proof.support.limit * CLOSER ** (2 if before.unheld else 1)
     return replace(old, unheld=(*old.unheld, HighWall(top, top - f.depth, thin)))
 
 
-def _side_of(step: Workingstep, sides: Sequence[Side]) -> Side | None:
-    """The side a step of a program was planned on; by its id, as arcs and longer lines make another step of it."""
-    return next((s for s in sides if any(t.id == step.id for t in s.made.steps)), None)
+def _access_plan_of(step: Workingstep, access_plans: Sequence[AccessPlan]) -> AccessPlan | None:
+    """The plan that holds a step of a program, found by its id: arcs and longer lines make another object of it."""
+    return next((a for a in access_plans if any(t.id == step.id for t in a.plan.steps)), None)
 
 
 def _with(places: Mapping[str, F64], tool: str, tip: F64) -> Mapping[str, F64]:
     return {**places, tool: np.vstack([places.get(tool, np.zeros((0, 3))), tip])}
 
 
-def _step_of(f: Finding, programs: Sequence[Program]) -> Workingstep | None:
+def _step_of(f: Finding, programs: Sequence[WrittenProgram]) -> Workingstep | None:
     """The workingstep a finding's line belongs to."""
     program = next((p for p in programs if p.name == f.program), None)
     if program is None or f.line <= 0:
@@ -161,4 +164,4 @@ def _step_of(f: Finding, programs: Sequence[Program]) -> Workingstep | None:
     return None
 
 
-__all__ = ["PLANS", "Attempt", "Learned", "learned", "worth_another"]
+__all__ = ["PLANS", "Attempt", "ProofFeedback", "learned", "worth_another"]

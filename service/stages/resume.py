@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from geometry.sampling import SurfaceSamples
 from service.checkpoint_store import Kept
 from service.serialization import Known, pack, unpack
-from service.stages.access_plan import Side
+from service.stages.access_plan import AccessPlan
 from service.stages.preparation import Prepared
 from service.version import code_version
 from toolpath.counterexamples import Counterexamples
@@ -65,22 +65,24 @@ class Resumed:
     def __init__(self, kept: Kept, ready: Prepared, checks: Sequence[Target], samples: SurfaceSamples) -> None:
         self.kept, self.ready, self.checks, self.samples = kept, ready, checks, samples
 
-    def side(self, view: View, before: Sequence[Side], found: Counterexamples, make: Callable[[Keeper], Side]) -> Side:
+    def access_plan(self, view: View, before: Sequence[AccessPlan], found: Counterexamples,
+                    make: Callable[[Keeper], AccessPlan]) -> AccessPlan:
         """The plan of an access: the one that is kept, else what ``make`` plans, which is kept then.
 
-        before : the sides planned before it; found : what proofs found along it
+        before : plans of the accesses before it; found : what proofs found along it
         make   : given who keeps the plan while it is under way
         """
         if not self.kept:
             return make(NOTHING)
         name = _digest(self._prepared, view.id, *(s.name for s in before), pack(found))
-        side = self.taken(PLAN, name, partial(_side, view))
-        if side is None:
-            side = make(_UnderWay(self, name))
-            left = None if side.left is None else (side.left.lattice, side.left.top, side.left.cover)
-            if self.keep(PLAN, name, (side.made, side.clearance, left)):
+        planned = self.taken(PLAN, name, partial(_access_plan, view))
+        if planned is None:
+            planned = make(_UnderWay(self, name))
+            stock = planned.left
+            left = None if stock is None else (stock.lattice, stock.top, stock.cover)
+            if self.keep(PLAN, name, (planned.plan, planned.clearance, left)):
                 self.kept.drop(ACTS, name)
-        return replace(side, name=name)
+        return replace(planned, name=name)
 
     def proof(self, programs: Sequence[NcProgram], zone: NDArray[np.int32], make: Callable[[], Proof]) -> Proof:
         """The proof of programs: the one that is kept, else what ``make`` finds, which is kept then.
@@ -165,9 +167,9 @@ class _UnderWay(Keeper):
             self.next = ended + max(ACTS_EVERY_S, ACTS_PAUSE * (ended - begun))
 
 
-def _side(view: View, value: Any) -> Side:
-    made, clearance, left = value
-    return Side(view, _checked(Plan, made), clearance, None if left is None else StockMap(*left))
+def _access_plan(view: View, value: Any) -> AccessPlan:
+    plan, clearance, left = value
+    return AccessPlan(view, _checked(Plan, plan), clearance, None if left is None else StockMap(*left))
 
 
 def _checked(kind: type[T], value: Any) -> T:

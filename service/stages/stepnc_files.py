@@ -24,7 +24,7 @@ from geometry.tool_body import ToolBody
 from output.stepnc.ap238 import stream_stepnc_aim
 from output.stepnc.iso14649 import stream_stepnc_arm
 from output.workplan import Workplan
-from service.stages.access_plan import Program
+from service.stages.access_plan import WrittenProgram
 from service.stages.result_files import Files
 from verify.checks.program_sequence import read_all
 from verify.comparison.stepnc_agreement import check_agreement
@@ -39,7 +39,7 @@ TIME_LIMIT, MEMORY_LIMIT = 7200.0, 8e9  # s, bytes
 
 
 @contextmanager
-def stepnc_under_way(programs: Sequence[Program], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
+def stepnc_under_way(programs: Sequence[WrittenProgram], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
                      out: Path) -> Iterator[Callable[[], Files]]:
     """``stepnc_files`` going on while something else is done: gives what waits for them.
 
@@ -84,7 +84,7 @@ def _beside(out: Path, name: str) -> Path:
     return out / f"{name}.part"
 
 
-def stepnc_files(programs: Sequence[Program], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
+def stepnc_files(programs: Sequence[WrittenProgram], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
                  out: Path) -> Files:
     """Both forms of STEP-NC of proved programs, as files beside their place in a folder.
 

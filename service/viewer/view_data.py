@@ -13,7 +13,7 @@ from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.sampling import SurfaceSamples
 from geometry.tool_body import ToolBody
 from service.report.report import REMAINDER_FLOOR_MM2
-from service.stages.access_plan import Look
+from service.stages.access_plan import ProofFrame
 from service.stages.preparation import Prepared
 from service.stages.proof_samples import Score
 from service.stages.result_files import Files
@@ -21,7 +21,7 @@ from service.version import VERSION
 from service.viewer.view_file import Chunk, write_view
 from service.viewer.view_mesh import GRID as MESH_GRID
 from service.viewer.view_mesh import LEFT_UNIT, Judged, edge_chunk, facets_of, mesh_chunks, top_of
-from service.viewer.view_paths import AXIS_UNIT, COARSE, Way, path_chunks, way_of
+from service.viewer.view_paths import AXIS_UNIT, COARSE, ToolTrack, path_chunks, way_of
 from service.viewer.view_paths import GRID as PATH_GRID
 from service.viewer.view_stock import stock_chunk
 from verify.checks.program_sequence import Reading, read_all
@@ -37,46 +37,46 @@ NO_HOLDER = 30.0  # mm of shank that are drawn where no holder is known
 I64 = NDArray[np.int64]
 
 
-def plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int32], rest: NDArray[np.bool_],
+def plan_view(ready: Prepared, frame: ProofFrame, scored: Score, zone: NDArray[np.int32], rest: NDArray[np.bool_],
               stays: Sequence[Remainder], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
               report: Mapping[str, Any]) -> Files:
     """The view file of a planned job, as ``service.stages.result_files`` takes it.
 
-    scored, proof, setup : of the last plan, the proof in the frame of ``look``; programs : its texts
+    scored, proof, setup : of the last plan, the proof in the frame of ``frame``; programs : its texts
     zone   : (n,) int32, row of the zone that answers for each sample, from 1; 0 for none
     rest   : (n,) bool, those that stay uncut; stays : why, as ``service.report.report.job_report`` has it
     report : whose places are in the setup frame; of a job that is not proved no program is given away.
              Where the file cannot be made its notes say so
     """
     return _or_none(report, f"{VIEW_NAME}, and preview.png, which is drawn from it,",
-                    lambda: _plan_view(ready, look, scored, zone, rest, stays, proof, programs, setup, report))
+                    lambda: _plan_view(ready, frame, scored, zone, rest, stays, proof, programs, setup, report))
 
 
-def _plan_view(ready: Prepared, look: Look, scored: Score, zone: NDArray[np.int32], rest: NDArray[np.bool_],
+def _plan_view(ready: Prepared, frame: ProofFrame, scored: Score, zone: NDArray[np.int32], rest: NDArray[np.bool_],
                stays: Sequence[Remainder], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
                report: Mapping[str, Any]) -> Files:
     zones, entries = report["zones"], report["remainder"]
     label = np.where(zone > 0, zone.astype(np.int64) - 1, len(zones) + len(entries))
     label[rest] = len(zones) + _entries(scored.samples.subset(rest), stays, len(entries))
     names = [{"zone": z["id"]} for z in zones] + [{"remainder": k} for k in range(len(entries))] + [{"other": True}]
-    read = read_all(programs, look.part, ready.inputs.bodies, setup, 0, lambda _share: None)
-    way = way_of(read, programs, look.rotation, report["steps"])
-    return _file(ready, look.into(scored.samples, ready.views[0]), look, label, names, proof, setup, way, read,
+    read = read_all(programs, frame.part, ready.inputs.bodies, setup, 0, lambda _share: None)
+    way = way_of(read, programs, frame.rotation, report["steps"])
+    return _file(ready, frame.into(scored.samples, ready.views[0]), frame, label, names, proof, setup, way, read,
                  report, open_=report["state"] == "proved")
 
 
-def verification_view(ready: Prepared, look: Look, samples: SurfaceSamples, proof: Proof,
+def verification_view(ready: Prepared, frame: ProofFrame, samples: SurfaceSamples, proof: Proof,
                       programs: Sequence[NcProgram], setup: ProofSetup, report: Mapping[str, Any],
                       spindle_tool: int = 0) -> Files:
     """The view file of a verification; its program is that of whoever posted it, so its way is shown as it is.
 
-    samples : of the proof, in the frame of ``look``; report : whose places are in the setup frame
+    samples : of the proof, in the frame of ``frame``; report : whose places are in the setup frame
     """
     def made() -> Files:
-        read = read_all(programs, look.part, ready.inputs.bodies, setup, spindle_tool, lambda _share: None)
-        way = way_of(read, programs, look.rotation)
+        read = read_all(programs, frame.part, ready.inputs.bodies, setup, spindle_tool, lambda _share: None)
+        way = way_of(read, programs, frame.rotation)
         label = np.zeros(len(samples), np.int64)
-        return _file(ready, samples, look, label, [{"other": True}], proof, setup, way, read, report, open_=True)
+        return _file(ready, samples, frame, label, [{"other": True}], proof, setup, way, read, report, open_=True)
 
     return _or_none(report, VIEW_NAME, made)
 
@@ -103,11 +103,11 @@ def _entries(s: SurfaceSamples, stays: Sequence[Remainder], count: int) -> I64:
     return np.where(row >= 0, of[row], count)
 
 
-def _file(ready: Prepared, samples: SurfaceSamples, look: Look, label: I64, names: Sequence[Mapping[str, Any]],
-          proof: Proof, setup: ProofSetup, way: Way, read: Sequence[Reading], report: Mapping[str, Any], *,
+def _file(ready: Prepared, samples: SurfaceSamples, frame: ProofFrame, label: I64, names: Sequence[Mapping[str, Any]],
+          proof: Proof, setup: ProofSetup, way: ToolTrack, read: Sequence[Reading], report: Mapping[str, Any], *,
           open_: bool) -> Files:
     part, d = ready.part, ready.decomposition
-    here = turned_samples(samples, look.rotation.T)
+    here = turned_samples(samples, frame.rotation.T)
     judged = Judged(here, label, proof.residual - setup.stock_allowance, np.asarray(proof.program >= 0),
                     setup.scallop_height, setup.gouge_tolerance)
     facets = facets_of(part, judged)
@@ -117,7 +117,7 @@ def _file(ready: Prepared, samples: SurfaceSamples, look: Look, label: I64, name
     path, longer, steps, grid = path_chunks(way, low, open_=open_)
     chunks: list[Chunk] = [*mesh, edge_chunk(part, low, EDGE_SPACING), *path]
     if len(way.end):
-        chunks.append(stock_chunk(read, look.part, ready.inputs.bodies, setup, look, open_=open_))
+        chunks.append(stock_chunk(read, frame.part, ready.inputs.bodies, setup, frame, open_=open_))
     chunks += [*finer, *longer]
     head = {
         "version": VIEW_VERSION, "made_by": VERSION, "kind": "plan" if "zones" in report else "verify",
@@ -161,7 +161,7 @@ def _named(ready: Prepared, name: str, faces: Sequence[int]) -> dict[str, Any]:
     return {"id": name, "faces": [int(f) for f in faces], "at_mm": top_of(ready.part, faces)}
 
 
-def _finding(f: Mapping[str, Any], way: Way, open_: bool) -> dict[str, Any]:
+def _finding(f: Mapping[str, Any], way: ToolTrack, open_: bool) -> dict[str, Any]:
     """A finding of the report with the time at which it happens, and how the tool stands then."""
     keep = {k: f[k] for k in ("kind", "message", "program", "line", "zone", "face", "point", "depth", "limit", "count")}
     # the place of a gouge is on the part; the tool is below it

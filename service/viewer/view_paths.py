@@ -42,7 +42,7 @@ class Stand:
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class ToolTrack:
     """All moves of a job one after the other, setup frame.
 
     start, end : (m, 3) float64, mm, of the tip; axis : (m, 3) float64, unit, tip to spindle, at the end
@@ -91,7 +91,7 @@ class Way:
 
 
 def way_of(readings: Sequence[Reading], programs: Sequence[NcProgram], rotation: F64,
-           planned: Sequence[dict[str, Any]] = ()) -> Way:
+           planned: Sequence[dict[str, Any]] = ()) -> ToolTrack:
     """The way of the tool through programs.
 
     readings : of the programs, as ``verify.checks.program_sequence.read_all`` gives them
@@ -112,10 +112,10 @@ def way_of(readings: Sequence[Reading], programs: Sequence[NcProgram], rotation:
                       np.full(len(p), k, np.int64), step))
     if not parts:
         none, no = np.zeros((0, 3)), np.zeros(0, np.int64)
-        return Way(none, none, none, np.zeros(0, np.bool_), np.zeros(0), np.zeros(0), no, no, no, no, (), ())
+        return ToolTrack(none, none, none, np.zeros(0, np.bool_), np.zeros(0), np.zeros(0), no, no, no, no, (), ())
     start, end, axis, feed, begun, ended, line, tool, program, step = map(np.concatenate, zip(*parts, strict=True))
     there = np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)
-    return Way(start[there], end[there], axis[there], feed[there], begun[there], ended[there], line[there], tool[there],
+    return ToolTrack(start[there], end[there], axis[there], feed[there], begun[there], ended[there], line[there], tool[there],
                program[there], step[there], tuple(steps), tuple(p.name for p in programs))
 
 
@@ -145,7 +145,7 @@ def _steps(line: I64, tool: I64, given: NcProgram, known: dict[str, dict[str, An
     return np.asarray(change + first, np.int64)
 
 
-def path_chunks(way: Way, low: F64, *, open_: bool) -> tuple[list[Chunk], list[Chunk], list[dict[str, Any]], float]:
+def path_chunks(way: ToolTrack, low: F64, *, open_: bool) -> tuple[list[Chunk], list[Chunk], list[dict[str, Any]], float]:
     """The way as chunks, step by step: rough, fine; and the steps with tool, times and axis, and mm of the grid.
 
     low   : (3,) float64, mm, place of the grid's zero
@@ -173,7 +173,7 @@ def path_chunks(way: Way, low: F64, *, open_: bool) -> tuple[list[Chunk], list[C
 class _Line:
     """The moves of a step as rows: places, kinds, times, axes and lines."""
 
-    def __init__(self, way: Way, rows: I64) -> None:
+    def __init__(self, way: ToolTrack, rows: I64) -> None:
         start, end = way.start[rows], way.end[rows]
         broken = np.ones(len(rows), np.bool_)
         broken[1:] = np.abs(start[1:] - end[:-1]).max(axis=1) > 1e-6
@@ -261,4 +261,4 @@ def _chunk(rows: tuple[F64, I64, F64, F64, I64], step: int, lod: int, low: F64, 
     return Chunk("path", {"step": step, "lod": lod}, columns)
 
 
-__all__ = ["Stand", "Way", "path_chunks", "thinned", "way_of"]
+__all__ = ["Stand", "ToolTrack", "path_chunks", "thinned", "way_of"]

@@ -12,7 +12,7 @@ import numpy as np
 
 from geometry.part import Part
 from geometry.tool_body import ToolBody
-from service.stages.access_plan import Look
+from service.stages.access_plan import ProofFrame
 from service.viewer.view_file import Chunk, Column
 from verify.checks.program_sequence import Reading
 from verify.material.machined_part import LEVELS, stock_in_time
@@ -21,17 +21,17 @@ from verify.model import ProofSetup
 NODES, STRETCHES = 200_000, 32
 
 
-def stock_chunk(read: Sequence[Reading], part: Part, tools: Sequence[ToolBody], setup: ProofSetup, look: Look, *,
+def stock_chunk(read: Sequence[Reading], part: Part, tools: Sequence[ToolBody], setup: ProofSetup, frame: ProofFrame, *,
                 open_: bool) -> Chunk:
     """Blank, part and the changes as a chunk of kind 'field'.
 
     read  : the programs; part, tools, setup : as the proof took them, and errors as ``stock_in_time``
-    look  : the frame of the proof, which is that of the grid
+    frame  : the frame of the proof, which is that of the grid
     open_ : whether the program may be known; else seconds are whole
     """
     stock = stock_in_time(read, part, tools, setup, stretches=STRETCHES, nodes=NODES)
     ended = 1000.0 * (stock.ended if open_ else np.rint(stock.ended))
-    about = {"lod": 1, "rotation": [round(v, 9) for v in look.rotation.ravel().tolist()],
+    about = {"lod": 1, "rotation": [round(v, 9) for v in frame.rotation.ravel().tolist()],
              "origin_mm": [round(v, 6) for v in stock.origin.tolist()], "step_mm": round(stock.step, 6),
              "shape": list(stock.first.shape), "levels": LEVELS}
     return Chunk("field", about, {

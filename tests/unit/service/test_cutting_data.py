@@ -147,7 +147,7 @@ def test_a_tool_that_does_not_cut_to_its_centre_is_told_of_where_it_goes_down_in
                        {"id": "T2", "kind": "flat", "diameter_mm": 4.0}]}
     wanted = parse_setup(json.dumps(asked))
     t1, t2 = tool_bodies(wanted)
-    layers = [replace(step(k, t, "layers"), operation="roughing") for k, t in ((1, t1), (2, t2))]
+    layers = [replace(step(k, t, "depth_layers"), operation="roughing") for k, t in ((1, t1), (2, t2))]
     (told,) = uncut_centres(JobInputs.of(wanted), layers)
     assert told.kind == "center_cutting" and told.subjects == ("T1",) and told.measured == 0.75
     assert "drill" in told.remedy and told.limit == 6.0

@@ -17,10 +17,10 @@ from geometry.errors import OutputError
 from geometry.part import FaceInfo, Part
 from service.from_wire import parse_setup
 from service.pictures.clamping_picture import box_mesh, corners_of
-from service.setup_sheet.model import Facts, Section, Sheet
+from service.setup_sheet.model import Facts, SetupSheet, SheetSection
 from service.setup_sheet.pdf import latin, pdf_of
 from service.setup_sheet.setup_sheet import sheet_files
-from service.stages.access_plan import Program
+from service.stages.access_plan import WrittenProgram
 from service.stages.blank_model import blank_of
 from service.stages.job_inputs import JobInputs
 from service.stages.result_files import Files
@@ -133,7 +133,7 @@ def made(state: str = "proved", findings: list[dict[str, Any]] | None = None, cu
     files: Files = {"zones.json": ("zones", "", None, b"{}")}
     if state == "proved":
         files["program.linuxcnc.ngc"] = ("program", "linuxcnc", "A1", b"G21\n")
-    written = [Program("A1", work, "G21 (not to be seen)\n")] if cut else []
+    written = [WrittenProgram("A1", work, "G21 (not to be seen)\n")] if cut else []
     got = sheet_files(ready, written, report, files)  # type: ignore[arg-type]
     assert {name: f[0] for name, f in got.items()} == {"sheet.html": "sheet", "sheet.pdf": "sheet"}
     return {name: data for name, (*_, data) in got.items() if isinstance(data, bytes)}
@@ -238,8 +238,8 @@ def test_a_part_that_is_turned_by_hand_is_shown_as_it_lies_each_time():
     ready = SimpleNamespace(inputs=JobInputs.of(setup), part=part, blank=blank_of(setup, part),
                             views=tuple(views.values()), accesses=setup.access, view=lambda name: views[name])
     first, second, third = steps()
-    written = [Program("A1", plan(first), "G21\n"), Program("A2", plan(second, clearance_plane=33.0), "G21\n", ".A2"),
-               Program("A2", plan(third, clearance_plane=33.0), "G21\n", ".A2.part2")]
+    written = [WrittenProgram("A1", plan(first), "G21\n"), WrittenProgram("A2", plan(second, clearance_plane=33.0), "G21\n", ".A2"),
+               WrittenProgram("A2", plan(third, clearance_plane=33.0), "G21\n", ".A2.part2")]
     report = report_of("proved", [])
     files: Files = {name: ("program", "linuxcnc", p.access, b"G21\n") for p in written for _, name, _ in p.files()}
     for name, (*_, data) in sheet_files(ready, written, report, files).items():  # type: ignore[arg-type]
@@ -260,7 +260,7 @@ def test_each_control_has_its_own_label():
                             accesses=setup.access, view=lambda _name: view)
     for others, told in (({"haas": "", "siemens": ""}, "N200, STEP_S02"), ({"siemens": "", "heidenhain": ""},
                          'N200, STEP_S02, LBL "S02"'), ({"haas": ""}, "N200")):
-        written = [Program("A1", plan(*steps(), restart=True), "G21\n", dialect="fanuc", others=others)]
+        written = [WrittenProgram("A1", plan(*steps(), restart=True), "G21\n", dialect="fanuc", others=others)]
         files: Files = {name: ("program", d, "A1", b"G21\n") for d, name, _ in written[0].files()}
         got = sheet_files(ready, written, report_of("proved", []), files)  # type: ignore[arg-type]
         words = " ".join(" ".join(Page(got["sheet.html"][3].decode()).words).split())
@@ -282,14 +282,14 @@ def test_the_pdf_is_whole(proved):
 
 
 def test_a_line_is_cut_where_it_does_not_fit():
-    sheet = Sheet("W" * 300, True, "fine", "W" * 300, (Section("job", "Job", (Facts((("W" * 200, "W" * 2000),)),)),))
+    sheet = SetupSheet("W" * 300, True, "fine", "W" * 300, (SheetSection("job", "Job", (Facts((("W" * 200, "W" * 2000),)),)),))
     text = pdf_text(pdf_of(sheet))
     assert re.search(r" W{40,110}\.\.\. page 1 of 2", text) and text.count("W") > 2500
 
 
 def test_what_stands_for_the_number_of_pages_is_nothing_a_user_can_write():
     said = "{nb} \x7f\x7f"
-    sheet = Sheet(said, True, said, said, (Section("job", "Job", (Facts((("W" * 200, "W" * 2000),)),)),))
+    sheet = SetupSheet(said, True, said, said, (SheetSection("job", "Job", (Facts((("W" * 200, "W" * 2000),)),)),))
     text = pdf_text(pdf_of(sheet))
     assert text.count("{nb}") >= 4 and "page 1 of 2" in text and "page 2 of 2" in text
 

@@ -9,7 +9,7 @@ import pytest
 from geometry.errors import InternalError, ResourceError
 from output.linuxcnc import write_linuxcnc
 from service.stages import stepnc_files as stepnc
-from service.stages.access_plan import Program
+from service.stages.access_plan import WrittenProgram
 from service.stages.stepnc_files import stepnc_files, stepnc_under_way
 from tests.pocket_case import SETUP, block
 from tests.synthetic_plan import BALL, line, plan, step
@@ -19,7 +19,7 @@ from toolpath.workingsteps import Motion
 @pytest.fixture
 def job():
     work = plan(step(1, BALL, "waterline"))
-    return [Program("A1", work, write_linuxcnc(work))], block(), [BALL], SETUP
+    return [WrittenProgram("A1", work, write_linuxcnc(work))], block(), [BALL], SETUP
 
 
 @pytest.fixture
