@@ -16,19 +16,19 @@ import numpy as np
 from geometry.errors import CamError, SetupError
 from schemas.setup import Setup
 from service.checkpoint_store import Kept
+from service.delivery.job_delivery import cautions_before_planning, deliver_job, deviation_map, warned
+from service.delivery.machined_mesh import MESH_NAME, MeshWish, machined_part
+from service.delivery.result_files import Files, clear_results, deliver
 from service.from_wire import check_plannable, check_spindle_tool
 from service.pictures.proof_picture import MAP_NAME
 from service.report import report as reporting
 from service.stages.access_plan import ProofFrame, in_setup_frame
 from service.stages.access_settings import proof_setup
 from service.stages.cautions import sentences
-from service.stages.delivery import cautions_before_planning, deliver_job, deviation_map, warned
-from service.stages.machined_mesh import MESH_NAME, MeshWish, machined_part
 from service.stages.plan_prove_loop import Planner, Progress, plan_and_prove
 from service.stages.preparation import Prepared, prepare
 from service.stages.programs import proof_frame
 from service.stages.proof_samples import Score, score
-from service.stages.result_files import Files, clear_results, deliver
 from service.stages.resume import Resumed
 from service.stages.trimmed_faces import trimmed_faces
 from service.viewer.view_data import verification_view

@@ -21,6 +21,7 @@ from geometry.tool_body import ToolBody
 from output.gcode.dialects import DIALECTS, Switches
 from output.gcode.program_writer import label_number, lowest_tip
 from output.workplan import Workplan
+from service.delivery.result_files import Files, listed
 from service.pictures.clamping_picture import Clamped, bar_mesh, box_mesh, clamp_picture, corners_of
 from service.pictures.tool_drawing import draw_tool, svg_of
 from service.setup_sheet.model import Block, Facts, Lines, Picture, SetupSheet, SheetSection, Table, ToolCard
@@ -43,7 +44,6 @@ from service.stages.access_plan import ProofFrame, WrittenProgram
 from service.stages.job_inputs import JobInputs
 from service.stages.preparation import Prepared
 from service.stages.programs import access_of, proof_frame
-from service.stages.result_files import Files, listed
 from toolpath.workingsteps import Workingstep
 
 ZONE_WORDS = (
@@ -122,7 +122,7 @@ def _clamping(ready: Prepared, frame: ProofFrame, programs: Sequence[WrittenProg
     names, listed_names = [n for p in programs for _, n, _ in p.files()], {f["name"] for f in report["files"]}
     blank = ready.blank.corners(frame.rotation)
     axes = frame.rotation @ _setup_axes(inputs.placement)
-    frame = "the frame of the setup" if turns else f"the frame of access {frame.id}"
+    frame_name = "the frame of the setup" if turns else f"the frame of access {frame.id}"
     pairs = [
         ("Programs", ", ".join(n for n in names if n in listed_names) or "none written"),
         ("Work offset", access.work_offset),
@@ -130,7 +130,7 @@ def _clamping(ready: Prepared, frame: ProofFrame, programs: Sequence[WrittenProg
                          f"program is {_direction(axes[0].tolist())} and Z is {_direction(axes[2].tolist())}"),
         *([] if turns else [("Tool axis", f"{frame.id}: {_direction(frame.rotation[2].tolist())} of the setup is Z of "
                                           "the program")]),
-        ("Part", f"{_box(frame.part.bounds)} in {frame}"),
+        ("Part", f"{_box(frame.part.bounds)} in {frame_name}"),
         (f"Blank, {inputs.stock.kind.replace('_', ' ')}", _box(blank) + _round(ready, frame.rotation) + (
             "" if ready.blank.stands_alone else f": the part grown by {number(ready.blank.margin)}") + (
             f"; the real one may stand {number(ready.blank.uncertainty)} beyond" if ready.blank.uncertainty else "")),

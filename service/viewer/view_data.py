@@ -12,11 +12,11 @@ from geometry.errors import CamError
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.sampling import SurfaceSamples
 from geometry.tool_body import ToolBody
+from service.delivery.result_files import Files
 from service.report.report import REMAINDER_FLOOR_MM2
 from service.stages.access_plan import ProofFrame
 from service.stages.preparation import Prepared
 from service.stages.proof_samples import Score
-from service.stages.result_files import Files
 from service.version import VERSION
 from service.viewer.view_file import Chunk, write_view
 from service.viewer.view_mesh import GRID as MESH_GRID
@@ -40,7 +40,7 @@ I64 = NDArray[np.int64]
 def plan_view(ready: Prepared, frame: ProofFrame, scored: Score, zone: NDArray[np.int32], rest: NDArray[np.bool_],
               stays: Sequence[Remainder], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
               report: Mapping[str, Any]) -> Files:
-    """The view file of a planned job, as ``service.stages.result_files`` takes it.
+    """The view file of a planned job, as ``service.delivery.result_files`` takes it.
 
     scored, proof, setup : of the last plan, the proof in the frame of ``frame``; programs : its texts
     zone   : (n,) int32, row of the zone that answers for each sample, from 1; 0 for none

@@ -15,6 +15,7 @@ import pytest
 
 from geometry.errors import OutputError
 from geometry.part import FaceInfo, Part
+from service.delivery.result_files import Files
 from service.from_wire import parse_setup
 from service.pictures.clamping_picture import box_mesh, corners_of
 from service.setup_sheet.model import Facts, SetupSheet, SheetSection
@@ -23,7 +24,6 @@ from service.setup_sheet.setup_sheet import sheet_files
 from service.stages.access_plan import WrittenProgram
 from service.stages.blank_model import blank_of
 from service.stages.job_inputs import JobInputs
-from service.stages.result_files import Files
 from tests.synthetic_plan import plan, step
 from toolpath.workingsteps import Workingstep
 from zones.reach.access_view import access_rotation, turned

@@ -8,9 +8,9 @@ import pytest
 
 from geometry.errors import InternalError, ResourceError
 from output.linuxcnc import write_linuxcnc
-from service.stages import stepnc_files as stepnc
+from service.delivery import stepnc_files as stepnc
+from service.delivery.stepnc_files import stepnc_files, stepnc_under_way
 from service.stages.access_plan import WrittenProgram
-from service.stages.stepnc_files import stepnc_files, stepnc_under_way
 from tests.pocket_case import SETUP, block
 from tests.synthetic_plan import BALL, line, plan, step
 from toolpath.workingsteps import Motion

@@ -24,8 +24,8 @@ from geometry.tool_body import ToolBody
 from output.stepnc.ap238 import stream_stepnc_aim
 from output.stepnc.iso14649 import stream_stepnc_arm
 from output.workplan import Workplan
+from service.delivery.result_files import Files
 from service.stages.access_plan import WrittenProgram
-from service.stages.result_files import Files
 from verify.checks.program_sequence import read_all
 from verify.comparison.stepnc_agreement import check_agreement
 from verify.model import NcProgram, ProofSetup
@@ -63,7 +63,7 @@ def stepnc_under_way(programs: Sequence[WrittenProgram], part: Part, tools: Sequ
 
     try:
         with ThreadPoolExecutor(1) as pool:
-            begun = pool.submit(run_limited, [sys.executable, "-m", "service.stages.stepnc_process"], pickle.dumps(job),
+            begun = pool.submit(run_limited, [sys.executable, "-m", "service.delivery.stepnc_process"], pickle.dumps(job),
                                 time_limit=TIME_LIMIT, memory_limit=MEMORY_LIMIT, what="stepnc", stop=stop)
             try:
                 yield wait

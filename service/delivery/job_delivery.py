@@ -11,6 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from geometry.sampling import SurfaceSamples
+from service.delivery.machined_mesh import MESH_NAME, MeshWish, machined_part
+from service.delivery.result_files import Files, deliver, json_bytes
+from service.delivery.stepnc_files import stepnc_under_way
 from service.pictures.proof_picture import MAP_NAME, draw_proof
 from service.report import report as reporting
 from service.setup_sheet.setup_sheet import sheet_files
@@ -28,12 +31,9 @@ from service.stages.cautions import (
     unheld,
     upright,
 )
-from service.stages.machined_mesh import MESH_NAME, MeshWish, machined_part
 from service.stages.plan_prove_loop import PROVED, Progress, ProvedPlan
 from service.stages.preparation import Prepared
 from service.stages.programs import with_figures
-from service.stages.result_files import Files, deliver, json_bytes
-from service.stages.stepnc_files import stepnc_under_way
 from service.viewer.preview_picture import draw_preview
 from service.viewer.view_data import VIEW_NAME, plan_view
 from verify.comparison.program_equivalence import carried
