@@ -148,7 +148,7 @@ def test_accesses_before_the_first_that_is_told_something_are_planned_once(tmp_p
         return plan_job(zones, *args, **kwargs)
 
     def once(told, attempt):
-        asked.append([s.view.id for s in attempt.sides])
+        asked.append([s.view.id for s in attempt.access_plans])
         far = Counterexamples(barred={"T1": np.array([[0.0, 0.0, 90.0]])})
         return ProofFeedback({"A2": far}) if len(asked) == 1 else None
 
