@@ -61,8 +61,8 @@ def way(points: int) -> ToolTrack:
     steps = tuple({"id": f"S{i + 1:02d}", "zone": f"Z{i // 2 + 1}", "operation": "finishing" if i % 2 else "roughing",
                    "strategy": "zigzag", "program": "program.linuxcnc.ngc"} for i in range(STEPS))
     return ToolTrack(place[:-1], place[1:], np.tile([0.0, 0.0, 1.0], (points, 1)), k[1:] % 500 != 0,
-               np.concatenate([[0.0], seconds[:-1]]), seconds, k[1:], np.ones(points, np.int64),
-               np.zeros(points, np.int64), step, steps, ("program.linuxcnc.ngc",))
+                     np.concatenate([[0.0], seconds[:-1]]), seconds, k[1:], np.ones(points, np.int64),
+                     np.zeros(points, np.int64), step, steps, ("program.linuxcnc.ngc",))
 
 
 def folder(out: Path, triangles: int, points: int) -> dict[str, float]:

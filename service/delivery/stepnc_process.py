@@ -1,6 +1,6 @@
-"""Entry of the process that writes STEP-NC and reads it back beside its parent: request on stdin, names in the result.
+"""Entry of the process that writes STEP-NC and reads it back: request on stdin, file names in the result.
 
-The request is a pickle of what ``service.delivery.stepnc_files.stepnc_files`` takes, made by the parent for this child alone.
+The request is a pickle of the arguments of ``service.delivery.stepnc_files.stepnc_files``. Only the parent writes it.
 """
 
 from __future__ import annotations

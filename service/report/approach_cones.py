@@ -1,4 +1,4 @@
-"""What a planner may ask beyond the zones: from where each could be approached. The tools to add: ``offers``."""
+"""Approach cones: the directions from which a zone can be machined with its tool."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from service.stages.preparation import Prepared
 from zones.reach.approach_cones import Cone, approach, directions_over_hemisphere, zone_cone
 from zones.zoning.zones import ZoneArea
 
-CONE_SAMPLES = 40  # of a zone that are asked
-CONE_DIRECTIONS = 91  # over the half of the sphere round the access
+CONE_SAMPLES = 40  # of a zone that a cone is measured at
+CONE_DIRECTIONS = 91  # over the half sphere around the access
 CONE_SEED = 3
 
 
 def cone_of(ready: Prepared, zone: ZoneArea) -> Cone | None:
-    """The approach cone of a zone with its tool, in the setup frame, round or beside the axis it was cut from.
+    """The approach cone of a zone with its tool, in the setup frame; it holds the axis that the zone is cut along.
 
-    It holds that axis. None where not even that gets 98 % of the area that was asked.
+    None where that axis itself reaches less than 98 % of the sampled area.
     """
     view = ready.view(zone.access)
     rows = np.flatnonzero(view.samples.area[zone.samples] > 0)

@@ -1,4 +1,4 @@
-"""The tools to add: what the proposal finds, zoned again with them, so that the list keeps what it promises."""
+"""The tools to add to a setup. Zones are built again with them, so that each promised area is that of a real zone."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ LENGTHS = ("diameter_mm", "corner_radius_mm", "flute_length_mm", "neck_diameter_
 class Offer:
     """A tool to add to a setup.
 
-    access   : id of the access it was looked for along
+    access   : id of the access it is for
     proposed : its shape
     body     : the same with an id and a number that are free in the setup
-    area_mm2 : of the remainder, what the zones with it hold
+    area_mm2 : area of the remainder in the zones of the tool
     """
 
     access: str
@@ -43,7 +43,7 @@ class Offer:
 
 @dataclass(frozen=True, eq=False)
 class _Added:
-    """What zones are built from for a tool that is not there yet, in one view."""
+    """Tip limit and reach of a tool that is not in the setup, in one view."""
 
     limit: TipField
     reach: Reach
@@ -51,7 +51,7 @@ class _Added:
 
 @dataclass(frozen=True, eq=False)
 class Offers:
-    """All tools to add, and what zones built with them leave; areas in mm², ``stays_mm2`` by reason."""
+    """All tools to add, the area they empty, mm², and the area that stays by reason, mm²."""
 
     tools: tuple[Offer, ...]
     emptied_mm2: float
@@ -59,15 +59,15 @@ class Offers:
 
 
 def offers(ready: Prepared) -> Offers:
-    """The smallest change of the tool set, each access asked for what is in sight of it and of none before it.
+    """The smallest set of tools to add.
 
-    Zones are built again with the tools added, each asked for the remainder only. Those that are left with less than a
-    tool has to gain are dropped, the poorest first and as many at once as hold less than that together, and zones are
-    built once more: what is promised is what such zones hold.
+    Each access gets the samples of the remainder that it sees and no access before it does. Zones are built again with
+    the added tools, for the remainder only. A tool whose zones hold less than the least area of a zone is dropped, the
+    smallest first, and several at once where they hold less than that together. Then zones are built once more.
     """
     rest = ~ready.zoning.taken & (ready.samples.area > 0)
-    asked = _asked(ready, np.flatnonzero(rest))
-    found = _numbered(ready.inputs, [(v.id, t) for v, _, p in asked for t in p.tools])
+    proposals = _proposals(ready, np.flatnonzero(rest))
+    found = _numbered(ready.inputs, [(v.id, t) for v, _, p in proposals for t in p.tools])
     area, zoning = ready.samples.area, ready.zoning
     added = [_added(ready, view, found, rest) for view in ready.views]
     while found:
@@ -82,11 +82,11 @@ def offers(ready: Prepared) -> Offers:
         zoning = ready.zoning
     stays = float(area[~zoning.taken].sum())
     emptied = float(area[~ready.zoning.taken].sum()) - stays
-    return Offers(tuple(found), emptied, _stays(asked, area, zoning.taken, stays))
+    return Offers(tuple(found), emptied, _stays(proposals, area, zoning.taken, stays))
 
 
-def _asked(ready: Prepared, rest: NDArray[np.int64]) -> list[tuple[View, NDArray[np.int64], Proposal]]:
-    """Each view with the samples it is asked for and its proposal; the last one has all that is left."""
+def _proposals(ready: Prepared, rest: NDArray[np.int64]) -> list[tuple[View, NDArray[np.int64], Proposal]]:
+    """Each view with its samples of the remainder and the proposal for them; the last view gets all that are left."""
     out = []
     for k, view in enumerate(ready.views):
         last = k == len(ready.views) - 1
@@ -98,7 +98,7 @@ def _asked(ready: Prepared, rest: NDArray[np.int64]) -> list[tuple[View, NDArray
 
 
 def _numbered(inputs: JobInputs, tools: Sequence[tuple[str, ProposedTool]]) -> list[Offer]:
-    """The tools with numbers above all of the setup; ids 'P' and that number, which leave the default numbers alone."""
+    """The tools with numbers above those of the setup, and ids of 'P' and the number."""
     bodies = {b.id: b for b in inputs.bodies}
     number = max(b.number for b in bodies.values())
     out = []
@@ -111,7 +111,10 @@ def _numbered(inputs: JobInputs, tools: Sequence[tuple[str, ProposedTool]]) -> l
 
 
 def _added(ready: Prepared, view: View, found: Sequence[Offer], rest: NDArray[np.bool_]) -> dict[str, _Added]:
-    """The tools by id in one view: their tip limit, and what they reach of the samples in ``rest`` (n,) bool."""
+    """The tools by id in one view: their tip limit and their reach.
+
+    rest : (n,) bool, samples of the remainder; the reach of the others is not computed
+    """
     rows, s = np.flatnonzero(rest), view.samples
     standing = next(iter(view.fields.values())).standing
     out = {}
@@ -125,7 +128,7 @@ def _added(ready: Prepared, view: View, found: Sequence[Offer], rest: NDArray[np
 
 
 def _again(ready: Prepared, ids: Container[str], added: Sequence[Mapping[str, _Added]]) -> Zoning:
-    """Zones with some of the tools ``added`` to those at hand in every view."""
+    """Zones with some of the tools in ``added`` beside those of the setup, in every view."""
     new = [{t: a for t, a in here.items() if t in ids} for here in added]
     views = [replace(v, fields={**v.fields, **{t: a.limit for t, a in n.items()}})
              for v, n in zip(ready.views, new, strict=True)]
@@ -134,7 +137,7 @@ def _again(ready: Prepared, ids: Container[str], added: Sequence[Mapping[str, _A
 
 
 def _worth_it(found: Sequence[Offer]) -> list[Offer]:
-    """The tools without those to drop now: none, one, or more that hold less than one has to gain all together."""
+    """The tools without those to drop now: none, one, or several that together hold less than the least zone."""
     by_area = sorted(found, key=lambda o: o.area_mm2)
     if by_area[0].area_mm2 >= LEAST_ZONE_MM2:
         return list(found)
@@ -143,11 +146,11 @@ def _worth_it(found: Sequence[Offer]) -> list[Offer]:
     return [o for o in found if o.body.id not in drop]
 
 
-def _stays(asked: Sequence[tuple[View, NDArray[np.int64], Proposal]], area: NDArray[np.float64],
+def _stays(proposals: Sequence[tuple[View, NDArray[np.int64], Proposal]], area: NDArray[np.float64],
            taken: NDArray[np.bool_], total: float) -> dict[str, float]:
-    """Area that stays by reason, mm², scaled from the samples that were asked to ``total``."""
+    """Area that stays, mm², by reason, scaled from the samples of the proposals to ``total``."""
     stays: dict[str, float] = {}
-    for _, mine, proposal in asked:
+    for _, mine, proposal in proposals:
         rows = mine[proposal.asked]
         why = np.where(proposal.why == "taken", "too little", proposal.why)
         weight = float(area[mine].sum()) / max(float(area[rows].sum()), 1e-300)
@@ -158,7 +161,7 @@ def _stays(asked: Sequence[tuple[View, NDArray[np.int64], Proposal]], area: NDAr
 
 
 def as_dict(inputs: JobInputs, found: Offers) -> dict[str, Any]:
-    """The proposal of a report: one list of tools, what they empty, what stays by reason; mm and mm²."""
+    """The proposal of a report: the tools, the area they empty and the area that stays by reason; mm and mm²."""
     tools = []
     for o in found.tools:
         t = o.proposed
@@ -171,7 +174,7 @@ def as_dict(inputs: JobInputs, found: Offers) -> dict[str, Any]:
 
 
 def _entry(inputs: JobInputs, offer: Offer) -> dict[str, Any]:
-    """The tool as an entry of ``tools`` of a setup, in the holder of the tool at hand it resembles."""
+    """The tool as an entry of ``tools`` of a setup, in the holder of the tool that it resembles."""
     t = offer.proposed
     like = next(x for x in inputs.tools if x.id == t.holder_of)
     lengths = {k: round(getattr(t, k), 4) for k in LENGTHS}

@@ -1,7 +1,8 @@
-"""Setup sheet of a job, as a web page and as a PDF: what planner and machinist have to know before the spindle turns.
+"""Setup sheet of a job, as a web page and as a PDF: what planner and machinist need before the spindle turns.
 
-Both are made of one ``service.setup_sheet.model.SetupSheet``, so that they say the same. It holds no line of a program, and of a
-job that is not proved it says so before all else. No clock and no random number: the same input gives the same bytes.
+Both are made of one ``service.setup_sheet.model.SetupSheet``, so their contents agree. The sheet holds no line of a
+program, and an unproved job is marked first of all. It has no clock and no random number: the same input gives the
+same bytes.
 """
 
 from __future__ import annotations
@@ -47,24 +48,24 @@ from service.stages.programs import access_of, proof_frame
 from toolpath.workingsteps import Workingstep
 
 ZONE_WORDS = (
-    "A zone is what one tool finishes along one tool axis. SCZI: on, over or under a connection of walls; SCZ: "
-    "elsewhere.",
-    "Scallop: what stands over the surface between two passes, mm; as asked for, what 99 % of the samples keep, and "
-    "the most.",
-    "Covered: share of the zone that the proof found within the budget.")
+    "A zone is the area that one tool finishes along one tool axis. SCZI: on, over or under a connection of walls; "
+    "SCZ: elsewhere.",
+    "Scallop: height of the material that stays between two passes, mm; as requested, the value that 99 % of the "
+    "samples keep, and the largest.",
+    "Covered: share of the zone that the proof measured within tolerance.")
 HTML_NAME, PDF_NAME = "sheet.html", "sheet.pdf"
 
 
 def sheet_files(ready: Prepared, written: Sequence[WrittenProgram], report: Mapping[str, Any], files: Files) -> Files:
     """Both forms of the sheet of a job.
 
-    written : the programs, also those of an unproved job, of which nothing is told but heights
-    files   : what else is delivered; its map of the deviations goes onto the sheet
+    written : the programs; of an unproved job the sheet gives only their heights
+    files   : the other files of the job; the sheet shows its deviation map
 
     Raises
     ------
     OutputError
-        ``bad_epoch``: SOURCE_DATE_EPOCH is no number.
+        Code 'bad_epoch': SOURCE_DATE_EPOCH is no number.
     """
     sheet = sheet_of(ready, written, {**report, "files": listed(files)}, _bytes_of(files, "deviation"))
     return {HTML_NAME: ("sheet", "", None, html_of(sheet)), PDF_NAME: ("sheet", "", None, pdf_of(sheet))}
@@ -76,16 +77,16 @@ def _bytes_of(files: Files, kind: str) -> bytes | None:
 
 def sheet_of(ready: Prepared, written: Sequence[WrittenProgram], report: Mapping[str, Any],
              deviation: bytes | None) -> SetupSheet:
-    """What stands on the sheet of a job.
+    """The sheet of a job.
 
-    deviation : PNG of the map of the deviations, or None
+    deviation : PNG of the deviation map, or None
     """
     inputs = ready.inputs
     proved = report["state"] == "proved"
     count = sum(report["finding_counts"].values())
-    verdict = ("The programs were simulated, and the proof found nothing." if proved else
+    verdict = ("The programs were simulated, and the proof has no finding." if proved else
                f"Nothing may be run: the proof has {count} finding{'' if count == 1 else 's'}, and no program was "
-               "written. What follows is what was planned.")
+               "written. The sheet describes the plan.")
     title = inputs.labels.get("order") or "zonemill job"
     findings = findings_section(report)
     sections = [job_section(report, inputs), *([] if proved else [findings]),
@@ -96,15 +97,15 @@ def sheet_of(ready: Prepared, written: Sequence[WrittenProgram], report: Mapping
                 proof_section(report), SheetSection("files", "Files", (files_table(report),))]
     if deviation is not None:
         sections.append(SheetSection("deviation", "Deviation from the part", (Picture(
-            deviation, "The part coloured by what the proof measured: red where it is cut too deep, green within the "
-            "budget, blue where stock is left, hatched where no tool got."),)))
+            deviation, "The part coloured by the measured deviation: red where it is cut too deep, green within "
+            "tolerance, blue where stock is left, hatched where no tool reached."),)))
     sha = report["inputs"]
     foot = f"{report['state']}; part {sha['part_sha256'][:16]}, setup {sha['setup_sha256'][:16]}; {title}"
     return SetupSheet(f"Setup sheet: {title}", proved, verdict, foot, tuple(sections))
 
 
 def _clampings(ready: Prepared, written: Sequence[WrittenProgram], report: Mapping[str, Any]) -> list[SheetSection]:
-    """A part that is turned by hand has a picture for each time it is clamped; where nothing is cut, for the first."""
+    """One section for each clamping of the part, or for the first access where nothing is cut."""
     names = list(dict.fromkeys(p.access for p in written)) or [ready.views[0].id]
     frames = [proof_frame(ready)] if ready.inputs.turns else [ProofFrame.of(ready.view(n)) for n in names]
     return [_clamping(ready, frame, [p for p in written if len(frames) == 1 or p.access == frame.id], report,
@@ -143,19 +144,19 @@ def _clamping(ready: Prepared, frame: ProofFrame, programs: Sequence[WrittenProg
                      for k, box in enumerate((np.array([c.min(axis=0), c.max(axis=0)]) for c in held.fixtures), 1))
     blocks.append(Table("Fixtures: boxes in the frame of the program that nothing may touch, mm",
                         ("fixture", "X", "Y", "Z"), fixtures, (1.0, 1.5, 1.5, 1.5),
-                        none="The setup names no fixture: none is kept clear of."))
+                        none="The setup names no fixture, so the programs keep clear of none."))
     title = f"Clamping and program zero, {frame.id}" if several else "Clamping and program zero"
     return SheetSection(f"clamping-{frame.id}", title, tuple(blocks))
 
 
 def _setup_axes(placement: Placement) -> F64:
-    """(3, 3), unit: X, Y and Z of the setup frame as rows, in the coordinates of the part's file."""
+    """(3, 3) float64, dimensionless: unit axes of the setup frame as rows, in coordinates of the part's file."""
     x, z = (np.array(v) / np.linalg.norm(v) for v in (placement.x_axis, placement.z_axis))
     return np.array([x, np.cross(z, x), z])
 
 
 def _round(ready: Prepared, rotation: F64) -> str:
-    """Of a round blank how thick it is, and where the middles of its ends lie in a frame."""
+    """Diameter of a round blank and the middles of its ends in a frame; '' for other blanks."""
     bar = ready.blank.bar
     if bar is None:
         return ""
@@ -166,16 +167,16 @@ def _round(ready: Prepared, rotation: F64) -> str:
 def _seen(held: Clamped, blank: F64) -> str:
     fixtures = f", {len(held.fixtures)} fixtures" if held.fixtures else ""
     return (f"Part in its blank{fixtures}, program zero {held.zero} with its axes, and tool axes "
-            f"{', '.join(name for name, _ in held.comings)}; slanting and from above. The blank reaches {_box(blank)}.")
+            f"{', '.join(name for name, _ in held.comings)}; oblique view and top view. The blank spans {_box(blank)}.")
 
 
 def _heights(works: Sequence[Workplan]) -> list[tuple[str, str]]:
-    """Where rapids are free and how deep the tip goes, as the headers of the programs of one clamping have them."""
+    """Heights of one clamping from the headers of its programs: where rapids are free, and how deep the tip goes."""
     if not works:
         return []
     low, work = min(map(lowest_tip, works)), works[0]
     below = float(work.stock.lower[2]) - low
-    deep = f"Z{number(low)}" + (f", {number(below)} below the blank: nothing may stand there" if below > 1e-3 else "")
+    deep = f"Z{number(low)}" + (f", {number(below)} below the blank: keep this room free" if below > 1e-3 else "")
     if work.clamping is None:
         return [("Clearance plane", f"Z{number(work.clearance_plane)}: above it rapids in X and Y are free"),
                 ("Lowest Z of the tip", deep)]
@@ -188,9 +189,9 @@ def _heights(works: Sequence[Workplan]) -> list[tuple[str, str]]:
 def _turned(report: Mapping[str, Any], letters: str) -> Table:
     rows = tuple((a["id"], _direction(a["axis"]), " ".join(
         letter + number(v) for letter, v in zip(letters, a["rotary_deg"] or (), strict=False)) or NONE,
-                  "found for what the others leave" if a["found"] else "of the setup") for a in report["accesses"])
-    return Table("Accesses: tool axes in the frame of the setup, and how the rotary axes stand for them",
-                 ("access", "tool axis", "rotary axes, deg", "where from"), rows,
+                  "found, for the area that the others leave" if a["found"] else "setup") for a in report["accesses"])
+    return Table("Accesses: tool axes in the frame of the setup, and the rotary axes for each",
+                 ("access", "tool axis", "rotary axes, deg", "origin"), rows,
                  (1.0, 2.5, 2.5, 2.0))
 
 
@@ -207,7 +208,7 @@ def _box(box: F64) -> str:
 
 
 def _blank_mesh(ready: Prepared, rotation: F64) -> TriangleMesh:
-    """The nominal blank in a frame; of one that is grown from the part the box round it."""
+    """The nominal blank in a frame; for a blank grown from the part the box around it."""
     blank = ready.blank
     solid = blank.proof_mesh(rotation)
     if solid is not None:
@@ -230,16 +231,16 @@ def _card(inputs: JobInputs, body: ToolBody, gauge: float, report: Mapping[str, 
     fact = next(t for t in report["tools"] if t["id"] == body.id)
     segments = tuple((f"Holder {k}", f"Ø{number(h.diameter)}" + (
         f" to {number(h.diameter_top)}" if h.diameter_top != h.diameter else "") + f", {number(h.length)} long")
-        for k, h in enumerate(body.holder, 1)) or (("Holder", "not named in the setup: none was kept clear"),)
+        for k, h in enumerate(body.holder, 1)) or (("Holder", "not given in the setup, so not kept clear of"),)
     bends = fact["deflection_mm"]
     pairs = (
         ("Teeth", f"{tool.flutes}, {'cuts' if tool.center_cutting else 'does not cut'} to the centre"), *segments,
-        ("Gauge length", f"{number(gauge)}" + ("" if tool.gauge_given else ": stickout and holder, as none was given")),
+        ("Gauge length", number(gauge) + ("" if tool.gauge_given else ": stickout and holder, none is given")),
         ("Slenderness", number(fact["slenderness"], 1)),
-        ("Bends", "not estimated" if bends is None else f"{number(bends)} mm at most, as estimated"),
+        ("Deflection", "not estimated" if bends is None else f"{number(bends)} mm at most, estimated"),
         ("In cut", f"{number(fact['minutes_in_cut'], 2)} min, {number(fact['metres_in_cut'], 2)} m"),
         ("Cutters", f"{fact['cutters']}" + (f", each lasts {number(fact['life_min'])} min in cut" if fact["life_min"]
-                                            else ", life not counted")))
+                                            else ", tool life not given")))
     mind = tuple(f"{c['message']}; {c['remedy']}" for c in report["warnings"] if body.id in c["subjects"])
     own = "" if body.id == f"T{body.number}" else f" {body.id}"
     heading = f"T{body.number}{own}: {tool.kind} Ø{number(tool.diameter_mm)}"
@@ -256,17 +257,17 @@ def _steps(inputs: JobInputs, written: Sequence[WrittenProgram], report: Mapping
             if p.work.restart and report["state"] == "proved":
                 labels[s.id] = _label(p, s)
     table = steps_table(report, planned, labels, programs, {b.id: b.number for b in inputs.bodies})
-    note = "Heights are in the frame of the program; of a tool axis that leans they are along it."
-    words = "A program can be started at the label of any step, when all steps before it have been cut."
+    note = "Heights are in the frame of the program, or along the tool axis where it is tilted."
+    words = "A program can start at the label of any step when all steps before it have been cut."
     begun = (words,) if labels else ()
     return SheetSection("steps", "Steps", (table, Lines("How to read it", (note, *begun))))
 
 
 def _label(program: WrittenProgram, step: Workingstep) -> str:
-    """The label of a step on each control, told once where several have the same."""
-    said = (DIALECTS[d](Switches()).label(step.id, label_number(program.work, step))[0].rstrip(":")
+    """The label of a step on each control; equal labels once."""
+    labels = (DIALECTS[d](Switches()).label(step.id, label_number(program.work, step))[0].rstrip(":")
             for d, _, _ in program.files())
-    return ", ".join(dict.fromkeys(said))
+    return ", ".join(dict.fromkeys(labels))
 
 
 @cache
@@ -279,7 +280,7 @@ def _template() -> Template:
 
 
 def html_of(sheet: SetupSheet) -> bytes:
-    """The sheet as one page that asks for nothing from elsewhere; every word of the user's is escaped."""
+    """The sheet as one page that loads nothing else; every text of the user is escaped."""
     return (_template().render(sheet=sheet).rstrip() + "\n").encode()
 
 

@@ -27,14 +27,14 @@ ABOVE = 1.0  # mm between the height rapids may go down to and the clearance pla
 
 
 def planning_stock(ready: Prepared, view: View) -> StockMap:
-    """The stock the planner starts from: the largest the setup allows."""
+    """The stock that the planner of an access starts from: the largest that the setup allows."""
     lo, hi = ready.blank.corners(view.rotation)
     step = max(min(STOCK_STEP, ready.inputs.engagement_spacing), float(np.sqrt(np.prod(hi[:2] - lo[:2]) / STOCK_CELLS)))
     return ready.blank.planned(view, step)
 
 
 def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
-    """Tolerances and heights of the plan."""
+    """Tolerances and heights of a plan, in the frame of the access."""
     inputs = ready.inputs
     q, ops = inputs.quality, inputs.operations
     tops = [stock.highest, float(view.part.bounds[1, 2]) + q.stock_allowance_mm]
@@ -49,7 +49,7 @@ def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
 
 
 def leaned(lean: Lean) -> Leaned | None:
-    """How noses are asked to lean, in the words of the plan."""
+    """Lead and tilt of the setup as the planner takes them, rad; None where it asks for none."""
     if not lean.asked:
         return None
     walls = lean.walls_tilt_deg
@@ -58,13 +58,13 @@ def leaned(lean: Lean) -> Leaned | None:
 
 
 def proof_setup(ready: Prepared, view: View | ProofFrame, *, foreign: bool = False) -> ProofSetup:
-    """The setup in the plain words of the proof, in the frame of a view.
+    """The conditions of a proof in the frame of a view.
 
-    foreign : of programs that were not planned here: a table nobody told of is not held against them
+    foreign : the programs were not planned here; then a table of unknown height is no obstacle
     """
     inputs = ready.inputs
     c, q, machine = inputs.clearances, inputs.quality, inputs.machine
-    # its height is one of the setup frame: a program read in the frame of an oblique access is not held against it
+    # the height of the table is known in the setup frame only, so a proof in an oblique frame leaves the table out
     tabled = (inputs.turns and np.array_equal(view.rotation, np.eye(3))
               and not (foreign and machine.table_z_mm is None))
     cylinder, upwards = ready.blank.proof_cylinder(view.rotation)

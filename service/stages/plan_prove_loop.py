@@ -21,7 +21,7 @@ from service.stages.access_settings import plan_settings, planning_stock
 from service.stages.preparation import Prepared
 from service.stages.programs import programs_of
 from service.stages.proof_samples import Score
-from service.stages.replanning import PLANS, Attempt, ProofFeedback, learned, worth_another
+from service.stages.replanning import MAX_PLANS, Attempt, ProofFeedback, learned, worth_another
 from service.stages.resume import Resumed
 from service.stages.wall_support import band_planes
 from toolpath.feeds.tool_life import with_fresh_cutters, worn
@@ -111,7 +111,7 @@ def plan_and_prove(resumed: Resumed, scored: Score, trimmed: Mapping[str, Sequen
             [z.id for z in ready.zones], span.proving))
         next_feedback = learned(feedback, Attempt(access_plans, written, ready.zones, scored.zone, zone, frame, proof))
         finding_counts.append(sum(proof.counts.values()))
-        if next_feedback is None or not worth_another(finding_counts, PLANS):
+        if next_feedback is None or not worth_another(finding_counts, MAX_PLANS):
             return ProvedPlan(ready, scored, frame, samples, conditions, plan, tuple(written), zone, given_up, proof,
                               feedback.notes)
         # an access begins with what those before it leave: plans stay up to the first access with new feedback

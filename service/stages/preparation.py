@@ -40,33 +40,34 @@ from zones.zoning.zone_patches import zone_patches
 from zones.zoning.zones import ZoneArea, Zoning, build_zones
 
 PLANNING_DENSITY = 25.0  # samples a mm²
-MOST_SAMPLES = 1_500_000
-LEAST_SAMPLES = 1200.0  # of a face, as far as MOST_DENSITY allows
-MOST_DENSITY = 150.0
+MAX_SAMPLES = 1_500_000
+MIN_FACE_SAMPLES = 1200.0  # on a face, as far as MAX_DENSITY allows
+MAX_DENSITY = 150.0
 BORDER_SPACING = 0.2  # mm
 BORDER_INSET = 0.0  # mm: on the border itself
-LEAST_TURN_MM2, LEAST_TURN_SHARE = 10.0, 0.002  # of Ma, what a further tool axis has to win
-TABLE, TABLE_SPARE = 1000.0, 0.01  # mm, what a table reaches from the part, and what planning keeps more to it
-UPRIGHT = 1.0 - 1e-12  # of an axis that does not lean
-MOST_ROOM = 60.0  # mm beyond the cutter's radius that the planning lattice covers beside a large block
+MIN_ACCESS_GAIN_MM2, MIN_ACCESS_GAIN_SHARE = 10.0, 0.002  # area, and share of Ma, that a further tool axis must win
+TABLE, TABLE_SPARE = 1000.0, 0.01  # mm: half width of the table, and clearance that planning adds above it
+UPRIGHT = 1.0 - 1e-12  # Z of a unit tool axis, from which on it counts as upright
+MAX_ROOM = 60.0  # mm beyond the cutter's radius that the planning lattice covers beside a large block
 
 Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A part with everything known before the first pass is laid.
+    """A part with everything that is known before the first pass is laid.
 
-    inputs        : JobInputs, what the setup says
+    inputs        : JobInputs, the converted setup
     part          : Part in the setup frame
     blank         : Blank, the stock before the first cut
-    accesses      : of the setup, and after them those that were found on a machine with rotary axes
+    accesses      : of the setup, then those found for a machine with rotary axes
     views         : one per access, each in its own frame
-    decomposition : in the frame of the first view, as the samples
+    decomposition : in the frame of the first view, like the samples
     samples       : of the machinable area, planning density
     zoning        : zones, each in the frame of its view
-    seen_from     : (d, 3) float64, unit, setup frame: the directions that the machinable area is seen from
-    lift          : mm, distance along the normal within which a touch counts
+    seen_from     : (d, 3) float64, dimensionless, setup frame: unit directions that the machinable area is seen from
+    lift          : mm, distance along the normal within which a tool touches a sample
+    warnings      : sentences for the report and the headers of programs
     """
 
     inputs: JobInputs
@@ -111,7 +112,7 @@ def load_blank(path: Path, setup: Setup) -> Part:
     Raises
     ------
     CamError
-        As ``geometry.step_import.reader.read_part``, of the same class and code; it says that the blank is meant.
+        As ``geometry.step_import.reader.read_part``, of the same class and code; the message names the blank.
     """
     try:
         return read_part(path, placement=placement_of(setup), chord=mesh_chord(setup.quality))
@@ -120,14 +121,14 @@ def load_blank(path: Path, setup: Setup) -> Part:
 
 
 def table_height(inputs: JobInputs, blank: Blank) -> float:
-    """mm, setup frame: what a leaning tool stays above: the table, where that is not known the bottom of the blank."""
+    """Height that a tilted tool stays above, mm, setup frame: the table, or the bottom of the blank if unknown."""
     return blank.seat if inputs.machine.table_z_mm is None else inputs.machine.table_z_mm
 
 
 def obstacle_mesh(part: Part, inputs: JobInputs, *, table: float | None = None) -> TriangleMesh:
     """The part and the fixture boxes, these grown by the rapid clearance, as one mesh.
 
-    table : mm, setup frame, its height where the tool leans, so that it is in its way as well
+    table : mm, setup frame, height of the machine table, which a tilted tool must avoid; None: no table
     """
     vertices, faces, ids = [part.mesh.vertices], [part.mesh.faces], [part.mesh.face_ids]
     n = len(part.mesh.vertices)
@@ -153,29 +154,30 @@ def _box(lo: F64, hi: F64) -> tuple[F64, np.ndarray]:
 
 
 def _room(body: ToolBody, bounds: F64, blank: Blank, rotation: F64) -> float:
-    """How far round the part a tool is planned, mm; beside a large blank it has to get round what stands there.
+    """How far around the part a tool is planned, mm. Beside a large blank it has to pass around the stock there.
 
-    bounds : (2, 3) float64, mm, of the part in the access frame, into which rotation (3, 3) leads
+    bounds   : (2, 3) float64, mm, of the part in the access frame
+    rotation : (3, 3) float64, dimensionless, from the setup frame to the access frame
     """
-    beside = 0.0
+    around = 0.0
     if blank.stands_alone:
         stock = blank.corners(rotation)
         spare = float(np.max([bounds[0, :2] - stock[0, :2], stock[1, :2] - bounds[1, :2]]))
-        beside = min(spare + blank.uncertainty + body.radius, MOST_ROOM)
-    return body.radius + max(AIR, beside)
+        around = min(spare + blank.uncertainty + body.radius, MAX_ROOM)
+    return body.radius + max(AIR, around)
 
 
 def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True,
             blank_path: Path | None = None) -> Prepared:
-    """Read, decompose, measure reach, build zones.
+    """Read the part, decompose it, measure the reach of the tools and build zones.
 
-    search : on a machine with rotary axes look for further tool axes; else the accesses of the setup are all
-    blank_path : STEP file of a blank of kind step
+    search     : look for further tool axes on a machine with rotary axes; False: the accesses of the setup only
+    blank_path : STEP file of a blank of kind 'step'
 
     Raises
     ------
     CamError
-        The part or the setup is wrong, or the reader ran out of its limits.
+        The part or the setup is wrong, or the reader exceeds its limits.
     """
     progress("read", 0.0)
     if setup.stock.kind == "step" and blank_path is None:
@@ -195,7 +197,7 @@ def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True
     lift = max(0.1 * inputs.quality.scallop_height_mm, 1.5 * part.chord)
     views: list[View] = []
 
-    def look(access: Access) -> None:
+    def add_view(access: Access) -> None:
         rotation = access_rotation(access.direction)
         views.append(_view(inputs, access.id, part, blank, rotation, rotations[0], samples, decomposition, channels))
 
@@ -203,24 +205,25 @@ def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True
         return build_zones(views, decomposition, inputs.quality.scallop_height_mm, lift, Categories(channels), known)
 
     for k, access in enumerate(accesses):
-        look(access)
+        add_view(access)
         progress("zones", 0.14 + 0.08 * (k + 1) / len(accesses))
     zoning = zoned()
     progress("zones", 0.24)
     for access in _further(inputs, part, blank, views, zoning, lift) if search else ():
         accesses.append(access)
-        look(access)
+        add_view(access)
         progress("zones", 0.25)
     if len(views) > len(zoning.reach):
         zoning = zoned([*zoning.reach, *({} for _ in range(len(views) - len(zoning.reach)))])
     progress("zones", 0.27)
     of_blank = () if blank.solid is None else (f"the blank: {w}" for w in blank.solid.warnings)
     warnings = (*part.warnings, *of_blank, *decomposition.warnings, *_stood_askew(inputs, part, decomposition))
-    return Prepared(inputs, part, blank, tuple(accesses), tuple(views), decomposition, zoning, seen_from, lift, warnings)
+    return Prepared(inputs, part, blank, tuple(accesses), tuple(views), decomposition, zoning, seen_from, lift,
+                    warnings)
 
 
 def _seen_from(inputs: JobInputs, rotations: list[F64], search: bool) -> F64:
-    """(d, 3) unit, setup frame: the accesses, and on a machine with rotary axes all it can turn to from above."""
+    """(d, 3) float64, dimensionless, setup frame: unit vectors of the accesses and of all axes the machine turns to."""
     given = np.array([r[2] for r in rotations])
     machine = inputs.rotary
     if machine is None or not search or inputs.machine.orientations == "given":
@@ -229,8 +232,9 @@ def _seen_from(inputs: JobInputs, rotations: list[F64], search: bool) -> F64:
     return np.vstack([given, axes[machine.stands(axes)]])
 
 
-def _further(inputs: JobInputs, part: Part, blank: Blank, views: list[View], zoning: Zoning, lift: float) -> list[Access]:
-    """Accesses a machine with rotary axes turns to beyond those of the setup, for what these leave."""
+def _further(inputs: JobInputs, part: Part, blank: Blank, views: list[View], zoning: Zoning,
+             lift: float) -> list[Access]:
+    """Further accesses of a machine with rotary axes, for the area that those of the setup leave."""
     machine = inputs.rotary
     if machine is None or inputs.machine.orientations == "given":
         return []
@@ -239,7 +243,7 @@ def _further(inputs: JobInputs, part: Part, blank: Blank, views: list[View], zon
     here = turned_samples(samples, turn.T)
     gatherer = Gatherer(TriangleTree(obstacle_mesh(part, inputs, table=table_height(inputs, blank))), inputs.bodies,
                         inputs.clearances, inputs.quality.scallop_height_mm, lift, inputs.quality.stock_allowance_mm)
-    worth = max(LEAST_TURN_MM2, LEAST_TURN_SHARE * float(samples.area.sum()))
+    worth = max(MIN_ACCESS_GAIN_MM2, MIN_ACCESS_GAIN_SHARE * float(samples.area.sum()))
     known = np.array([v.direction for v in views])
     axes = orientations(here.subset(np.flatnonzero(~zoning.taken)), gatherer, machine.stands, machine.even, known,
                         worth)
@@ -250,14 +254,15 @@ def _further(inputs: JobInputs, part: Part, blank: Blank, views: list[View], zon
 
 
 def _stood_askew(inputs: JobInputs, part: Part, decomposition: Decomposition) -> tuple[str, ...]:
-    """A sentence where the first access, which walls are found along, shows none but another one does."""
+    """A warning where no wall stands along the first access, although walls stand along another one."""
     if decomposition.walls:
         return ()
     for access in inputs.accesses[1:]:
         count = len(decompose(turned(part, access_rotation(access.direction))).walls)
         if count:
-            return (f"walls are found along the first access, {inputs.accesses[0].id}, and none stands along it; along "
-                    f"{access.id} {count} do: name {access.id} first",)
+            first = inputs.accesses[0].id
+            return (f"no wall stands along the first access, {first}, and {count} stand along {access.id}; walls are "
+                    f"found along the first access only: name {access.id} first",)
     return ()
 
 
@@ -265,9 +270,10 @@ def tip_field(inputs: JobInputs, blank: Blank, rotation: F64, standing: DiscHeig
               body: ToolBody) -> TipField:
     """Tip limits of a tool along an access, over the part, the room beside it and the blank.
 
-    blank                 : Blank in the setup frame
-    rotation              : (3, 3) from there into the access frame
-    standing, bounds      : DiscHeights of part and fixtures; (2, 3) float64 of the part, mm; in the access frame
+    blank    : Blank in the setup frame
+    rotation : (3, 3) float64, dimensionless, from the setup frame to the access frame
+    standing : DiscHeights of part and fixtures, access frame
+    bounds   : (2, 3) float64, mm, of the part in the access frame
     """
     room = _room(body, bounds, blank, rotation)
     return TipField(standing.tree, body, inputs.clearances, bounds, room, lattice_step(body),
@@ -280,8 +286,8 @@ def _view(inputs: JobInputs, name: str, part: Part, blank: Blank, rotation: F64,
     is_first = rotation is first or np.array_equal(rotation, first)
     here = turned(part, rotation)
     tree = TriangleTree(here.mesh)
-    told = inputs.machine.table_z_mm is not None
-    obstacles, leaning = tree, inputs.turns and (told or rotation[2, 2] < UPRIGHT)
+    table_known = inputs.machine.table_z_mm is not None
+    obstacles, leaning = tree, inputs.turns and (table_known or rotation[2, 2] < UPRIGHT)
     if inputs.fixtures or leaning:
         matrix = np.eye(4)
         matrix[:3, :3] = rotation
@@ -297,31 +303,32 @@ def _view(inputs: JobInputs, name: str, part: Part, blank: Blank, rotation: F64,
 
 
 def planning_samples(part: Part, decomposition: Decomposition, inputs: JobInputs, directions: F64) -> SurfaceSamples:
-    """What zones are built of and passes are measured at.
+    """The samples that zones are built of and passes are measured at, in the frame of the part.
 
-    Every face gets ``PLANNING_DENSITY`` samples a mm², a small one ``LEAST_SAMPLES``, and its borders a sample
-    every ``BORDER_SPACING`` mm, so that the deepest and the outermost place of a zone are among them. Normals are those
-    of the exact surface: beside those of facets a tool would stand so far aside that it does not fit into a round.
+    Every face gets ``PLANNING_DENSITY`` samples a mm², a small one more: ``MIN_FACE_SAMPLES`` or ``MAX_DENSITY``. Its
+    borders get a sample every ``BORDER_SPACING`` mm, so that the deepest and the outermost place of a zone are among
+    them. Normals are those of the exact surface: with the normals of facets a tool would stand too far aside to fit
+    into a fillet.
 
-    directions : (d, 3) float64, unit, that it is seen from, in the frame of the part
+    directions : (d, 3) float64, dimensionless, frame of the part: unit vectors the area is seen from
     """
     triangles = machinable_triangles(part, decomposition, inputs, directions)
     ids, areas = part.mesh.face_ids[triangles], part.mesh.areas[triangles]
-    thin = min(1.0, MOST_SAMPLES / max(PLANNING_DENSITY * float(areas.sum()), 1e-9))
+    thin = min(1.0, MAX_SAMPLES / max(PLANNING_DENSITY * float(areas.sum()), 1e-9))
     sets = []
     for face in np.unique(ids):
         mine = triangles[ids == face]
         area = float(part.mesh.areas[mine].sum())
-        density = max(PLANNING_DENSITY * thin, min(LEAST_SAMPLES / max(area, 1e-9), MOST_DENSITY))
+        density = max(PLANNING_DENSITY * thin, min(MIN_FACE_SAMPLES / max(area, 1e-9), MAX_DENSITY))
         sets.append(sample_surface(part.mesh, density, seed=int(face), triangles=mine))
     sets.append(sample_borders(part.mesh, BORDER_SPACING, BORDER_INSET, triangles))
     return with_surface_normals(joined(sets), part.mesh)
 
 
 def machinable_triangles(part: Part, decomposition: Decomposition, inputs: JobInputs, directions: F64) -> np.ndarray:
-    """Indices of the mesh triangles of the machinable area Ma.
+    """The mesh triangles of the machinable area Ma, (n,) int64, index.
 
-    directions : (d, 3) float64, unit, that it is seen from, in the frame of the part
+    directions : (d, 3) float64, dimensionless, frame of the part: unit vectors the area is seen from
 
     Raises
     ------

@@ -32,24 +32,24 @@ from toolpath.plan_settings import Turning
 from toolpath.workingsteps import Workingstep
 from zones.reach.access_view import View
 
-BOW, SPARE = 1.0 / 800.0, 0.01  # of the distance from the tip; mm, for rounding
+BOW, SPARE = 1.0 / 800.0, 0.01  # chord error of a swing over the distance from the tip; mm, for rounding
 RATE_SPARE = 1.05  # of the time the axes take at their fastest: words are rounded
 PARTS, LAST_NUMBER = 100, 7000  # from 8000 on numbers may be locked
-NO_HOLDER = 200.0  # mm by which a shank is taken to go on where the setup names no holder
+NO_HOLDER = 200.0  # mm of shank above the stickout that are assumed where the setup names no holder
 
 
 def fixture_boxes(ready: Prepared, view: View | ProofFrame) -> tuple[np.ndarray, ...]:
-    """Boxes (2, 3) that hold the fixtures in the frame of a view, mm."""
+    """Boxes around the fixtures, each (2, 3) float64, mm, in the frame of a view."""
     return tuple(turned_box(box, view.rotation) for box in ready.inputs.fixtures)
 
 
 def access_of(ready: Prepared, view: View | ProofFrame) -> Access:
-    """The access a view or a frame belongs to."""
+    """The access that a view or a frame of a proof belongs to."""
     return next(a for a in ready.accesses if a.id == view.id)
 
 
 def proof_frame(ready: Prepared) -> ProofFrame:
-    """The frame programs are proved in: of the first access, on a machine with rotary axes that of the setup."""
+    """The frame programs are proved in: that of the first access, or the setup frame on a machine with rotary axes."""
     first = ProofFrame.of(ready.views[0])
     if not ready.inputs.turns:
         return first
@@ -59,9 +59,9 @@ def proof_frame(ready: Prepared) -> ProofFrame:
 
 def programs_of(ready: Prepared, access_plans: Sequence[AccessPlan],
                 trimmed: Mapping[str, Sequence[Faces]] | None = None) -> list[WrittenProgram]:
-    """The programs: one of each access that has steps, on a machine with rotary axes one of them all.
+    """The programs: one for each access that has steps, or one for all accesses on a machine with rotary axes.
 
-    trimmed : exact faces by zone, in the frame of its access, which the features of STEP-NC are made of
+    trimmed : exact faces by zone, in the frame of its access; the features of STEP-NC are made of them
     """
     cutting = [s for s in access_plans if s.plan.steps]
     if not cutting:
@@ -80,9 +80,9 @@ def programs_of(ready: Prepared, access_plans: Sequence[AccessPlan],
 
 def _written(ready: Prepared, access: str, work: Workplan, end: str = "",
              turn: F64 | None = None) -> list[WrittenProgram]:
-    """The program of a plan for every control of the machine; several in order where one would be too large.
+    """The program of a plan in every dialect of the machine, or several in order where one would be too large.
 
-    The one that is simulated is the first that says how far the path may be left: that is in the error bound then.
+    The proof simulates the first dialect that states how far the control may leave the path; its error bound counts it.
     """
     machine = ready.inputs.machine
     switches = Switches(machine.high_speed, machine.haas_tcp, machine.heidenhain_plane, machine.siemens_cycle800)
@@ -103,20 +103,20 @@ def _written(ready: Prepared, access: str, work: Workplan, end: str = "",
 
 
 def with_figures(written: Sequence[WrittenProgram], report: Mapping[str, Any]) -> list[WrittenProgram]:
-    """Proved programs with the figures of their proof in the headers, to be read once more before they count.
+    """Proved programs with the figures of their proof in the headers. They are read once more before delivery.
 
     report : of the job
     """
-    told = figures_of(report)
+    figures = figures_of(report)
     out = []
     for p in written:
-        texts = {d: filled(text, DIALECTS[d](Switches()), told) for d, _, text in p.files()}
-        out.append(replace(p, work=replace(p.work, figures=told), text=texts.pop(p.dialect), others=texts))
+        texts = {d: filled(text, DIALECTS[d](Switches()), figures) for d, _, text in p.files()}
+        out.append(replace(p, work=replace(p.work, figures=figures), text=texts.pop(p.dialect), others=texts))
     return out
 
 
 def figures_of(report: Mapping[str, Any]) -> tuple[str, ...]:
-    """What the header of a program says of the proof of its job."""
+    """The lines about the proof of the job in the header of a program."""
     scallops = [z["scallop_mm"]["p99"] for z in report["zones"] if z["scallop_mm"]["p99"] is not None]
     scallop = f"scallop p99 at most {decimal(max(scallops))} mm" if scallops else "no scallop to measure"
     rest, time, proof = report["remainder"], report["time"], report["proof"]
@@ -131,7 +131,7 @@ def figures_of(report: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def program_number(access: int, part: int) -> int:
-    """Four digits at most, from 1000 on, another for each part of each access; both count from 0.
+    """Number of a program, four digits at most, from 1000 on; ``access`` and ``part`` count from 0.
 
     >>> program_number(0, 0), program_number(2, 1), program_number(5, 99)
     (1000, 1201, 1599)
@@ -140,7 +140,7 @@ def program_number(access: int, part: int) -> int:
 
 
 def workplan(ready: Prepared, access_plan: AccessPlan) -> Workplan:
-    """The plan of one access as the writers want it."""
+    """The workplan of one access, for the writers."""
     view = access_plan.view
     comments: tuple[str, ...] = ()
     if len(ready.views) > 1:
@@ -151,7 +151,13 @@ def workplan(ready: Prepared, access_plan: AccessPlan) -> Workplan:
 
 
 def clamped_workplan(ready: Prepared, access_plans: Sequence[AccessPlan]) -> Workplan:
-    """The plans of all accesses one after the other, as the writers want it on a machine with rotary axes."""
+    """The workplan of all accesses one after the other, for the writers, on a machine with rotary axes.
+
+    Raises
+    ------
+    InternalError
+        The machine has no rotary axes.
+    """
     inputs, first = ready.inputs, ready.views[0]
     frame = ProofFrame(first.id, np.eye(3), ready.part)
     machine = inputs.rotary
@@ -177,7 +183,7 @@ def clamped_workplan(ready: Prepared, access_plans: Sequence[AccessPlan]) -> Wor
 
 
 def turning_of(ready: Prepared, view: View) -> Turning | None:
-    """What the rotary axes can do in the frame of a view; None on a machine without, or where they only index."""
+    """Motion of the rotary axes in the frame of a view; None on a machine without, or where they only index."""
     inputs, turn = ready.inputs, view.rotation
     machine = inputs.rotary
     if machine is None or not inputs.machine.simultaneous:
@@ -191,29 +197,31 @@ def turning_of(ready: Prepared, view: View) -> Turning | None:
             way, turns = machine.course(tips @ turn, axes @ turn, tolerance, SWING, longest)
         except OutputError:
             return None
-        least = np.zeros(len(way) - 1)
+        min_minutes = np.zeros(len(way) - 1)
         if rate is not None:
-            least = np.degrees(np.abs(np.diff(turns, axis=0)).max(axis=1)) / rate
+            min_minutes = np.degrees(np.abs(np.diff(turns, axis=0)).max(axis=1)) / rate
         if machine.pivots is not None:
             for gauge in {*inputs.gauge_lengths.values()}:
                 gone = np.abs(np.diff(machine.joints(way, turns, gauge), axis=0)).max(axis=1)
-                least = np.maximum(least, gone / fastest)
-        return way @ turn.T, machine.axes(turns) @ turn.T, RATE_SPARE * least
+                min_minutes = np.maximum(min_minutes, gone / fastest)
+        return way @ turn.T, machine.axes(turns) @ turn.T, RATE_SPARE * min_minutes
 
     table = table_height(inputs, ready.blank) + inputs.clearances.rapid + TABLE_SPARE
     return Turning(lambda axes: machine.stands(axes @ turn), along, turn[:, 2], table)
 
 
 def room_to_turn(height: float, radius: float, leans: float, tools: Sequence[ToolBody], table: float) -> float:
-    """By how much the ball that tools turn outside of is moved up, and made greater, so that they clear the table.
+    """How far the ball that tools turn outside of moves up and grows, mm, so that tilted tools clear the table.
 
-    height, radius : mm, of its centre and its size
-    leans  : rad, the most a tool leans, well below a half turn (``service.from_wire.check_plannable``)
-    table  : mm, Z that no tool may come down to
+    height, radius : mm, of the centre of the ball and its size
+    leans : rad, the largest tilt of a tool, well below a half turn (``service.from_wire.check_plannable``)
+    table : mm, Z that no tool may come down to
 
-    Returns mm; what lay in the ball still does. A rim r wide at the height h above the tip hangs r sin(lean) below its
-    place, h cos(lean) above the tip; that is radius cos(lean) above the centre. While an axis swings the proof takes
-    1/800 of the distance from the tip off that (``verify.checks.table_clearance``), and so it is here.
+    Notes
+    -----
+    The grown ball still holds the first one. The tip stands radius cos(tilt) above the centre. A rim of radius r at the
+    height h above the tip stands h cos(tilt) - r sin(tilt) above it. While an axis swings, the proof subtracts 1/800 of
+    the distance from the tip (``verify.checks.table_clearance``), and so does this function.
     """
     angles = np.linspace(0.0, leans, max(2, int(np.ceil(np.degrees(leans))) + 1))
     up, aside = np.cos(angles), np.sin(angles)
@@ -234,7 +242,7 @@ def room_to_turn(height: float, radius: float, leans: float, tools: Sequence[Too
 
 def _workplan(ready: Prepared, steps: tuple[Workingstep, ...], frame: ProofFrame, clearance: float, access: Access,
               words: tuple[str, ...]) -> Workplan:
-    """What both kinds of plan say; clearance is the height of the clearance plane, mm."""
+    """The workplan of steps in a frame; clearance : mm, height of the clearance plane."""
     inputs = ready.inputs
     used = {s.tool.id for s in steps}
     if ready.blank.solid is not None:
@@ -255,7 +263,7 @@ def _workplan(ready: Prepared, steps: tuple[Workingstep, ...], frame: ProofFrame
 
 
 def _stock_words(ready: Prepared) -> str:
-    """What kind of blank it is, where a box does not say it all."""
+    """The kind of the blank for the header; '' where the box in the header is the whole blank."""
     blank = ready.blank
     if blank.bar is not None:
         return f"cylinder of diameter {2.0 * blank.bar.radius:g} mm and height {blank.bar.height:g} mm"
@@ -265,7 +273,7 @@ def _stock_words(ready: Prepared) -> str:
 
 
 def _cylinder(ready: Prepared, frame: ProofFrame) -> StockCylinder | None:
-    """The blank in a frame, where it is a cylinder."""
+    """The blank as a cylinder in a frame; None where it is none."""
     bar = ready.blank.bar
     if bar is None:
         return None
@@ -275,7 +283,7 @@ def _cylinder(ready: Prepared, frame: ProofFrame) -> StockCylinder | None:
 
 def _surfaces(ready: Prepared, access_plans: Sequence[AccessPlan],
               trimmed: Mapping[str, Sequence[Faces]]) -> dict[int, NurbsSurface]:
-    """Exact faces by number: of one access in its frame, or of all accesses in the setup frame on a machine that turns."""
+    """Exact faces by number: of one access in its frame, or of all in the setup frame on a machine with rotary axes."""
     out: dict[int, NurbsSurface] = {}
     for access_plan in access_plans:
         turn = np.eye(4)

@@ -1,7 +1,7 @@
-"""The stock for a page: the verifier's field on a coarse grid, from the blank on, as what each stretch of time changed.
+"""The stock for a page: the field of the proof on a coarse grid, from the blank on, as changes in each stretch of time.
 
-Made by the cuts of the proof, so it is right for tools that lean or turn and for several accesses on one blank. Between
-two states the page cuts the same grid with the tool along the way it draws.
+The cuts of the proof make it, so it is right for tilted and turning tools and for several accesses on one blank.
+Between two states the page cuts the same grid with the tool along the track that it draws.
 """
 
 from __future__ import annotations
@@ -25,9 +25,15 @@ def stock_chunk(read: Sequence[Reading], part: Part, tools: Sequence[ToolBody], 
                 open_: bool) -> Chunk:
     """Blank, part and the changes as a chunk of kind 'field'.
 
-    read  : the programs; part, tools, setup : as the proof took them, and errors as ``stock_in_time``
-    frame  : the frame of the proof, which is that of the grid
-    open_ : whether the program may be known; else seconds are whole
+    read  : the programs
+    part, tools, setup : as the proof took them
+    frame : of the proof and of the grid
+    open_ : whether the program may be shown; else seconds are whole
+
+    Raises
+    ------
+    CamError
+        As ``verify.material.machined_part.stock_in_time``.
     """
     stock = stock_in_time(read, part, tools, setup, stretches=STRETCHES, nodes=NODES)
     ended = 1000.0 * (stock.ended if open_ else np.rint(stock.ended))

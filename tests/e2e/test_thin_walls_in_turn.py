@@ -53,7 +53,7 @@ def test_the_plan_holds_both_sides_and_the_order_of_before_does_not(wall, tmp_pa
     steps = [s["strategy"] for s in banded["steps"]]
     assert steps.count("depth_layers") == 2 and steps.index("waterline") < len(steps) - 1 - steps[::-1].index("depth_layers")
     monkeypatch.setattr(plan_prove_loop, "band_planes", lambda *_: ())
-    monkeypatch.setattr(plan_prove_loop, "PLANS", 1)
+    monkeypatch.setattr(plan_prove_loop, "MAX_PLANS", 1)
     whole = plan(wall, tmp_path / "whole", setup())
     assert whole["state"] == "unproved" and set(whole["finding_counts"]) == {"support"}
     assert 14.0 < whole["proof"]["support"]["most_ratio"] < 9.5 / 0.6 + 1.0  # the last layer at the foot still stands

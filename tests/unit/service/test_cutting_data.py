@@ -81,8 +81,8 @@ def test_what_the_setup_says_of_a_tool_stands_and_is_held_to_the_limits():
     told = limited(JobInputs.of(slow))
     assert [(c.subjects, c.measured, c.limit) for c in told] == [
         (("T1",), 9000, 8000), (("T1",), 321, 200), (("T2",), 7000, 5000)]
-    assert told[0].sentence == ("tool T1: spindle_rpm 9000 is more than machine.max_rpm 8000; it runs at 8000; ask for "
-                                "no more, or correct the limit")
+    assert told[0].sentence == ("tool T1: spindle_rpm 9000 is more than machine.max_rpm 8000; it runs at 8000; lower "
+                                "the figure, or correct the limit")
     assert "its max_rpm 5000" in told[2].message
     cut = JobInputs.of(slow).cut_table["T1"]
     assert (cut.spindle_rpm, cut.feed, cut.plunge_feed, cut.link_feed) == (8000, 200, 55, 200)

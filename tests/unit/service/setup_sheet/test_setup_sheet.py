@@ -168,7 +168,7 @@ def test_all_that_the_report_names_is_on_both(proved):
         "4 below the blank",
         "X -1 to 41, Y -2 to 22, Z -3 to 14", "X 0 to 40, Y 0 to 20, Z 0 to 13", "fixture 1", "-20 to -5",
         "T1 lasts for 20 min", "have 2 cutters at hand", "a face was mended", "a note of the proof", "abababababababab",
-        "cdcdcdcdcdcdcdcd", "25.12", "Ø2.8", "81 gauge length", "0.0031 mm", "The proof found nothing",
+        "cdcdcdcdcdcdcdcd", "25.12", "Ø2.8", "81 gauge length", "0.0031 mm", "The proof has no finding",
         "program.linuxcnc.ngc", "31415", "Ti-6Al-4V"]
     for text in both(proved):
         assert [w for w in wanted if w not in text] == []

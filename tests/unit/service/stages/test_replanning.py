@@ -14,7 +14,7 @@ from schemas.setup import Setup
 from service import pipeline
 from service.stages import plan_prove_loop
 from service.stages.access_plan import ProofFrame
-from service.stages.replanning import MOST, MOST_PACKED, Attempt, ProofFeedback, learned
+from service.stages.replanning import MAX_OTHER_FINDINGS, MAX_ENGAGEMENT_FINDINGS, Attempt, ProofFeedback, learned
 from tests.hand_parts import SHORT_TOOLS
 from toolpath.counterexamples import BARRED, CARE, CLOSER, STRICTER, Counterexamples
 from toolpath.lines import Line
@@ -71,8 +71,8 @@ def test_where_too_much_was_in_stock_is_gone_in_skims_and_then_not_at_all():
     assert once.along("A1").crowds(TOOL, np.array([[1.0, 3.0, -2.0], [9.0, 3.0, -2.0]])).tolist() == [True, False]
     twice = learned(once, attempt(found(FindingKind.ENGAGEMENT)))
     assert len(twice.along("A1").barred[TOOL.id]) == 1 and "kept away" in twice.notes[1]
-    many = [found(FindingKind.ENGAGEMENT, tip=(9.0 * k, 2.0, 3.0)) for k in range(MOST_PACKED + 1)]
-    assert len(learned(ProofFeedback(), attempt(*many[1:])).along("A1").packed[TOOL.id]) == MOST_PACKED > MOST
+    many = [found(FindingKind.ENGAGEMENT, tip=(9.0 * k, 2.0, 3.0)) for k in range(MAX_ENGAGEMENT_FINDINGS + 1)]
+    assert len(learned(ProofFeedback(), attempt(*many[1:])).along("A1").packed[TOOL.id]) == MAX_ENGAGEMENT_FINDINGS > MAX_OTHER_FINDINGS
     assert learned(ProofFeedback(), attempt(*many)) is None
     leaning = learned(ProofFeedback(), attempt(found(FindingKind.ENGAGEMENT, line=5)))
     assert len(leaning.along("A1").barred[TOOL.id]) == 1  # a flank has no skims
@@ -102,7 +102,7 @@ def test_what_was_met_or_dug_beside_a_wall_bars_the_tool(kind, line):
 @pytest.mark.parametrize("tried", [
     attempt(), attempt(found(FindingKind.GOUGE)), attempt(found(FindingKind.RAPID)),
     attempt(found(FindingKind.PLUNGE), found(FindingKind.GOUGE)), attempt(found(FindingKind.PLUNGE, tip=None)),
-    attempt(found(FindingKind.PLUNGE, line=1)), attempt(*[found(FindingKind.PLUNGE)] * (MOST + 1)),
+    attempt(found(FindingKind.PLUNGE, line=1)), attempt(*[found(FindingKind.PLUNGE)] * (MAX_OTHER_FINDINGS + 1)),
     attempt(found(FindingKind.PLUNGE), counts={"plunge": 300}), attempt(found(FindingKind.RESIDUAL, 0, None, -0.1)),
     attempt(found(FindingKind.PROGRAM))])
 def test_a_fault_of_the_planner_is_not_planned_away(tried):

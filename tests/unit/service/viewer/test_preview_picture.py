@@ -126,7 +126,7 @@ def test_reasons_are_told_once_with_their_area():
             {"reason": "corner", "area_mm2": 3.5}]
     assert preview_picture._reasons(rows) == ["30 mm2 stay: undercut", "5.5 mm2 stay: corner (2 places)"]
     many = [{"reason": f"r{k}", "area_mm2": 10.0 - k} for k in range(8)]
-    assert len(preview_picture._reasons(many)) == preview_picture.MOST_REASONS
+    assert len(preview_picture._reasons(many)) == preview_picture.MAX_REASONS
     assert preview_picture._reasons(many)[-1] == "18.0 mm2 for 4 more reasons"
 
 

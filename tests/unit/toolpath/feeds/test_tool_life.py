@@ -114,7 +114,7 @@ def test_a_run_longer_than_a_life_gets_a_cutter_of_its_own_and_is_told_of():
     inputs = SimpleNamespace(tools=[SimpleNamespace(id="T1", life_min=0.5), SimpleNamespace(id="T2", life_min=None)])
     told = lives_ended(inputs, got)
     assert [c.subjects for c in told] == [("T1", "S04b", "S04c"), ("T1", "S04b")]
-    assert told[0].remedy == "have 3 cutters at hand" and told[1].measured == pytest.approx(1.0, abs=0.05)
+    assert told[0].remedy == "have 3 cutters ready" and told[1].measured == pytest.approx(1.0, abs=0.05)
     assert lives_ended(inputs, [step(1, 10.0)]) == []
 
 
