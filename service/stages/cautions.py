@@ -105,8 +105,8 @@ def uncut_centres(inputs: JobInputs, steps: Sequence[Workingstep]) -> list[JobCa
         shortest = LEAST_RUN * used[tool.id].radius
         message = (f"tool {tool.id} does not cut to its centre; its ramps into stock, of 3 degrees at most, may be as "
                    f"short as {shortest:.2f} mm where there is no more room")
-        out.append(JobCaution("center_cutting", (tool.id,), message, shortest, tool.diameter_mm,
-                              "watch its first cuts in closed pockets, drill them first, or take a centre-cutting tool"))
+        remedy = "watch its first cuts in closed pockets, drill them first, or use a centre-cutting tool"
+        out.append(JobCaution("center_cutting", (tool.id,), message, shortest, tool.diameter_mm, remedy))
     return out
 
 
