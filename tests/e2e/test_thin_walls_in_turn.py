@@ -51,7 +51,8 @@ def test_the_plan_holds_both_sides_and_the_order_of_before_does_not(wall, tmp_pa
     assert support["walls"] == 1 and support["places"] > 100 and support["places_over"] == 0
     assert support["most_ratio"] <= PLANNED_RATIO + 1.0 and support["limit_ratio"] == FREE_RATIO
     steps = [s["strategy"] for s in banded["steps"]]
-    assert steps.count("depth_layers") == 2 and steps.index("waterline") < len(steps) - 1 - steps[::-1].index("depth_layers")
+    last_layers = len(steps) - 1 - steps[::-1].index("depth_layers")
+    assert steps.count("depth_layers") == 2 and steps.index("waterline") < last_layers
     monkeypatch.setattr(plan_prove_loop, "band_planes", lambda *_: ())
     monkeypatch.setattr(plan_prove_loop, "MAX_PLANS", 1)
     whole = plan(wall, tmp_path / "whole", setup())

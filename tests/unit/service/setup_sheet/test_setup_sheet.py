@@ -238,7 +238,8 @@ def test_a_part_that_is_turned_by_hand_is_shown_as_it_lies_each_time():
     ready = SimpleNamespace(inputs=JobInputs.of(setup), part=part, blank=blank_of(setup, part),
                             views=tuple(views.values()), accesses=setup.access, view=lambda name: views[name])
     first, second, third = steps()
-    written = [WrittenProgram("A1", plan(first), "G21\n"), WrittenProgram("A2", plan(second, clearance_plane=33.0), "G21\n", ".A2"),
+    written = [WrittenProgram("A1", plan(first), "G21\n"),
+               WrittenProgram("A2", plan(second, clearance_plane=33.0), "G21\n", ".A2"),
                WrittenProgram("A2", plan(third, clearance_plane=33.0), "G21\n", ".A2.part2")]
     report = report_of("proved", [])
     files: Files = {name: ("program", "linuxcnc", p.access, b"G21\n") for p in written for _, name, _ in p.files()}
@@ -282,7 +283,8 @@ def test_the_pdf_is_whole(proved):
 
 
 def test_a_line_is_cut_where_it_does_not_fit():
-    sheet = SetupSheet("W" * 300, True, "fine", "W" * 300, (SheetSection("job", "Job", (Facts((("W" * 200, "W" * 2000),)),)),))
+    section = SheetSection("job", "Job", (Facts((("W" * 200, "W" * 2000),)),))
+    sheet = SetupSheet("W" * 300, True, "fine", "W" * 300, (section,))
     text = pdf_text(pdf_of(sheet))
     assert re.search(r" W{40,110}\.\.\. page 1 of 2", text) and text.count("W") > 2500
 

@@ -14,7 +14,7 @@ from schemas.setup import Setup
 from service import pipeline
 from service.stages import plan_prove_loop
 from service.stages.access_plan import ProofFrame
-from service.stages.replanning import MAX_OTHER_FINDINGS, MAX_ENGAGEMENT_FINDINGS, Attempt, ProofFeedback, learned
+from service.stages.replanning import MAX_ENGAGEMENT_FINDINGS, MAX_OTHER_FINDINGS, Attempt, ProofFeedback, learned
 from tests.hand_parts import SHORT_TOOLS
 from toolpath.counterexamples import BARRED, CARE, CLOSER, STRICTER, Counterexamples
 from toolpath.lines import Line
@@ -72,7 +72,8 @@ def test_where_too_much_was_in_stock_is_gone_in_skims_and_then_not_at_all():
     twice = learned(once, attempt(found(FindingKind.ENGAGEMENT)))
     assert len(twice.along("A1").barred[TOOL.id]) == 1 and "kept away" in twice.notes[1]
     many = [found(FindingKind.ENGAGEMENT, tip=(9.0 * k, 2.0, 3.0)) for k in range(MAX_ENGAGEMENT_FINDINGS + 1)]
-    assert len(learned(ProofFeedback(), attempt(*many[1:])).along("A1").packed[TOOL.id]) == MAX_ENGAGEMENT_FINDINGS > MAX_OTHER_FINDINGS
+    places = learned(ProofFeedback(), attempt(*many[1:])).along("A1").packed[TOOL.id]
+    assert len(places) == MAX_ENGAGEMENT_FINDINGS > MAX_OTHER_FINDINGS
     assert learned(ProofFeedback(), attempt(*many)) is None
     leaning = learned(ProofFeedback(), attempt(found(FindingKind.ENGAGEMENT, line=5)))
     assert len(leaning.along("A1").barred[TOOL.id]) == 1  # a flank has no skims
