@@ -77,7 +77,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
 
 
 def _trimmed_and_scored(part_path: Path, ready: Prepared) -> tuple[Prepared, Mapping[str, Sequence[Faces]], Score]:
-    """The exact faces, which another process reads meanwhile, and the samples of the proof."""
+    """The exact faces by zone, which another process reads meanwhile, and the samples of the proof."""
     with ThreadPoolExecutor(1) as pool:
         faces = pool.submit(trimmed_faces, part_path, ready) if ready.inputs.operations.finishing else None
         scored = score(ready)
@@ -88,9 +88,9 @@ def _trimmed_and_scored(part_path: Path, ready: Prepared) -> tuple[Prepared, Map
 
 
 def zones_only(part_path: Path, setup: Setup, progress: Progress, blank_path: Path | None = None) -> dict[str, Any]:
-    """The dry check: walls, connections, channels, zones with their tools, and what stays out of reach.
+    """The dry check: walls, connections, channels, zones with their tools, and the remainder.
 
-    blank_path : as ``plan``
+    blank_path : as in ``plan``
 
     Raises
     ------
@@ -109,18 +109,18 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
                    access: str | None = None, out: Path | None = None, mesh: MeshWish | None = None,
                    spindle_tool: int = 0, blank_path: Path | None = None, dialect: str | None = None,
                    ending: str = "") -> dict[str, Any]:
-    """Prove any program, NC code or STEP-NC, against the part: gouges, contacts, rapids and limits, and what it leaves.
+    """Prove any program, NC code or STEP-NC, against the part: gouges, contacts, rapids, limits and uncut area.
 
-    No zone answers for a sample here, so uncut area is a figure (coverage), not a finding. The program is read in the
-    frame of one access; where ``access`` is None in that of the first, on a machine with rotary axes in the setup's.
-    ``spindle_tool`` is the T number that stands in the spindle, its length offset on, before its first line, 0 for
-    none.
+    No zone answers for a sample here, so uncut area is a figure (coverage), not a finding.
 
-    out  : folder for the deviation map, the mesh and the report; none is written where it is None
-    mesh : the machined part is wanted too; it is written into ``out``
-    blank_path : as ``plan``
-    dialect : whose words the program has; None: by its own marks, by ``ending`` of its file name or by the controls of
-        the machine (``verify.gcode.dialects.dialect_of``)
+    access       : in whose frame the program is read; None: the first access, or the setup frame on a machine with
+                   rotary axes
+    out          : folder for the deviation map, the mesh and the report; None: no file is written
+    mesh         : also write the machined part as a mesh into ``out``
+    spindle_tool : T number of the tool in the spindle before the first line, its length offset active; 0: none
+    blank_path   : as in ``plan``
+    dialect      : of the program; None: found by marks in its text, by ``ending`` of its file name, or by the dialects
+                   of the machine (``verify.gcode.dialects.dialect_of``)
 
     Raises
     ------

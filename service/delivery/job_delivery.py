@@ -10,6 +10,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from geometry.sampling import SurfaceSamples
 from service.delivery.machined_mesh import MESH_NAME, MeshWish, machined_part
 from service.delivery.result_files import Files, deliver, json_bytes
@@ -44,7 +47,7 @@ PREVIEW_NAME = "preview.png"
 
 
 def cautions_before_planning(ready: Prepared) -> list[JobCaution]:
-    """What a machinist has to know of a job before anything is planned."""
+    """The cautions of a job that are known before it is planned."""
     return [*limited(ready.inputs), *dry(ready.inputs), *thin_walls(ready)]
 
 
@@ -63,7 +66,7 @@ def deliver_job(job: ProvedPlan, cautions: Sequence[JobCaution], out: Path, mesh
     Raises
     ------
     CamError
-        A file cannot be made, or what was written is not read back as the proved program.
+        A file cannot be made, or a written file does not read back as the proved program.
     """
     reported = _report(job, cautions)
     report, ready, proved = reported.report, reported.ready, reported.report["state"] == "proved"
@@ -98,14 +101,15 @@ class _Reported:
     """A job with its report.
 
     ready     : Prepared, with all warnings
-    written   : the programs as they are delivered; of a job that is not proved as they were proved
-    uncut     : (n,) bool, samples of the proof that stay uncut; remainder : the same by region and reason
+    written   : the programs, with the figures of the proof in their headers where the job is proved
+    uncut     : (n,) bool, samples of the proof that stay uncut
+    remainder : the same by region and reason
     """
 
     ready: Prepared
     report: dict[str, Any]
     written: Sequence[WrittenProgram]
-    uncut: Any
+    uncut: NDArray[np.bool_]
     remainder: Sequence[Remainder]
 
 
@@ -120,7 +124,7 @@ def _report(job: ProvedPlan, cautions: Sequence[JobCaution]) -> _Reported:
                                                     job.zone, job.given_up, [*cautions, *plan_cautions])
     written: Sequence[WrittenProgram] = job.written
     if report["state"] == "proved":
-        # of every control's program one was simulated, before its figures were known; what is delivered is the same
+        # the proof simulated one dialect without figures, so the delivered texts of all dialects are compared with it
         written = with_figures(job.written, report)
         report["proof"]["notes"] += _differences(job, written)
     return _Reported(ready, report, written, uncut, remainder)

@@ -41,10 +41,10 @@ TIME_LIMIT, MEMORY_LIMIT = 7200.0, 8e9  # s, bytes
 @contextmanager
 def stepnc_under_way(programs: Sequence[WrittenProgram], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
                      out: Path) -> Iterator[Callable[[], Files]]:
-    """``stepnc_files`` going on while something else is done: gives what waits for them.
+    """Run ``stepnc_files`` in another process meanwhile; yields a function that waits for the files and returns them.
 
-    Short programs are begun only then. Where the other process cannot do it, for want of memory or time, this one does.
-    If nobody waited, nothing of them stays.
+    This process writes short programs itself, once the function is called. It also does so where the other process
+    exceeds its memory or time. Files that are never taken are deleted.
     """
     job = (programs, part, tools, setup, out)
     if sum(len(p.text) for p in programs) < LONG or (os.cpu_count() or 1) < 2:
