@@ -45,7 +45,8 @@ from zones.reach.access_view import View
 
 log = structlog.get_logger(__name__)
 
-COMPUTING = ("numpy", "scipy", "numba", "shapely", "trimesh", "cadquery-ocp")  # libraries that change a plan
+KERNEL_WHEELS = ("cadquery-ocp", "cadquery-ocp-novtk")  # an environment holds one of them
+COMPUTING = ("numpy", "scipy", "numba", "shapely", "trimesh", *KERNEL_WHEELS)  # libraries that change a plan
 PLAN, ACTS, PROOF = "plan", "acts", "proof"
 ACTS_EVERY_S = 15.0  # least time between two states of an unfinished plan that are kept
 ACTS_PAUSE = 60.0  # the same, in times of how long keeping the last state took
