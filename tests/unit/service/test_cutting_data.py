@@ -136,10 +136,10 @@ def test_a_tool_that_bends_too_far_is_named_with_its_worst_step():
              replace(step(5, SLIM, "waterline"), bend=Bend(0.02, 0.005, 1.0, 0.02, fixed=True))]
     told = bent(steps)
     assert [c.subjects for c in told] == [("T1", "S01", "S02"), ("T1", "S05")]
-    assert told[0].sentence == ("tool T1 in S02 layers and 1 other steps, roughing: its tip would bend 0.400 mm "
-                                "(limit 0.050 mm); its feed is eased to 20 %, with 0.120 mm; a shorter or thicker "
-                                "tool needs no easing")
-    assert (told[0].measured, told[0].limit) == (0.4, 0.05) and "the setup's own" in told[1].remedy
+    assert told[0].sentence == ("tool T1 in S02 depth_layers and 1 other steps, roughing: its tip would bend "
+                                "0.400 mm (limit 0.050 mm); the plan lowers its feed to 20 %, where it bends 0.120 mm; "
+                                "a shorter or thicker tool keeps its feed")
+    assert (told[0].measured, told[0].limit) == (0.4, 0.05) and "given by the setup" in told[1].remedy
 
 
 def test_a_tool_that_does_not_cut_to_its_centre_is_told_of_where_it_goes_down_into_stock():
