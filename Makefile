@@ -21,7 +21,7 @@ PAGE := service/page/index.html
 NODE := $(shell npm --version >/dev/null 2>&1 && node -e 'const [a, b] = process.versions.node.split("."); process.exit(a > 20 || (a == 20 && b >= 19) ? 0 : 1)' >/dev/null 2>&1 && echo yes)
 PAGE_PATH = $(if $(NODE),,PATH="$(CURDIR)/$(BIN):$$PATH")
 
-.PHONY: web page
+.PHONY: web page lint-web
 
 setup: $(STAMP) hooks page
 
@@ -48,7 +48,7 @@ peers: $(BENCH_STAMP)
 
 web: $(PAGE)
 
-$(PAGE): $(wildcard web/*.json web/*.js web/*.html web/src/*) openapi.yaml requirements-web.lock | $(BIN)/python
+$(PAGE): $(wildcard web/*.json web/*.js web/*.html web/src/* web/src/*/*) openapi.yaml requirements-web.lock | $(BIN)/python
 	$(if $(NODE),,@$(SHOW) "installing Node for the page" $(INSTALL) --no-deps -r requirements-web.lock)
 	@$(PAGE_PATH) $(SHOW) "installing the packages of the page" npm --prefix web ci --loglevel=http
 	@$(PAGE_PATH) $(SHOW) "building the page" npm --prefix web run build
@@ -57,6 +57,11 @@ $(PAGE): $(wildcard web/*.json web/*.js web/*.html web/src/*) openapi.yaml requi
 # Whoever cannot get the packages of the page has everything but the page, and is told.
 page: | $(BIN)/python
 	@$(MAKE) --no-print-directory -s web || echo "The page was not built, for the reason above. All else works. Remedy: make web"
+
+# The linter of the page; it says so and goes on where the packages of the page are missing.
+lint-web:
+	@if [ -f web/node_modules/eslint/package.json ] && [ -f web/src/wire.ts ]; then cd web && $(NPM) run --silent lint; \
+	else echo "web/ is not linted: the packages of the page are not installed. Remedy: make web"; fi
 
 check: $(STAMP)
 	$(BIN)/ruff check .

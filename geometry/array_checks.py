@@ -10,11 +10,11 @@ from geometry.mesh import F64
 
 
 def finite_points(values: ArrayLike, width: int, name: str) -> F64:
-    """Points as every kernel wants them.
+    """Points in the form that every kernel takes.
 
     values : numbers of shape (n, width), mm; nothing at all counts as n = 0
     width  : int, columns
-    name   : str, what the caller calls them
+    name   : str, the caller's name for them
 
     Returns
     -------
@@ -23,7 +23,7 @@ def finite_points(values: ArrayLike, width: int, name: str) -> F64:
     Raises
     ------
     GeometryError
-        Another shape, no numbers, or a row that is not finite; the subject is ``name``, with the row.
+        Code 'bad_array': another shape, no numbers, or a row that is not finite. The subject is ``name`` with the row.
     """
     try:
         points = np.ascontiguousarray(values, dtype=np.float64)

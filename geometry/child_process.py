@@ -1,4 +1,4 @@
-"""Run one command in a child process that cannot harm its parent.
+"""Runs one command in a child process that cannot harm its parent.
 
 The child lives in its own process group, dies with its parent, and is watched: wall time, resident memory of the
 whole group, signals. Whatever happens, nothing of it is left running when ``run_limited`` returns.
@@ -28,26 +28,26 @@ _PR_SET_PDEATHSIG = 1
 RESULT_VARIABLE = "ZONEMILL_CHILD_RESULT"
 MEMORY_VARIABLE = "ZONEMILL_CHILD_MEMORY"
 PARENT_VARIABLE = "ZONEMILL_CHILD_PARENT"
-# Exit code of a child that wrote an error description instead of a result.
+# Exit code of a child that wrote the description of an error instead of a result.
 TYPED_ERROR = 3
-# Address space counts what is mapped and never touched (libraries, thread arenas), so it gets room on top.
+# Address space also counts mapped memory that is never touched (libraries, thread arenas), so its limit is wider.
 ADDRESS_ROOM = 4e9
 
 
 def run_limited(command: Sequence[str], request: bytes, *, time_limit: float, memory_limit: float,
-                what: str = "reader", stop: threading.Event | None = None) -> bytes:
-    """Run a command, feed it a request on stdin, and return what it left in its result file.
+                name: str = "reader", stop: threading.Event | None = None) -> bytes:
+    """Run a command, feed it a request on stdin, and return the content of its result file.
 
     command      : arguments; the child finds the name of its result file in ``ZONEMILL_CHILD_RESULT``
     request      : bytes, stdin of the child
     time_limit   : float, s of wall time
     memory_limit : float, bytes resident in the child and its descendants together
-    what         : first word of the error codes
+    name         : first word of the error codes
     stop         : once set, the child is ended as if its time were over
 
     Returns bytes the child wrote before it exited with 0.
-    Raises the typed error the child described (exit code 3), or ResourceError with code ``<what>_timeout``,
-    ``<what>_memory`` or ``<what>_crashed``.
+    Raises the typed error the child described (exit code 3), or ResourceError with code ``<name>_timeout``,
+    ``<name>_memory`` or ``<name>_crashed``.
     """
     with tempfile.TemporaryDirectory(prefix="zonemill-") as folder:
         result = Path(folder, "result")
@@ -61,14 +61,14 @@ def run_limited(command: Sequence[str], request: bytes, *, time_limit: float, me
             child = subprocess.Popen(list(command), stdin=stdin, stdout=out, stderr=subprocess.STDOUT,
                                      start_new_session=True, env=environment)
             try:
-                _watch(child, time_limit, memory_limit, what, stop)
+                _watch(child, time_limit, memory_limit, name, stop)
             finally:
                 _kill_group(child)
-        return _outcome(child.returncode, result, log, memory_limit, what)
+        return _outcome(child.returncode, result, log, memory_limit, name)
 
 
 def guard_child() -> Path:
-    """Called first in the child: die with the parent, keep limits, return the path of the result file."""
+    """Path of the result file. Call this first in the child: it sets the limits and ends the child with its parent."""
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     parent = os.environ.get(PARENT_VARIABLE)
     if parent and os.getppid() != int(parent):
@@ -79,7 +79,7 @@ def guard_child() -> Path:
     return Path(os.environ[RESULT_VARIABLE])
 
 
-def _watch(child: subprocess.Popen[bytes], time_limit: float, memory_limit: float, what: str,
+def _watch(child: subprocess.Popen[bytes], time_limit: float, memory_limit: float, name: str,
            stop: threading.Event | None) -> None:
     deadline = time.monotonic() + time_limit
     handle = psutil.Process(child.pid)
@@ -91,10 +91,10 @@ def _watch(child: subprocess.Popen[bytes], time_limit: float, memory_limit: floa
             pass
         used = _resident(handle)
         if used > memory_limit:
-            raise _memory_error(what, used, memory_limit)
+            raise _memory_error(name, used, memory_limit)
         if time.monotonic() > deadline or (stop is not None and stop.is_set()):
-            raise ResourceError(f"the {what} did not finish within {time_limit:g} s and was stopped",
-                                code=f"{what}_timeout", measured=time_limit, limit=time_limit,
+            raise ResourceError(f"the {name} did not finish within {time_limit:g} s and was stopped",
+                                code=f"{name}_timeout", measured=time_limit, limit=time_limit,
                                 remedy="simplify the part, ask for a coarser chord, or raise the time limit")
 
 
@@ -104,7 +104,7 @@ def _resident(handle: psutil.Process) -> int:
         for process in [handle, *handle.children(recursive=True)]:
             total += process.memory_info().rss
     except psutil.Error:
-        pass  # it ended while we looked
+        pass  # the process ended between two looks
     return total
 
 
@@ -116,26 +116,26 @@ def _kill_group(child: subprocess.Popen[bytes]) -> None:
     child.wait()
 
 
-def _outcome(code: int, result: Path, log: Path, memory_limit: float, what: str) -> bytes:
+def _outcome(code: int, result: Path, log: Path, memory_limit: float, program: str) -> bytes:
     written = result.read_bytes() if result.exists() else b""
     if code == 0 and written:
         return written
     if code == TYPED_ERROR and written:
         error = error_from_dict(json.loads(written))
         if error.code == "out_of_memory":
-            raise _memory_error(what, memory_limit, memory_limit)
+            raise _memory_error(program, memory_limit, memory_limit)
         raise error
     tail = log.read_bytes()[-2000:].decode("utf-8", "replace").strip()
     if "bad_alloc" in tail or "MemoryError" in tail:
-        raise _memory_error(what, memory_limit, memory_limit)
+        raise _memory_error(program, memory_limit, memory_limit)
     name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-    last = tail.splitlines()[-1] if tail else "it said nothing"
-    raise ResourceError(f"the {what} died of {name} ({last})", code=f"{what}_crashed", measured=name,
-                        remedy="the file drives the CAD kernel into a fault; export the part again, if possible "
+    last = tail.splitlines()[-1] if tail else "it wrote no message"
+    raise ResourceError(f"the {program} ended with {name} ({last})", code=f"{program}_crashed", measured=name,
+                        remedy="the file causes a fault in the CAD kernel; export the part again, if possible "
                                "from another program or as another schema")
 
 
-def _memory_error(what: str, used: float, limit: float) -> ResourceError:
-    return ResourceError(f"the {what} needed more than {limit / 1e9:.2f} GB of memory and was stopped",
-                         code=f"{what}_memory", measured=used, limit=limit,
+def _memory_error(name: str, used: float, limit: float) -> ResourceError:
+    return ResourceError(f"the {name} needed more than {limit / 1e9:.2f} GB of memory and was stopped",
+                         code=f"{name}_memory", measured=used, limit=limit,
                          remedy="simplify the part, ask for a coarser chord, or raise the memory limit")

@@ -5,17 +5,17 @@
     │   ├── StepError             not a STEP file, truncated, or without a usable solid
     │   ├── PartError             a readable shape that cannot be planned (open, several, size)
     │   ├── SetupError            tools, machine or tolerances contradict each other
-    │   └── ProgramError          an NC program that cannot be read
+    │   └── ProgramError          an NC program cannot be read
     ├── GeometryError         a computation on valid input did not converge or overflowed
     ├── ResourceError         a child ran out of time or memory, or died of a signal
     ├── PlanningError         a plan could not be made although the input is valid
     ├── VerificationError     the proof itself could not be carried out
     ├── OutputError           a program or STEP-NC file could not be written
-    ├── CancelledError        someone asked for the job to stop
-    └── InternalError         a bug: an invariant of ours is broken
+    ├── CancelledError        a user cancelled the job
+    └── InternalError         a bug: an invariant of the project is broken
 
-Every error says what is wrong, where (``subjects``: face, tool, zone ids or a
-point), what was measured, against which limit, and what to do about it.
+Every error holds a message, the subjects (ids of faces, tools or zones, or a point), the measured value, its limit and
+a remedy.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ class CamError(Exception):
 
     code     : short stable identifier, snake_case; the HTTP problem type ends with it
     message  : one sentence for a person
-    subjects : ids of what is concerned, for example ("F12", "T3"), or points as "(x, y, z)"
-    measured : what was found, a number with its unit in ``message``, or None
-    limit    : what would have been allowed, or None
-    remedy   : what the person can do about it
+    subjects : ids of the faces, tools or zones concerned, for example ("F12", "T3"), or points as "(x, y, z)"
+    measured : measured value, a number with its unit in ``message``, or None
+    limit    : largest or least value allowed, or None
+    remedy   : what the user can do
     """
 
     default_code = "error"
@@ -55,7 +55,7 @@ class CamError(Exception):
         self.remedy = remedy
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data for a report, a problem document or a pipe between processes."""
+        """Plain values for a report, a problem document or a pipe between processes."""
         return {
             "class": type(self).__name__,
             "code": self.code,
@@ -71,7 +71,7 @@ class CamError(Exception):
 
 
 class InputError(CamError):
-    """What the user sent is wrong by itself."""
+    """The user's input is wrong by itself."""
 
     default_code = "bad_input"
 
@@ -83,7 +83,7 @@ class StepError(InputError):
 
 
 class PartError(InputError):
-    """The shape can be read but not planned as it is."""
+    """The shape can be read, but not planned in this state."""
 
     default_code = "bad_part"
 
@@ -131,7 +131,7 @@ class OutputError(CamError):
 
 
 class CancelledError(CamError):
-    """Someone asked for the job to stop."""
+    """A user cancelled the job."""
 
     default_code = "cancelled"
 

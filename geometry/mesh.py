@@ -1,4 +1,4 @@
-"""Triangle meshes that know which B-rep face each triangle came from."""
+"""Triangle meshes with the number of the B-rep face of each triangle."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ I32 = NDArray[np.int32]
 
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
-    """Triangles in space, outward by the right-hand rule.
+    """Triangles in space, outward by the right-hand rule. All coordinates are in one frame, that of ``vertices``.
 
     vertices : (n, 3) float64, mm
     faces    : (m, 3) int32, indices into ``vertices``, counter-clockwise seen from outside

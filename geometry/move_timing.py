@@ -1,4 +1,4 @@
-"""How long a machine takes for straight moves: feeds, rapids, and speeding up and slowing down between them."""
+"""Time that a machine takes for straight moves: feeds, rapids, and the acceleration between them."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from geometry.mesh import F64
 
 @dataclass(frozen=True)
 class Rates:
-    """What a machine does.
+    """Rapid rate and acceleration of a machine.
 
     rapid        : mm/min
     acceleration : mm/s², in every direction
-    rounding     : mm by which the control may pass a corner; 0 stops at each
+    rounding     : mm, largest distance by which the control may pass a corner; at 0 it stops at each corner
     """
 
     rapid: float
@@ -27,24 +27,24 @@ class Rates:
 
 
 RATES = Rates(10000.0, 1000.0, 0.001)
-"""Of a machine that does not say."""
+"""Rates of a machine whose setup gives none."""
 
 
 def move_seconds(way: F64, feed: F64, rates: Rates, stop: NDArray[np.bool_] | None = None,
                  curve: NDArray[np.bool_] | None = None) -> F64:
     """Seconds of moves run one behind the other, from standstill to standstill.
 
-    way   : (m, 3) float64, mm, of each straight move
+    way   : (m, 3) float64, mm, vector of each straight move in any frame
     feed  : (m,) float64, mm/min, > 0, at the rapid rate for rapids
     rates : Rates
-    stop  : (m,) bool, moves before which the control stands still, as for a change of the tool; none when None
+    stop  : (m,) bool, moves before which the control stands still, as for a tool change; none when None
     curve : (m,) bool, moves that are chords of the same curve as the one before: there is no corner between; none when
             None
 
     Returns
     -------
-    (m,) float64. A move without length takes none and stops the control: what takes its time, a dwell or a rotary axis
-    alone, is for the caller to add.
+    (m,) float64, s. A move without length takes no time and stops the control. The caller adds the time of a dwell or
+    of a rotary axis that turns alone.
 
     Raises
     ------
@@ -53,13 +53,13 @@ def move_seconds(way: F64, feed: F64, rates: Rates, stop: NDArray[np.bool_] | No
 
     Notes
     -----
-    Corners are run on arcs (``geometry.kernels.timing``), speed changes at the full acceleration at once (no jerk), and
-    the control looks ahead as far as it has to. Theory, and figures against a controller: docs/theory/times.md.
+    The control rounds corners on arcs (``geometry.kernels.timing``). Speed changes at the full acceleration at once (no
+    jerk), and the look-ahead is unlimited. Theory, and figures against a controller: docs/theory/times.md.
     """
     ways, feeds = np.ascontiguousarray(way, dtype=np.float64), np.ascontiguousarray(feed, dtype=np.float64)
     worst = min(float(feeds.min(initial=np.inf)), rates.acceleration)
     if not worst > 0.0 or not np.isfinite(feeds).all():
-        raise GeometryError(f"feeds and the acceleration must be above 0, one is {worst:g}", code="bad_rate",
+        raise GeometryError(f"feeds and the acceleration must be above 0, but one is {worst:g}", code="bad_rate",
                             subjects=("feed",), measured=worst, limit=0.0, remedy="give each move a feed")
     stops, curves = (np.zeros(len(ways), np.bool_) if flag is None else np.ascontiguousarray(flag, dtype=np.bool_)
                      for flag in (stop, curve))

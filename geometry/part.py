@@ -1,4 +1,4 @@
-"""The part as every later stage sees it: plain arrays in the setup frame, mm.
+"""The part for every later stage: plain arrays in the setup frame, mm.
 
 A ``Part`` is made in a child process (``geometry.step_import.reader``) and travels as arrays;
 nothing downstream touches OCP objects.
@@ -83,13 +83,13 @@ class Part:
     volume    : mm³ of the exact solid
     bounds    : (2, 3) float64, mm
     unit      : length unit of the file, for example 'mm' or 'inch'
-    chord, angle : mm and rad asked of the mesh
-    deviation : mm, largest distance from triangle centres to the exact surface that was measured
+    chord, angle : mm and rad, requested tolerances of the mesh
+    deviation : mm, largest measured distance from triangle centres to the exact surface
     warnings  : sentences for the report (slivers, healed edges, doubtful units, fused solids)
-    sha256    : of the bytes of the STEP file
+    sha256    : hex digest of the bytes of the STEP file
     uv        : (m, 3, 2) float64, surface parameters (u, v) of the corners of every triangle on its own face, never
-                NaN; those of the solid as read: converted to mm, swept surfaces turned into splines. Both sides of a
-                seam have their own values, so no triangle jumps by a period. None for a part without B-rep
+                NaN. They belong to the solid after import: converted to mm, swept surfaces turned into splines. Both
+                sides of a seam have their own values, so no triangle jumps by a period. None for a part without B-rep
     """
 
     mesh: TriangleMesh

@@ -1,4 +1,4 @@
-"""Points spread evenly over a mesh, each standing for a known area."""
+"""Points spread evenly over a mesh, each with the area it represents."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ import numpy as np
 from geometry.kernels.sampling import lattice_places
 from geometry.mesh import F64, I32, TriangleMesh
 
-# Normals of facet and surface that differ by more (cosine): the facet is a sliver or folded, the surface singular.
+# Least cosine between the normals of facet and surface. Below it the facet is a sliver or folded, or the surface is
+# singular.
 BELIEVED_DOT = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class SurfaceSamples:
-    """Samples of a surface.
+    """Samples of a surface, in the frame of the mesh.
 
     points   : (n, 3) float64, mm
     normals  : (n, 3) float64, unit, out of the material
-    area     : (n,) float64, mm² each sample stands for; sums to the area sampled
+    area     : (n,) float64, mm², area that each sample represents; sums to the sampled area
     face     : (n,) int32, number of the B-rep face
     triangle : (n,) int32, index of the triangle
     """
@@ -34,7 +35,7 @@ class SurfaceSamples:
         return len(self.points)
 
     def subset(self, keep: np.ndarray) -> SurfaceSamples:
-        """The samples selected by a boolean mask or an index array."""
+        """The selected samples. keep : (n,) bool mask, or (k,) int64 index of the samples."""
         return SurfaceSamples(self.points[keep], self.normals[keep], self.area[keep], self.face[keep],
                               self.triangle[keep])
 
@@ -46,13 +47,13 @@ def sample_surface(mesh: TriangleMesh, density: float, *, seed: int = 0,
     mesh      : TriangleMesh
     density   : float, samples per mm²
     seed      : int, two different seeds never share a sample
-    triangles : (k,) int indices of the triangles to sample, all when None
+    triangles : (k,) int64, index of the triangles to sample, all when None
 
     Returns
     -------
     SurfaceSamples
-        Triangles are taken in the given order and the running area is cut into equal strata with one
-        jittered sample each, so a triangle of area a gets a*density samples within one.
+        Triangles come in the given order. The running area is cut into equal strata with one jittered sample each, so a
+        triangle of area a gets a*density samples within one.
     """
     chosen = np.arange(len(mesh.faces)) if triangles is None else np.asarray(triangles)
     areas = mesh.areas[chosen]
@@ -71,7 +72,7 @@ def sample_surface(mesh: TriangleMesh, density: float, *, seed: int = 0,
 
 
 def lattice_samples(mesh: TriangleMesh, spacing: float) -> SurfaceSamples:
-    """Samples on a square lattice seen along the axis each triangle faces most, the same for all triangles.
+    """Samples on one square lattice, seen along the axis that each triangle faces most.
 
     mesh    : TriangleMesh
     spacing : mm between the lines of the lattice
@@ -79,9 +80,9 @@ def lattice_samples(mesh: TriangleMesh, spacing: float) -> SurfaceSamples:
     Returns
     -------
     SurfaceSamples
-        Each stands for the area of its cell on the slope of its triangle; where a triangle faces two axes nearly alike
-        it has both lattices. On a flat surface no place is farther than 0.87 of the spacing from a sample, edges left
-        out: cells are spacing wide one way and at most sqrt(3) of it the other.
+        Each represents the area of its cell on the slope of its triangle. A triangle that faces two axes nearly equally
+        has both lattices. On a flat surface no place is farther than 0.87 of the spacing from a sample, edges apart:
+        cells are one spacing wide in one direction and at most sqrt(3) spacings in the other.
     """
     triangles, normals = np.ascontiguousarray(mesh.triangles), np.ascontiguousarray(mesh.normals)
     room = round(1.2 * float(mesh.areas.sum()) / spacing**2) + 64
@@ -96,12 +97,12 @@ def lattice_samples(mesh: TriangleMesh, spacing: float) -> SurfaceSamples:
 
 
 def sample_borders(mesh: TriangleMesh, spacing: float, inset: float, triangles: np.ndarray) -> SurfaceSamples:
-    """Samples on or just inside the borders between faces; they stand for no area.
+    """Samples on or just inside the borders between faces; they represent no area.
 
     mesh      : TriangleMesh
     spacing   : mm along a border
     inset     : mm, how far inside the triangle a sample lies at most
-    triangles : (k,) int indices of the triangles looked at
+    triangles : (k,) int64, index of the triangles to search
 
     Returns
     -------
@@ -138,15 +139,15 @@ def sample_borders(mesh: TriangleMesh, spacing: float, inset: float, triangles: 
 def with_surface_normals(samples: SurfaceSamples, mesh: TriangleMesh) -> SurfaceSamples:
     """The same samples with the normals of the exact surface instead of those of their facets.
 
-    samples : SurfaceSamples of ``mesh``; their places stay on the facets, which are what a tool is held against
-    mesh    : TriangleMesh; without corner normals the samples come back as they are
+    samples : SurfaceSamples of ``mesh``; their places stay on the facets, which tools are checked against
+    mesh    : TriangleMesh; without corner normals the samples come back unchanged
 
     Returns
     -------
     SurfaceSamples
-        The normals at the three corners, weighted by how near the sample is to each. Error: second order in the size of
-        the facet, and on arcs third; a facet's own normal is off by half the turn across it. The facet's normal stays
-        where a corner has none, or the two differ by more than 60 degrees: such a facet is no picture of the surface.
+        The normals at the three corners, weighted by the barycentric coordinates of the sample. Error: second order in
+        the size of the facet, and third order on arcs; a facet's own normal is off by half the turn across it. The
+        facet's normal stays where a corner has none, or where the two differ by more than 60 degrees.
     """
     if mesh.corner_normals is None or not len(samples):
         return samples

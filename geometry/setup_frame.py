@@ -12,12 +12,12 @@ import numpy as np
 from geometry.errors import SetupError
 from geometry.mesh import F64
 
-# Below this angle (rad) between z and x the frame is not determined well enough to cut metal with.
-LEAST_AXIS_ANGLE = 1e-3
+# Below this angle (rad) between z and x the frame is not determined well enough.
+MIN_AXIS_ANGLE = 1e-3
 
 
 @dataclass(frozen=True)
-class Placement:
+class SetupFrame:
     """The setup frame given in STEP coordinates, mm.
 
     origin : (3,) float, mm, program zero in STEP coordinates
@@ -26,7 +26,7 @@ class Placement:
 
     Raises SetupError (``bad_placement``) for non-finite numbers, a zero axis or parallel axes.
 
-    >>> Placement((1, 2, 3)).matrix @ [1, 2, 3, 1]
+    >>> SetupFrame((1, 2, 3)).matrix @ [1, 2, 3, 1]
     array([0., 0., 0., 1.])
     """
 
@@ -42,10 +42,10 @@ class Placement:
                 raise SetupError(f"placement {name} has no length", code="bad_placement", subjects=(name,),
                                  measured=0.0, limit=1e-9, remedy="give a direction, for example [0, 0, 1]")
         angle = _angle(np.array(self.z_axis), np.array(self.x_axis))
-        if angle < LEAST_AXIS_ANGLE or angle > np.pi - LEAST_AXIS_ANGLE:
+        if angle < MIN_AXIS_ANGLE or angle > np.pi - MIN_AXIS_ANGLE:
             raise SetupError("placement z_axis and x_axis are parallel, so the frame is not determined",
                              code="bad_placement", subjects=("z_axis", "x_axis"), measured=angle,
-                             limit=LEAST_AXIS_ANGLE, remedy="give an x_axis that is square to z_axis")
+                             limit=MIN_AXIS_ANGLE, remedy="give an x_axis that is square to z_axis")
 
     @cached_property
     def inverse(self) -> F64:
@@ -64,12 +64,12 @@ class Placement:
         rotation = self.inverse[:3, :3].T
         out = np.eye(4)
         out[:3, :3] = rotation
-        # + 0.0 turns a negative zero into a plain one, which would otherwise show in printed numbers
+        # + 0.0 turns a negative zero into a plain one; otherwise printed numbers show the sign
         out[:3, 3] = -rotation @ np.array(self.origin) + 0.0
         return out
 
     def as_dict(self) -> dict[str, list[float]]:
-        """Plain lists, for a pipe between processes; ``Placement(**d)`` reads them back."""
+        """Plain lists, for a pipe between processes; ``SetupFrame(**d)`` reads them back."""
         return {"origin": list(self.origin), "z_axis": list(self.z_axis), "x_axis": list(self.x_axis)}
 
 

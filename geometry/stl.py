@@ -1,7 +1,7 @@
 """Meshes as STL files, through trimesh; the same mesh gives the same bytes.
 
-STL holds corners in single precision where it is binary (the default), as printed decimals where it is text, no unit
-(mm here) and no connection between facets: reading joins corners that are equal, bit for bit.
+Binary STL (the default) holds corners in single precision, text STL as printed decimals. STL has no unit (here mm) and
+no connection between facets: reading joins corners that are equal, bit for bit.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from geometry.mesh import TriangleMesh
 
 
 class StlForm(StrEnum):
-    """How an STL file is written."""
+    """Form of an STL file."""
 
     BINARY = "binary"
     """50 bytes a facet; corners to about 1e-7 of their distance from the origin."""
     TEXT = "text"
-    """The form of the thesis; corners to 1e-8 mm."""
+    """The form of the thesis [Jain2016]; corners to 1e-8 mm."""
 
 
 def stl_bytes(mesh: TriangleMesh, form: StlForm | str = StlForm.BINARY) -> bytes:
@@ -40,7 +40,7 @@ def stl_bytes(mesh: TriangleMesh, form: StlForm | str = StlForm.BINARY) -> bytes
     Raises
     ------
     GeometryError
-        ``mesh_not_finite``, which trimesh would write as it is.
+        ``mesh_not_finite``: a vertex is not finite.
     ValueError
         ``form`` is none of ``StlForm``.
     """
@@ -73,14 +73,14 @@ def read_stl(path: str | os.PathLike[str]) -> TriangleMesh:
     Raises
     ------
     InputError
-        ``not_stl``: no file, or one that is no STL.
+        ``not_stl``: the file is missing or is not STL.
     """
     try:
         with Path(path).open("rb") as file:
             read = trimesh.load_mesh(file, file_type="stl", process=False)
         corners = np.asarray(read.triangles, dtype=np.float64).reshape(-1, 3)
     except Exception as problem:
-        # trimesh raises whatever its parsers run into; nothing of ours is called in here
+        # the parsers of trimesh raise errors of any class; no code of the project runs in here
         raise _not_stl(path, str(problem)) from problem
     if not len(corners):
         raise _not_stl(path, "it holds no facet")
@@ -94,4 +94,4 @@ def read_stl(path: str | os.PathLike[str]) -> TriangleMesh:
 def _not_stl(path: str | os.PathLike[str], why: str) -> InputError:
     name = Path(path).name
     return InputError(f"{name} is not an STL file: {why}", code="not_stl", subjects=(name,),
-                      remedy="write it again, as binary STL")
+                      remedy="export it again, as binary STL")

@@ -1,4 +1,4 @@
-"""A tool as a body of revolution: shape only, no milling.
+"""A tool as a body of revolution: its shape only.
 
 Heights are measured from the tip upwards along the axis::
 
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class HolderSegment:
+class HolderFrustum:
     """A frustum of the holder: diameters at its lower and upper end and its length, mm."""
 
     diameter: float
@@ -49,7 +49,7 @@ class ToolBody:
     neck_length: float
     shank_diameter: float
     stickout: float
-    holder: tuple[HolderSegment, ...] = ()
+    holder: tuple[HolderFrustum, ...] = ()
 
     @property
     def radius(self) -> float:
@@ -64,6 +64,6 @@ class ToolBody:
         return "ball" if self.corner_radius >= self.radius - 1e-12 else "bull"
 
     def neck_clearance(self, wanted: float) -> float:
-        """Radial clearance kept at the neck, mm: ``wanted``, or half the relief where that is less."""
+        """Radial clearance at the neck, mm: ``wanted``, or half the relief where that is less."""
         relief = 0.5 * (self.diameter - self.neck_diameter)
         return wanted if relief >= wanted else 0.5 * max(relief, 0.0)

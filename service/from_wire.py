@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from geometry.errors import CamError, OutputError, SetupError
-from geometry.tool_body import HolderSegment, ToolBody
+from geometry.tool_body import HolderFrustum, ToolBody
 from output.inverse_kinematics import RotaryMachine, said_limits
 from schemas.machine import Machine
 from schemas.setup import Placement, Setup
@@ -288,7 +288,7 @@ def tool_body(tool: Tool) -> ToolBody:
         tool.stickout_mm)
     if None in (number, flute, neck_d, neck_l, shank, stickout):
         raise SetupError(f"tool {tool.id} has not been completed by a Setup", subjects=(tool.id,))
-    segments = tuple(HolderSegment(s.diameter_mm, s.diameter_top_mm or s.diameter_mm, s.length_mm)
+    segments = tuple(HolderFrustum(s.diameter_mm, s.diameter_top_mm or s.diameter_mm, s.length_mm)
                      for s in tool.holder)
     return ToolBody(tool.id, int(number or 0), tool.diameter_mm, tool.corner_radius_mm, float(flute or 0),
                     float(neck_d or 0), float(neck_l or 0), float(shank or 0), float(stickout or 0), segments)

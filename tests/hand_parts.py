@@ -14,7 +14,7 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import FaceInfo, Part
 from geometry.sampling import SurfaceSamples, sample_borders, sample_surface
-from geometry.tool_body import HolderSegment, ToolBody
+from geometry.tool_body import HolderFrustum, ToolBody
 from toolpath.passes.pass_family import Target
 from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
@@ -25,7 +25,7 @@ from zones.lattice import lattice_step
 from zones.machinable_area import machinable_faces
 from zones.model import Decomposition
 from zones.plan_view.channel_plan import ChannelPlan
-from zones.plan_view.regions import Labels, Regioner
+from zones.plan_view.regions import Labels, RegionLocator
 from zones.reach.access_view import View
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import TipField
@@ -154,7 +154,7 @@ def ball(diameter: float = 4.0, id: str = "T1", **changes) -> ToolBody:
 
 
 def tool(diameter: float, corner_radius: float, id: str = "T1", *, neck: float = 60.0, shank: float | None = None,
-         stickout: float = 80.0, holder: tuple[HolderSegment, ...] = ()) -> ToolBody:
+         stickout: float = 80.0, holder: tuple[HolderFrustum, ...] = ()) -> ToolBody:
     """A tool assembly, mm."""
     shank = diameter if shank is None else shank
     return ToolBody(id, 1, diameter, corner_radius, 2.0 * diameter, 0.95 * diameter, neck, shank, stickout, holder)
@@ -224,7 +224,7 @@ def blocks(seed):
     return terraces(xs, ys, rng.choice([1.0, 1.0, 2.5, 5.0, 8.0], (5, 5)))
 
 
-HOLDER = (HolderSegment(8, 14, 5), HolderSegment(14, 14, 20))
+HOLDER = (HolderFrustum(8, 14, 5), HolderFrustum(14, 14, 20))
 SHORT_TOOLS = {
     "ball": ball(2.0, neck=2.5, shank=3.4, stickout=5.0, holder=HOLDER),
     "flat": tool(2.0, 0.0, neck=2.5, shank=3.4, stickout=5.0, holder=HOLDER),
@@ -239,9 +239,9 @@ def view_of(part: Part, samples: SurfaceSamples, fields: dict[str, TipField],
     """The part from +Z; regions by the plan view unless ``labels`` are given."""
     d = decomposition or Decomposition((), (), ())
     tree = TriangleTree(part.mesh)
-    regioner = Regioner(part, d, ChannelPlan.of(part, d))
-    named = labels or regioner.of(samples.points, samples.normals, samples.face)
-    return View("A1", np.eye(3), part, tree, obstacles or tree, samples, named, fields, regioner, np.eye(3))
+    locator = RegionLocator(part, d, ChannelPlan.of(part, d))
+    named = labels or locator.of(samples.points, samples.normals, samples.face)
+    return View("A1", np.eye(3), part, tree, obstacles or tree, samples, named, fields, locator, np.eye(3))
 
 
 @dataclass(frozen=True, eq=False)

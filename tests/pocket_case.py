@@ -7,10 +7,10 @@ import numpy as np
 from geometry.mesh import TriangleMesh
 from geometry.part import FaceInfo, Part
 from geometry.sampling import sample_surface
-from geometry.tool_body import HolderSegment, ToolBody
+from geometry.tool_body import HolderFrustum, ToolBody
 from verify.model import ProofSetup, ScoredSamples
 
-TOOL = ToolBody("T1", 1, 4.0, 0.0, 8.0, 3.8, 20.0, 6.0, 30.0, (HolderSegment(20.0, 30.0, 20.0),))
+TOOL = ToolBody("T1", 1, 4.0, 0.0, 8.0, 3.8, 20.0, 6.0, 30.0, (HolderFrustum(20.0, 30.0, 20.0),))
 OTHER = ToolBody("T2", 2, 6.0, 0.0, 8.0, 5.8, 20.0, 6.0, 30.0)
 SETUP = ProofSetup(stock_kind="box", margin=0.5, uncertainty=0.0, rapid_feed=5000.0)
 DEPTH, LENGTH, WIDTH = -5.0, 20.0, 12.0

@@ -8,13 +8,13 @@ import numpy as np
 
 from geometry.mesh import TriangleMesh
 from geometry.surfaces.nurbs import NurbsSurface
-from geometry.tool_body import HolderSegment, ToolBody
+from geometry.tool_body import HolderFrustum, ToolBody
 from output.inverse_kinematics import RotaryMachine
 from output.workplan import Ap238, Assembly, Clamping, Frame, StockBox, StockCylinder, Workplan
 from toolpath.workingsteps import Motion, Trajectory, Workingstep
 from zones.reach.access_view import access_rotation
 
-HOLDER = (HolderSegment(20.0, 20.0, 30.0),)
+HOLDER = (HolderFrustum(20.0, 20.0, 30.0),)
 BALL = ToolBody("T1", 1, 3.0, 1.5, 9.0, 2.8, 20.0, 6.0, 45.0, HOLDER)
 FLAT = ToolBody("T2", 2, 6.0, 0.0, 18.0, 6.0, 18.0, 6.0, 40.0, HOLDER)
 BULL = ToolBody("rougher Ø8", 7, 8.0, 1.0, 20.0, 7.6, 30.0, 8.0, 50.0, HOLDER)

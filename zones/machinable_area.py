@@ -1,4 +1,4 @@
-"""The machinable area Ma, and the form a strategy sees in a piece of it."""
+"""The machinable area Ma, and the form of each piece of it."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from geometry.sampling import SurfaceSamples
 from zones.model import Decomposition
 
 STEEP = 0.70710678  # n_z below: steeper than 45 degrees, cut by waterlines
-LEVEL = 1.0 - 1e-6  # n_z above: a level plane, a flat end leaves no cusp
+LEVEL = 1.0 - 1e-6  # n_z above: a level plane, on which a flat end leaves no cusp
 SEEN = -0.02  # n_z above: the access direction sees it
 SEEN_SHARE = 0.005  # of the area of a face
 UP = ((0.0, 0.0, 1.0),)
 
 
-class Form(StrEnum):
-    """How a sample is cut."""
+class AreaForm(StrEnum):
+    """Form of the surface at a sample, which decides how it is cut."""
 
     LEVEL = "level"
     SHALLOW = "shallow"
@@ -28,14 +28,14 @@ class Form(StrEnum):
 
 def machinable_faces(samples: SurfaceSamples, decomposition: Decomposition, wanted: set[int] | None,
                      excluded: set[int], directions: ArrayLike = UP) -> set[int]:
-    """Numbers of the faces of the machinable area Ma.
+    """Numbers of the faces of the machinable area Ma [Arivazhagan2020].
 
-    By default every face of which some access direction sees at least ``SEEN_SHARE``; the seat only if an access
-    looks at it from within 45 degrees, for then the part lies turned over. Else the faces asked for. The share keeps
-    the answer from hanging on one facet of rounding at the rim of an underside.
+    Without ``wanted`` these are all faces of which some access direction sees at least ``SEEN_SHARE``. The seat counts
+    only if an access faces it within 45 degrees, since then the part is turned over. With ``wanted`` they are the
+    wanted faces. The share avoids that one facet of rounding at the rim of an underside decides.
 
-    samples    : of all faces, in the frame of the directions
-    directions : (d, 3) float64, unit, from the tool tip to the spindle
+    samples    : SurfaceSamples of all faces, in the frame of the directions
+    directions : (d, 3) float64, dimensionless, from the tool tip to the spindle
     """
     total = np.bincount(samples.face, weights=samples.area)
     least = np.where(np.isin(samples.face, list(decomposition.seat)), STEEP, SEEN)
@@ -48,8 +48,11 @@ def machinable_faces(samples: SurfaceSamples, decomposition: Decomposition, want
 
 
 def forms_of(normals: F64) -> NDArray[np.object_]:
-    """Form of each sample by its outward unit normal (n, 3) in the access frame."""
-    out = np.full(len(normals), Form.SHALLOW, dtype=object)
-    out[normals[:, 2] > LEVEL] = Form.LEVEL
-    out[normals[:, 2] < STEEP] = Form.STEEP
+    """Form of each sample, (n,) object array of AreaForm.
+
+    normals : (n, 3) float64, dimensionless, unit normals in the access frame, out of the material
+    """
+    out = np.full(len(normals), AreaForm.SHALLOW, dtype=object)
+    out[normals[:, 2] > LEVEL] = AreaForm.LEVEL
+    out[normals[:, 2] < STEEP] = AreaForm.STEEP
     return out

@@ -1,4 +1,4 @@
-"""What the decomposition of a part consists of; plain immutable values, mm and rad, setup frame."""
+"""Results of the decomposition of a part: immutable values, mm and rad, setup frame."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class Connection:
 class Channel:
     """The void between two facing walls (or two stretches of one wall).
 
-    gap_min : least outward ray distance between the sides, connections and fillets left out, mm
-    at      : the point on the first wall where that was measured
+    gap_min : mm, least outward ray distance between the sides, without connections and fillets
+    at      : mm, the start of that ray on the first wall
     """
 
     id: str

@@ -13,10 +13,10 @@ import numpy as np
 from benchmarks.faults.fault_case import Case, Mode, Script, as_part, samples_on
 from benchmarks.faults.fault_solids import Piece, Pocket, Profile, Pulled, Solid, chain
 from geometry.mesh import F64
-from geometry.tool_body import HolderSegment, ToolBody
+from geometry.tool_body import HolderFrustum, ToolBody
 from verify.model import ProofSetup, ScoredSamples, StockKind
 
-HOLDER = (HolderSegment(16.0, 24.0, 12.0), HolderSegment(24.0, 24.0, 15.0))
+HOLDER = (HolderFrustum(16.0, 24.0, 12.0), HolderFrustum(24.0, 24.0, 15.0))
 RAMP = math.tan(math.radians(2.8))
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -20,7 +20,7 @@ from benchmarks.faults.fault_case import as_part
 from benchmarks.foreign.foreign_twin import SPACING, envelope
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import Part
-from geometry.tool_body import HolderSegment, ToolBody
+from geometry.tool_body import HolderFrustum, ToolBody
 from verify.gcode.reader import FEED, read_program
 from verify.kinematics import Kinematics
 from verify.model import ProofSetup, StockKind
@@ -28,7 +28,7 @@ from verify.program.program import Program
 
 MARGIN = 0.01
 MACHINE = Kinematics("table-table-AC", ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-HOLDER = (HolderSegment(16.0, 22.0, 12.0), HolderSegment(26.0, 26.0, 30.0))
+HOLDER = (HolderFrustum(16.0, 22.0, 12.0), HolderFrustum(26.0, 26.0, 30.0))
 _DEMOS = "examples/sample-configs/sim/axis/vismach/5axis/table-rotary-tilting/demos"
 _CRAFT = "examples/sample-configs/sim/craftsman/screens"
 

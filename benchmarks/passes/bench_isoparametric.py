@@ -23,6 +23,7 @@ import shapely  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 
 from benchmarks.passes.bench_scallop import ball, random_surface  # noqa: E402
+from benchmarks.passes.faceting import facet_deviation, steps_for_chord  # noqa: E402
 from examples.family.recipes import make_part  # noqa: E402
 from geometry.errors import GeometryError  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
@@ -30,7 +31,6 @@ from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
 from geometry.parameterization.square_patches import Method, Squared, squared  # noqa: E402
 from geometry.sampling import sample_surface, with_surface_normals  # noqa: E402
 from geometry.step_import.face_surfaces import read_patches  # noqa: E402
-from geometry.surfaces.faceting import facet_deviation, steps_for_chord  # noqa: E402
 from geometry.surfaces.foot_points import foot_points  # noqa: E402
 from geometry.surfaces.nurbs import NurbsSurface  # noqa: E402
 from geometry.trimming.trim import trim_faces  # noqa: E402

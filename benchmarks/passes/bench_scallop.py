@@ -19,11 +19,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np  # noqa: E402
 
+from benchmarks.passes.faceting import facet_deviation, steps_for_chord  # noqa: E402
 from examples.family.thesis import surface as thesis_surface  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
 from geometry.step_import.face_surfaces import read_patches  # noqa: E402
-from geometry.surfaces.faceting import facet_deviation, steps_for_chord  # noqa: E402
 from geometry.surfaces.nurbs import NurbsSurface  # noqa: E402
 from geometry.tool_body import ToolBody  # noqa: E402
 from toolpath.cutter.cutter import Cutter  # noqa: E402

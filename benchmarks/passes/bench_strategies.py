@@ -38,7 +38,7 @@ from toolpath.plan_settings import Pattern
 from toolpath.workingsteps import Motion, Workingstep  # noqa: E402
 from verify.moves import Moves
 from verify.surface.removal import residual_on_normals
-from zones.machinable_area import Form  # noqa: E402
+from zones.machinable_area import AreaForm  # noqa: E402
 
 PARALLEL_S = 120
 DEEPEST = 60  # samples of the part whose depth in a ball is measured exactly
@@ -112,7 +112,7 @@ class Compared(finish.Finish):
             self._told(self.strategy, step_id)
             if other is not None:
                 self._told(other, step_id)
-            if self.zone.form is Form.STEEP and self.asked.setdefault(self.field.tool.id, 0) < self.parallel:
+            if self.zone.form is AreaForm.STEEP and self.asked.setdefault(self.field.tool.id, 0) < self.parallel:
                 self.asked[self.field.tool.id] += 1
                 self._parallel(step_id)
         steps = super().walk(step_id)
@@ -129,7 +129,8 @@ class Compared(finish.Finish):
         signal.alarm(PARALLEL_S)
         try:
             settings = replace(self.settings, pattern=Pattern.ZIGZAG)
-            made = finish._strategy(replace(self.zone, form=Form.SHALLOW), self.checks, self.field, self.cut, settings)
+            shallow = replace(self.zone, form=AreaForm.SHALLOW)
+            made = finish._strategy(shallow, self.checks, self.field, self.cut, settings)
             self._told(replace(made, name="plane-parallel"), step_id)
         except TimeoutError:
             print(f"{self.zone.id:5} {'plane-parallel':14} not done in {PARALLEL_S} s", flush=True)

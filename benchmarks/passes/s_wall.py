@@ -35,7 +35,7 @@ from geometry.mesh import F64, TriangleMesh  # noqa: E402
 from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
 from geometry.parameterization.grid_map import GridMap  # noqa: E402
 from geometry.surfaces.nurbs import NurbsSurface  # noqa: E402
-from geometry.tool_body import HolderSegment, ToolBody  # noqa: E402
+from geometry.tool_body import HolderFrustum, ToolBody  # noqa: E402
 from output.inverse_kinematics import RotaryMachine  # noqa: E402
 from toolpath.five_axis.axis_smoothing import Limits, steered  # noqa: E402
 from toolpath.five_axis.oriented_pass import enters, lead_and_tilt, posed  # noqa: E402
@@ -50,7 +50,7 @@ LENGTH, HIGH, THICK, WAVE, LESS, SHIFT = 160.0, 30.0, 3.0, 25.0, 4.0, 7.0  # mm
 SCALLOP, CHORD, DEPTH, OFF = 0.02, 0.0025, 0.0025, 0.004  # mm
 FEED = 1000.0  # mm/min
 FLANK = ToolBody("T1", 1, 16.0, 1.0, 36.0, 15.0, 60.0, 16.0, 60.0)
-BALL = ToolBody("T2", 2, 8.0, 4.0, 16.0, 7.6, 40.0, 8.0, 50.0, (HolderSegment(20.0, 32.0, 40.0),))
+BALL = ToolBody("T2", 2, 8.0, 4.0, 16.0, 7.6, 40.0, 8.0, 50.0, (HolderFrustum(20.0, 32.0, 40.0),))
 AWAY = 32.0  # mm, of the post from the middle of the wall
 LEANS, LIMITS = np.radians(65.0), Limits(np.radians(40.0), np.radians(4.0))
 WARY = 0.3  # mm kept more at the stations of a led pass, for what lies between them

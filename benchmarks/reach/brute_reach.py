@@ -321,11 +321,11 @@ def kernel_normals(part: Any, path: Path, setup: Any) -> Normals:
 
     Where the kernel has no normal, or its foot is another place, the facet's is taken. 20 to 130 µs a point.
     """
-    from geometry.setup_frame import Placement
-    from geometry.step_import.exact_faces import ExactFaces
+    from benchmarks.reach.exact_faces import ExactFaces
+    from geometry.setup_frame import SetupFrame
 
     p = setup.placement
-    placement = Placement(origin=tuple(p.origin_mm), z_axis=tuple(p.z_axis), x_axis=tuple(p.x_axis))
+    placement = SetupFrame(origin=tuple(p.origin_mm), z_axis=tuple(p.z_axis), x_axis=tuple(p.x_axis))
     faces = ExactFaces(path, placement=placement, solid=setup.part.solid)
     near = FOOT * max(part.deviation, part.chord)
 

@@ -379,10 +379,10 @@ def planned_normals(mesh: Any, points: F64, triangles: NDArray[np.int64]) -> F64
 def said_by_reach(tree: Any, part: Any, tool: Any, clear: Any, points: F64, normals: F64, lift: float,
                   allowance: float, cusp: float) -> dict[str, BOOL]:
     """What ``zones.reach.tip_field.touchable`` says of samples (n, 3) mm, with and without its play."""
+    from zones.lattice import lattice_step
     from zones.reach import tip_field
 
-    field = tip_field.TipField(tree, tool, clear, part.bounds, tool.radius + 4.0, tip_field.lattice_step(tool), allowance,
-                           cusp)
+    field = tip_field.TipField(tree, tool, clear, part.bounds, tool.radius + 4.0, lattice_step(tool), allowance, cusp)
     played = tip_field.touchable(field, points, normals, lift)[1]
     by_cutter, by_tool, _ = tip_field.touchable(field, points, normals, lift, play=0.0)
     return {"cutter": by_cutter, "tool": by_tool, "played": played}

@@ -47,13 +47,13 @@ def look(part: Any) -> Found:
     from zones.features.decomposition import decompose
     from zones.plan_view.channel_plan import ChannelPlan
     from zones.plan_view.profile_types import classify
-    from zones.plan_view.regions import Regioner
+    from zones.plan_view.regions import RegionLocator
 
     d = decompose(part)
     plan = ChannelPlan.of(part, d)
     size = float(np.linalg.norm(part.bounds[1] - part.bounds[0]))
     s = sample_surface(part.mesh, 60_000 / float(part.mesh.areas.sum()), seed=5)
-    labels = Regioner(part, d, plan).of(s.points, s.normals, s.face)
+    labels = RegionLocator(part, d, plan).of(s.points, s.normals, s.face)
     regions: dict[str, float] = {}
     for code, r in enumerate(labels.regions):
         regions[r.name] = regions.get(r.name, 0.0) + float(s.area[labels.code == code].sum())

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 import uvicorn
 
-from geometry.tool_body import HolderSegment, ToolBody
+from geometry.tool_body import HolderFrustum, ToolBody
 from service.commands.view_command import folder_app
 from service.viewer.view_data import tool_shape
 from service.viewer.view_file import Chunk, Column, write_view
@@ -31,7 +31,7 @@ from service.viewer.view_paths import AXIS_UNIT, ToolTrack, path_chunks
 ROOT = Path(__file__).parents[1]
 WIDE = 120.0  # mm
 ZONES, STEPS = 40, 80
-TOOL = ToolBody("T1", 1, 6.0, 3.0, 18.0, 5.8, 24.0, 6.0, 40.0, (HolderSegment(20.0, 24.0, 40.0),))
+TOOL = ToolBody("T1", 1, 6.0, 3.0, 18.0, 5.8, 24.0, 6.0, 40.0, (HolderFrustum(20.0, 24.0, 40.0),))
 
 
 def block(triangles: int) -> Facets:

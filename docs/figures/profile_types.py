@@ -12,12 +12,12 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.surfaces.bspline import SplineCurve, arc_length
-from zones.plan_view.curve_bends import Way
-from zones.plan_view.profile_types import Profile, classify
+from zones.plan_view.curve_bends import BendSide
+from zones.plan_view.profile_types import CurveProfile, classify
 
 IMAGES = Path(__file__).resolve().parents[1] / "images"
 WIDTH, HEIGHT, MARGIN = 150.0, 70.0, 9.0
-COLOURS = {Way.UP: "#c2410c", Way.DOWN: "#1d4ed8", None: "#111111"}
+COLOURS = {BendSide.UP: "#c2410c", BendSide.DOWN: "#1d4ed8", None: "#111111"}
 VOID = "#e8f1e4"
 
 
@@ -89,7 +89,7 @@ def placed(p: F64) -> F64:
     return np.asarray(q + [0.5 * WIDTH, 0.5 * HEIGHT])
 
 
-def picture(p: F64, closed: bool, found: Profile) -> str:
+def picture(p: F64, closed: bool, found: CurveProfile) -> str:
     """SVG text: void tinted, up bends orange, down bends blue, chord dashed; p : (n, 2) float64, unitless."""
     q = placed(p)
     box = f'width="{WIDTH:.0f}" height="{HEIGHT:.0f}"'

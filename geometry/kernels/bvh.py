@@ -6,7 +6,7 @@ Notation
     A leaf holds the triangles ``first .. first + size - 1`` in leaf order; ``order`` maps leaf order
     to the triangle numbers of the mesh.
     column row: x_lo, x_hi, y_lo, y_hi, z_max, a, b, c, sin, 1/cos with z <= a x + b y + c for every point of the
-    node, and sine and reciprocal cosine of the angle by which that plane leans.
+    node, and sine and reciprocal cosine of the slope angle of that plane.
     facet row: unit normal turned upwards (nx, ny, nz >= 0), orientation seen from above (+1/-1), quality.
 """
 
@@ -30,9 +30,9 @@ BINS = 16
 # which adds at most 31 levels for 2**31 triangles.
 DEPTH_OF_MEDIAN = 30
 STACK = 72
-UNEVEN = 0.6  # of the mean second moment of corners: from here on they show which way a node is longest
+UNEVEN = 0.6  # of the mean second moment of corners: above it they show the longest direction of a node
 
-# Facets by quality: the plane is of no use (no area, or vertical) / usable with care / well conditioned.
+# Facets by quality: the plane is unusable (no area, or vertical) / usable with care / well conditioned.
 EDGES_ONLY, CAREFUL, SOUND = 0.0, 1.0, 2.0
 
 
@@ -137,7 +137,11 @@ def _partition(lower, upper, order, start, stop, axis, left_bins, clo, scale):
 
 @njit(**KERNEL)
 def build_nodes(triangles: F64, leaf_size: int):
-    """Boxes, topology and leaf order of the hierarchy over (m, 3, 3) corner points, mm, m > 0."""
+    """Boxes, topology and leaf order of the hierarchy [MacDonald1990, Wald2007].
+
+    triangles : (m, 3, 3) float64, mm, corner points in the frame of the mesh, m > 0
+    leaf_size : largest number of triangles in a leaf
+    """
     m = triangles.shape[0]
     lower, upper = np.empty((m, 3)), np.empty((m, 3))
     _boxes(triangles, lower, upper)
@@ -211,7 +215,10 @@ def facet_row(p, q, r):
 
 @njit(**KERNEL)
 def facet_rows(corners: F64):
-    """(m, 5) ``facet_row`` of each triangle (m, 3, 3), mm."""
+    """(m, 5) float64, dimensionless, ``facet_row`` of each triangle.
+
+    corners : (m, 3, 3) float64, mm, frame of the mesh
+    """
     m = corners.shape[0]
     out = np.empty((m, 5))
     for i in range(m):
@@ -221,7 +228,7 @@ def facet_rows(corners: F64):
 
 @njit(**KERNEL)
 def column_rows(node_lo, node_hi, child, parent, first, count, corners):
-    """(k, 10) plan box, top z and covering plane of each node; the plane leans as the node does on average."""
+    """(k, 10) plan box, top z and covering plane of each node; the plane has the mean slope of the node."""
     k = node_lo.shape[0]
     normal = np.zeros((k, 3))
     out = np.zeros((k, 10))
@@ -267,14 +274,14 @@ def _unit(x, y, z):
 
 @njit(**KERNEL)
 def _plate_axes(normal, total, moment, lo, hi):
-    """Three unit ways n, a and b across each other: n as a node's triangles look on average, a its longest across n.
+    """Three perpendicular unit vectors n, a and b: n the mean normal of a node, a its longest direction across n.
 
     normal (3,) sum of areas times normals; total (4,) and moment (6,) sums over its corners of x, y, z and 1, and of
-    xx, yy, zz, yz, zx, xy; lo and hi (3,) its upright box. Where corners spread much the same all ways across n, a is
-    the longest side of the upright box, so that the box of a plate is no wider than it.
+    xx, yy, zz, yz, zx, xy; lo and hi (3,) its upright box. Where corners spread evenly across n, a is the longest side
+    of the upright box, so that the box of a plate is no wider than the plate.
     """
     nx, ny, nz = _unit(normal[0], normal[1], normal[2])
-    if not abs(nx * nx + ny * ny + nz * nz - 1.0) < 1e-9:  # no area, or nothing that can be squared
+    if not abs(nx * nx + ny * ny + nz * nz - 1.0) < 1e-9:  # no area, or the square overflows
         nx, ny, nz = 0.0, 0.0, 1.0
     if abs(nx) <= min(abs(ny), abs(nz)):
         ex, ey, ez = _unit(0.0, -nz, ny)
@@ -310,9 +317,9 @@ def _plate_axes(normal, total, moment, lo, hi):
 
 @njit(**KERNEL)
 def hull_rows(node_lo, node_hi, parent, first, count, corners):
-    """(k, 16) leaning box of each node: its middle, three unit ways n, a and b, half sides along them, half diagonal.
+    """(k, 16) oriented box of each node: its middle, unit vectors n, a and b, half sides along them, half diagonal.
 
-    n is how the triangles of the node look on average, a the way they spread most across that; mm.
+    n is the mean normal of the node's triangles, a the direction of their largest spread across n; mm.
     """
     k = node_lo.shape[0]
     normal, total, moment = np.zeros((k, 3)), np.zeros((k, 4)), np.zeros((k, 6))

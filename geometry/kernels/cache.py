@@ -1,12 +1,12 @@
-"""Where compiled kernels are kept: one folder for every state of a module and of all it depends on.
+"""Cache of compiled kernels: one folder for every state of a module and of all it depends on.
 
-Numba asks of a compiled function only whether the file it stands in has changed, not the files it takes other kernels
-from. Left at that, an update can leave old machine code inlined in a new kernel. Here the folder of a module bears the
-digest of ``geometry.kernels.sources``: an edit compiles again what depends on it, and nothing else. No path and no time
-goes into it, so that every checkout with the same sources takes the same machine code.
+Numba checks for a compiled function only whether its own file has changed, not the files of other kernels it uses. So
+an update can leave old machine code inlined in a new kernel. Here the name of a module's folder holds the digest of
+``geometry.kernels.sources``: an edit recompiles all that depends on it, and nothing else. The digest contains no path
+and no time, so that every checkout with the same sources uses the same machine code.
 
-Every ``kernels`` package imports this before its first kernel, for numba finds the folder when a function is decorated.
-The processor and its features are part of numba's own key: several machines may share a folder.
+Every ``kernels`` package imports this before its first kernel, since numba finds the folder when it decorates a
+function. The processor and its features are part of numba's own key: several machines may share a folder.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _FOLDER = re.compile(r"(?:[\w.]+-)?[0-9a-f]{16}")  # one digest of all kernels n
 
 
 def bases(given: str, root: Path = ROOT) -> list[Path]:
-    """Folders that the folders of modules may be made in, best first.
+    """Possible parents of the folders of modules, best first.
 
     given : NUMBA_CACHE_DIR as numba read it, "" where it is not set
 
@@ -46,7 +46,7 @@ def bases(given: str, root: Path = ROOT) -> list[Path]:
 
 @cache
 def writable_base(given: str) -> Path | None:
-    """The first of ``bases`` that files can be written in, by numba's own test; None where there is none."""
+    """The first of ``bases`` with write access, by numba's own test; None where there is none."""
     for base in bases(given):
         with contextlib.suppress(OSError):
             base.mkdir(parents=True, exist_ok=True)
@@ -63,7 +63,7 @@ def sources() -> Sources:
 
 @cache
 def module_folder(name: str, running_as: str, given: str) -> Path | None:
-    """Folder of a module's compiled functions, made and marked as used now; None where none can be written.
+    """Folder of a module's compiled functions, created and marked as used now; None without write access.
 
     running_as : ``__main__`` or the module's name; machine code finds its module by it, so the folders differ
     """
@@ -78,7 +78,7 @@ def module_folder(name: str, running_as: str, given: str) -> Path | None:
 
 
 class KernelLocator(caching._CacheLocator):  # type: ignore[misc]
-    """Tells numba where the machine code of a function of the project is kept, and when it is out of date."""
+    """Tells numba where the machine code of a function of the project is stored, and when it is out of date."""
 
     def __init__(self, py_func: Any, py_file: str, folder: Path) -> None:
         self._py_file = py_file
@@ -87,7 +87,7 @@ class KernelLocator(caching._CacheLocator):  # type: ignore[misc]
 
     @classmethod
     def from_function(cls, py_func: Any, py_file: str) -> KernelLocator | None:
-        """Locator of a function; None for one that is not the project's, which numba then keeps its own way.
+        """Locator of a function; None for a function outside the project, which numba stores in its own way.
 
         Raises
         ------
@@ -109,7 +109,7 @@ class KernelLocator(caching._CacheLocator):  # type: ignore[misc]
         return self._folder.name
 
     def get_disambiguator(self) -> str:
-        """Line of the function: two of one name may stand in one module."""
+        """Line of the function, since one module may hold two functions of one name."""
         return str(self._line)
 
 
@@ -141,7 +141,7 @@ def locked(path: Path) -> Iterator[None]:
 
 
 def remove_stale(given: str | None = None, age_s: float = WEEK_S) -> list[Path]:
-    """Remove the folders of other states of the modules that no process has begun to use for ``age_s`` seconds.
+    """Remove folders of other states of the modules that no process has started to use within ``age_s`` seconds.
 
     given : NUMBA_CACHE_DIR; None takes numba's
 

@@ -40,7 +40,7 @@ class Bull(NamedTuple):
 
 @njit(**KERNEL, inline="always")
 def bull_of(radius, corner_radius):
-    """Bull of a radius and a corner radius, mm; within a millionth of a nanometre of a ball or a flat end it is one."""
+    """Bull of a radius and a corner radius, mm; within 1e-12 of the radius it becomes a ball or a flat end."""
     r = min(corner_radius, radius)
     d = radius - r
     if d <= 1e-12 * radius:  # so nothing underflows
@@ -126,7 +126,7 @@ for_shape(revolved.lift_of, Bull)(triangle_tip)
 
 @for_shape(revolved.edge_bound, Bull)
 def _edge_bound(shape, z0, ez, length, u0, lo, hi, q):
-    """``_bound`` for a line, and no root to find; balls and flat ends have none anyway."""
+    """``_bound`` for a line, without a root to find; balls and flat ends need none."""
     r, d = shape.corner, shape.flat
     if r <= 0.0 or d <= 0.0:
         return np.inf
@@ -210,7 +210,7 @@ def _bound(shape, node, x, y, best):
 
 @njit(**KERNEL)
 def drop_tip(tree: TreeArrays, x, y, radius, corner_radius):
-    """Lowest tip height over (x, y) that leaves the mesh untouched, mm; -inf where nothing is below."""
+    """Lowest tip height over (x, y) at which the body does not enter the mesh, mm; -inf where nothing is below."""
     return walk(tree, bull_of(radius, corner_radius), x, y, NOTHING, False)[0]
 
 

@@ -70,7 +70,7 @@ def _box2(lower, upper, px, py, pz):
 def nearest_row(lower, upper, child, first, size, corners, px, py, pz, most2, stack):
     """Squared distance in mm² from a point to the mesh, and the row of the nearest triangle.
 
-    most2 : mm², nothing as far is looked for: most2 and -1 then; stack : (128,) int64, written over
+    most2 : mm², end of the search: most2 and -1 are returned then; stack : (128,) int64, overwritten
     """
     best, found = most2, -1
     stack[0], depth = 0, 1
@@ -93,15 +93,15 @@ def nearest_row(lower, upper, child, first, size, corners, px, py, pz, most2, st
 
 
 @njit(cache=True, nogil=True)
-def nearest_triangles(lower, upper, child, first, size, corners, points, most, out, row, feet):
+def nearest_triangles(lower, upper, child, first, size, corners, points, limit, out, row, feet):
     """out[i] = distance in mm from points[i] to the mesh, row[i] the row of the nearest triangle, feet[i] the place.
 
-    most : mm, nothing farther is looked for: inf and -1 then, as for an empty mesh
+    limit : mm, end of the search: inf and -1 there, as for an empty mesh
     """
     stack = np.empty(128, np.int64)
     for i in range(len(points)):
         px, py, pz = points[i, 0], points[i, 1], points[i, 2]
-        best, found = nearest_row(lower, upper, child, first, size, corners, px, py, pz, most * most, stack)
+        best, found = nearest_row(lower, upper, child, first, size, corners, px, py, pz, limit * limit, stack)
         out[i] = math.sqrt(best) if found >= 0 else np.inf
         row[i] = found
         if found >= 0:

@@ -10,8 +10,8 @@ from numba import njit
 
 from geometry.kernels.options import KERNEL
 
-MOST_STEPS = 30  # of Gauss and Newton to a foot
-NEAR = 1e-6  # mm a step to a foot may still be: the height is right to its square over the radius of curvature
+MAX_STEPS = 30  # Gauss-Newton steps to a foot
+NEAR = 1e-6  # mm, last step to a foot: the error of the height is its square over the radius of curvature
 
 
 @njit(**KERNEL)
@@ -70,11 +70,11 @@ def surface_values(net, knots_u, knots_v, order_u, order_v, uv, out):
 
 @njit(**KERNEL)
 def heights_along(nets, knots_u, knots_v, order_u, order_v, side, low, high, points, start, uv, height):
-    """Heights of chains of points (m, t, 3) over a surface, each foot searched from the one before.
+    """Heights of chains of points (m, t, 3) over a surface; the search for each foot starts at the previous foot.
 
     nets   : of the surface and its derivatives in u and v, homogeneous where there are four columns; the knots and
-             orders belong to the surface, of a derivative they are one less
-    low, high : (2,) parameters a foot may have; beyond its knots the surface goes on as the polynomial of its border
+             orders belong to the surface, those of a derivative are one less
+    low, high : (2,) limits of the parameters of a foot; beyond its knots the surface is the polynomial of its border
     start  : (m, 2) parameters near the foot of the first point
     uv     : (m, t, 2), height (m, t) mm along the normal of the foot, both written
     """
@@ -86,7 +86,7 @@ def heights_along(nets, knots_u, knots_v, order_u, order_v, side, low, high, poi
         u, v = start[m]
         for t in range(points.shape[1]):
             x, y, z = points[m, t]
-            for _ in range(MOST_STEPS):
+            for _ in range(MAX_STEPS):
                 _sum(net, knots_u, knots_v, order_u, order_v, u, v, by_u, by_v, place)
                 _sum(net_u, knots_u[1:-1], knots_v, order_u - 1, order_v, u, v, by_u, by_v, along_u)
                 _sum(net_v, knots_u, knots_v[1:-1], order_u, order_v - 1, u, v, by_u, by_v, along_v)

@@ -1,4 +1,4 @@
-"""How every kernel here is compiled, in one place.
+"""Options of numba for every kernel here, in one place.
 
 ``error_model`` numpy: a division by zero gives inf or NaN instead of raising, which a kernel must not do.
 No fast-math: bounds rely on infinities, and the same bytes on every machine rely on the order of operations.

@@ -2,7 +2,7 @@
 
 Notation
     o, d     origin and direction; a point of the ray is o + t d, so t is in lengths of d
-    u, v     barycentric weights of Moeller and Trumbore (1997), let out by EDGE so that a ray that meets a
+    u, v     barycentric weights [Moller1997], extended by EDGE so that a ray that meets a
              shared edge or vertex meets at least one of its triangles
 Both sides of a triangle count. The traversal is that of the drop kernel: near child first, a bit a level.
 """

@@ -1,16 +1,17 @@
-"""What any convex body of revolution does over a mesh: the loops, told apart by kinds of shape at compile time.
+"""Loops for any convex body of revolution over a mesh; the kind of shape is resolved at compile time.
 
 Notation
     shape   a named tuple of one kind: ``Bull`` (``geometry.kernels.drop``), ``Turned`` (``geometry.kernels.outline``),
             or a ``Push`` of one of these (``geometry.kernels.push``)
     (x, y)  axis of the body in plan; points are taken relative to it
     rho, h  distance from the axis in plan, and height of the body's lower outline there: convex, not falling
-    lift    what a point asks for: z - h(rho) in a drop. It is concave on a triangle, so where the plane's own contact
-            lies inside the triangle that is its maximum, and else the maximum lies on an edge that faces the contact.
+    lift    tip height that a point requires: z - h(rho) in a drop. It is concave on a triangle. So where the contact of
+            the plane lies inside the triangle, that is its maximum. Otherwise it lies on an edge that faces the
+            contact.
 
-The operations below the first rule are stubs. Each kind says with ``for_shape`` what they are; numba takes the body of
-the kind at hand when it compiles a loop, as if the loop had been written for it, and there is nothing to choose at run
-time. A local variable must not bear the name of a compiled function.
+The operations below the first rule are stubs. Each kind registers their bodies with ``for_shape``. When numba compiles
+a loop, it takes the body of the kind at hand, so nothing is chosen at run time. A local variable must not have the name
+of a compiled function.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ NOTHING = -np.inf
 
 
 def for_shape(operation: Any, kind: type) -> Any:
-    """Decorator: the function below is what ``operation`` does for shapes of one kind, a class of named tuples."""
+    """Decorator: the function below is the body of ``operation`` for shapes of one kind, a class of named tuples."""
 
     def register(body: Any) -> Any:
         @overload(operation, jit_options={"error_model": KERNEL["error_model"]}, strict=False)
@@ -61,12 +62,12 @@ def facet_contact(shape, nx, ny, nz):
 
 
 def touches_widely(shape):
-    """Whether a plane may be touched along a line of the body, so that all edges count where the contact is outside."""
+    """Whether the body may touch a plane along a line, so that all edges count where the contact is outside."""
     raise NotImplementedError
 
 
 def edge_bound(shape, z0, ez, length, u0, lo, hi, q):
-    """No point of an edge lifts the body above this; infinity where finding the place costs as little."""
+    """Upper bound of the lift of an edge; infinity where the place itself costs as little."""
     raise NotImplementedError
 
 
@@ -79,12 +80,12 @@ def edge_place(shape, lo, hi, q, half, length, l2, ez):
 
 
 def node_bound(shape, node, x, y, best):
-    """No point of the node lifts the body above this; -inf where that is clear to be no higher than best."""
+    """Upper bound of the lift of a node; -inf where it is certainly no higher than best."""
     raise NotImplementedError
 
 
 def lift_of(shape, v, facet, x, y, best):
-    """What one triangle asks for, and its contact point; at most ``best`` means no lift."""
+    """Lift that one triangle requires, and its contact point; a value up to ``best`` means no lift."""
     raise NotImplementedError
 
 
@@ -202,8 +203,8 @@ def triangle_tip(shape, v, facet, x, y, best):
 def walk(tree: TreeArrays, shape, x, y, start, first_only):
     """Highest lift above ``start``: lift, place in leaf order (-1: nothing lifts) and contact point.
 
-    first_only stops at the first triangle that lifts at all. The child with the higher bound goes first; what is left
-    behind is one bit a level in a 64-bit trail, so that no stack is needed.
+    first_only stops at the first triangle that lifts at all. The child with the higher bound goes first. One bit a
+    level in a 64-bit trail marks the siblings left to visit, so that no stack is needed.
     """
     best, slot, cx, cy, cz = start, -1, np.nan, np.nan, np.nan
     column, child, parent = tree.column, tree.child, tree.parent

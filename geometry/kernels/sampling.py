@@ -43,7 +43,7 @@ def _across(t, u):
 def lattice_places(triangles, normals, h, out, area, owner):
     """Write the places of the lattice on triangles (m, 3, 3) mm into out (n, 3), and their triangle into owner (n,).
 
-    normals : (m, 3) unit; area (n,) mm², what each place stands for. Nothing is written beyond n.
+    normals : (m, 3) unit; area (n,) mm², represented by each place. Nothing is written beyond n.
 
     Returns how many there are, which may exceed n.
     """

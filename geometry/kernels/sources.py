@@ -1,11 +1,11 @@
-"""Which source files a compiled kernel depends on, and one digest over them.
+"""Source files that a compiled kernel depends on, and one digest over them.
 
 Machine code holds whatever was inlined into it: kernels and constants of other modules, and the bodies that modules
 register for the stubs of ``geometry.kernels.revolved``. So a module depends on itself, on every project module it
 imports, on every module that registers a body for one of its stubs, and on all that these depend on in turn.
 
-Files are read, never imported. Import statements are found by line and parsed one by one: to parse whole modules takes
-a third of a second, and every process would wait for it.
+Files are read, never imported. Import statements are found by line and parsed one by one, since parsing whole modules
+takes a third of a second in every process.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ _REGISTERS = re.compile(rf"\b(?:{'|'.join(REGISTERS)})\(")
 
 
 def toolchain() -> str:
-    """Versions and settings of what compiles: with others the same source gives other machine code."""
+    """Versions and settings of the compiler; with others the same source gives other machine code."""
     settings = [f"{name}={getattr(config, name, None)}" for name in SETTINGS]
     return " ".join([numba.__version__, llvmlite.__version__, np.__version__, *settings])
 
 
 def import_statements(source: str) -> Iterator[ast.Import | ast.ImportFrom]:
-    """Every import statement of a module, wherever it stands; a line of prose that reads like one may be among them."""
+    """Every import statement of a module, at any place; a line of prose that reads like one may be among them."""
     for match in _IMPORT.finditer(source):
         lines = source[match.start():].split("\n", LONGEST)[:LONGEST]
         for count, line in enumerate(lines, start=1):
@@ -66,7 +66,7 @@ def import_statements(source: str) -> Iterator[ast.Import | ast.ImportFrom]:
 
 
 class Sources:
-    """The source files of the project below ``root``, each read once."""
+    """The source files of the project below ``root``; each is read once."""
 
     def __init__(self, root: Path = ROOT) -> None:
         self.root = root

@@ -1,4 +1,4 @@
-"""Whether a tool with any axis enters the mesh, asked of the one hierarchy that stands in the part's frame.
+"""Whether a tool with any axis enters the mesh, by the one hierarchy in the frame of the part.
 
 Notation
     turn    (3, 3) rotation from the frame of the mesh to the axis frame; its rows are the axis frame's x, y and z,
@@ -6,10 +6,10 @@ Notation
     body    a row of (k, 3): radius R, corner radius r, and the height of the body's lower end above the tip. Every body
             goes on upwards without end, as in ``geometry.kernels.drop``
     floor   lowest height, in the axis frame, at which a point can be inside some body: tip + least height
-A body is its core, the disc of radius R - r at height r above its lower end and all above, grown by r on all sides: it
-is convex, and how far a point is from it takes two differences and a root. A node is left out where a plane parts its
-leaning box from every body. Triangles of a leaf are turned corner by corner and handed to the exact primitives of the
-upright drop, so the answer is as exact as there.
+A body is its core, the disc of radius R - r at height r above its lower end and all above, grown by r on all sides. It
+is convex, and the distance of a point from it takes two differences and a root. The walk skips a node where a plane
+separates its oriented box from every body. Triangles of a leaf are turned corner by corner and go to the exact
+primitives of the upright drop, so the answer is as exact as there.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from geometry.kernels.drop import BLOCK_TOLERANCE, bull_of
 from geometry.kernels.options import KERNEL
 from geometry.kernels.revolved import lift_of
 
-SLACK = 1e-7  # mm, more than rounding: what is as near as that to a body is looked into
-LOOKS = 4  # from box to body and back, before a box is taken to be entered
-RUN = 64  # tips one thread asks for in a row
+SLACK = 1e-7  # mm, more than rounding: nodes nearer than this to a body are opened
+LOOKS = 4  # rounds from box to body and back; after them the box counts as entered
+RUN = 64  # consecutive tips of one thread
 
 
 @njit(**KERNEL, inline="always")
@@ -56,11 +56,11 @@ def _enters(tree, i, t, x, y, z, floor, widest, bodies):
 
 @njit(**KERNEL)
 def _off(hull, ux, uy, uz, px, py, pz, bodies):
-    """How far the middle of a node's box is from a body that may enter the box; infinite where certainly none does.
+    """Distance of the middle of a node's box from a body that may enter the box; infinite where certainly none does.
 
     hull (16,) of ``geometry.kernels.bvh.hull_rows``, (ux, uy, uz) tool axis and (px, py, pz) tip in the frame of the
-    mesh. Box and body are both convex. First their balls and the plane of the slab are tried; then the point of the box
-    and that of the body nearest each other are looked for by going to and fro, and the plane across that way is tried.
+    mesh. Box and body are both convex. First their balls and the plane of the slab are tried. Then the search
+    alternates between the nearest points of box and body, and tries the plane across their connection.
     """
     x, y, z = hull[0] - px, hull[1] - py, hull[2] - pz
     s = x * ux + y * uy + z * uz
@@ -145,7 +145,7 @@ def is_blocked_along(tree: TreeArrays, hulls, t, x, y, z, bodies, floor, widest,
             continue
         left = _off(hulls[inner], ux, uy, uz, px, py, pz, bodies)
         right = _off(hulls[inner + 1], ux, uy, uz, px, py, pz, bodies)
-        later = inner if left > right else inner + 1  # deeper in the tool goes first: it is likelier to block
+        later = inner if left > right else inner + 1  # the node deeper in the tool goes first: it is likelier to block
         if max(left, right) < np.inf:
             stack[top] = later
             top += 1
@@ -156,24 +156,25 @@ def is_blocked_along(tree: TreeArrays, hulls, t, x, y, z, bodies, floor, widest,
 
 
 @njit(**KERNEL)
-def along_range(tree, hulls, turns, which, tips, bodies, least, widest, lo, hi, out):
+def along_range(tree, hulls, turns, which, tips, bodies, lowest, widest, lo, hi, out):
     """Whether the tool is blocked at the tips lo .. hi - 1 of tips (n, 3), each in the frame turns[which].
 
-    What blocked the last one is tried first: neighbours tend to be blocked by the same triangle, and any will do.
+    The triangle that blocked the last tip is tried first, since it often blocks the neighbour; any blocking one
+    suffices.
     """
     stack = np.empty(STACK, np.int64)
     last = -1
     for i in range(lo, hi):
         z = tips[i, 2]
-        found = is_blocked_along(tree, hulls, turns[which[i]], tips[i, 0], tips[i, 1], z, bodies, z + least, widest,
+        found = is_blocked_along(tree, hulls, turns[which[i]], tips[i, 0], tips[i, 1], z, bodies, z + lowest, widest,
                                  stack, last)
         out[i] = found >= 0
         last = found if found >= 0 else last
 
 
 @njit(**KERNEL, parallel=True)
-def along_parallel(tree, hulls, turns, which, tips, bodies, least, widest, out):
+def along_parallel(tree, hulls, turns, which, tips, bodies, lowest, widest, out):
     """``along_range`` over all tips, on the threads numba has; the same bytes on any number of them."""
     n = tips.shape[0]
     for j in prange((n + RUN - 1) // RUN):
-        along_range(tree, hulls, turns, which, tips, bodies, least, widest, j * RUN, min((j + 1) * RUN, n), out)
+        along_range(tree, hulls, turns, which, tips, bodies, lowest, widest, j * RUN, min((j + 1) * RUN, n), out)

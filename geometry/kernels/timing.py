@@ -1,10 +1,10 @@
-"""How fast a control with look-ahead gets along straight moves.
+"""Speed of a control with look-ahead along straight moves.
 
 Notation
-    l, s      : length of a move, mm, and the speed asked for on it, mm/s
+    l, s      : length of a move, mm, and the programmed speed on it, mm/s
     a         : acceleration, mm/s², the same in every direction
     phi       : angle by which the way turns at a corner; 0 straight on, pi back
-    d         : mm the control may pass a corner by
+    d         : mm, largest distance by which the control may pass a corner
     v         : speed at a corner, mm/s
 
 At a corner the control runs an arc that touches both moves. Of radius r it passes the corner by

@@ -68,12 +68,16 @@ def _row_parts(data: F64, a: int, b: int, pitch: float) -> int:
 @njit(**KERNEL)
 def count_division(corners: I64, sides: I64, parts: I64, length: F64, first: I64, data: F64,
                    pitch: float) -> tuple[I64, I64]:
-    """Inner nodes and small facets that each facet will give.
+    """Count of inner nodes and small facets of each facet.
 
-    corners : (t, 3) node numbers; sides : (t, 3) edge numbers; parts, length, first : (e,) parts of each edge, its
-    length (mm), and the number of its first inner node; data : (n, 8) node rows, edge nodes included; pitch : mm
+    corners       : (t, 3) int64, index of the nodes
+    sides         : (t, 3) int64, index of the edges
+    parts, first  : (e,) int64, parts of each edge (count) and index of its first inner node
+    length        : (e,) float64, mm, of each edge
+    data          : (n, 8) float64, node rows in the frame of the part, edge nodes included
+    pitch         : mm
 
-    Returns (t,) inner nodes and (t,) facets.
+    Returns (t,) inner nodes and (t,) facets, int64, count.
     """
     m = len(corners)
     inner, small = np.zeros(m, np.int64), np.zeros(m, np.int64)
@@ -99,8 +103,11 @@ def divide(corners: I64, sides: I64, parts: I64, length: F64, first: I64, data: 
            facet_at: I64, out: I64) -> None:
     """Fill in the inner nodes (rows of ``data`` from node_at[t] on) and the small facets (``out`` from facet_at[t]).
 
-    Arguments as ``count_division``; out : (q, 3) node numbers. Two facets that share a side get the same nodes there,
-    for the nodes of a side depend on the side alone.
+    corners, sides, parts, length, first, data, pitch : as in ``count_division``, data in the frame of the part
+    node_at, facet_at : (t,) int64, index of the first inner node and the first small facet of each facet
+    out               : (q, 3) int64, index of the nodes of the small facets
+
+    Two facets that share a side get the same nodes there, since the nodes of a side depend on the side alone.
     """
     for t in range(len(corners)):
         apex = _apex_of(length, sides, t)
@@ -184,13 +191,13 @@ def _side_extras(corners: I64, sides: I64, parts: I64, first: I64, t: int, side:
 def trace(corners: I64, twin: I64, group: I64, loop_nodes: I64, loop_sides: I64, loop_at: I64) -> int:
     """Border loops of every group of facets, the group on the left.
 
-    corners   : (t, 3) node numbers; side 3 t + k runs from corner k to corner k + 1
-    twin      : (3 t,) the same side of the other facet, -1 at the rim
-    group     : (t,) group number of each facet
-    loop_nodes, loop_sides : (3 t,) out, start node and number of each border side, loop after loop
-    loop_at   : (3 t + 1,) out, where each loop starts; one past the end behind the last
+    corners   : (t, 3) int64, index of nodes in the frame of the sheet; side 3 t + k runs from corner k to corner k + 1
+    twin      : (3 t,) int64, index of the same side of the other facet, -1 at the rim
+    group     : (t,) int64, index of the group of each facet
+    loop_nodes, loop_sides : (3 t,) int64, out, index of the start node and the side of each border side, loop by loop
+    loop_at   : (3 t + 1,) int64, out, index of the start of each loop; one past the end after the last
 
-    Returns the number of loops. Where a group touches itself in a node the walk stays in its own fan of facets.
+    Returns the number of loops. Where a group touches itself in a node, the walk stays in its own fan of facets.
     """
     sides = 3 * len(corners)
     done = np.zeros(sides, np.bool_)
@@ -220,10 +227,10 @@ def _is_border(twin: I64, group: I64, s: int) -> bool:
 
 @njit(**KERNEL)
 def thin(points: F64, tolerance: float, keep: NDArray[np.bool_]) -> None:
-    """Douglas-Peucker on an open polyline.
+    """Thin an open polyline [Douglas1973].
 
-    points : (k, 5) float64, mm: x, y, z and u, v scaled to mm; a point is dropped when both its parts are within
-    ``tolerance`` of one place of the chord; keep : (k,) out, ends always kept
+    points : (k, 5) float64, mm: x, y, z and u, v scaled to mm. A point is dropped when both its parts are within
+    ``tolerance`` of one place of the chord. keep : (k,) bool, out; the ends stay
     """
     k = len(points)
     keep[0] = keep[k - 1] = True

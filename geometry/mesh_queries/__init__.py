@@ -1,4 +1,4 @@
-"""Questions asked of a triangle mesh: rays, nearest places, lowest tips, pushes, overlaps.
+"""Queries on a triangle mesh: rays, nearest places, lowest tips, pushes, overlaps.
 
-Only shapes are known here: no STEP file, no part, no plan.
+Only shapes belong here: no STEP file, no part, no plan.
 """

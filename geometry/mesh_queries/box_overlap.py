@@ -1,4 +1,4 @@
-"""Boxes with their sides along the axes, against a closed mesh."""
+"""Overlap of an axis-parallel box with a closed mesh."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ _NEXT = np.array([1, 2, 0])
 
 
 def point_of_mesh_in_box(mesh: TriangleMesh, lower: F64, upper: F64) -> F64 | None:
-    """A point of the solid that a closed mesh bounds inside a box, or None where they do not meet.
+    """A point of the solid inside a box, or None where solid and box do not meet [Ericson2005].
+
+    A closed mesh bounds the solid. All points are in the frame of the mesh.
 
     mesh         : TriangleMesh, closed, normals outwards, mm
     lower, upper : (3,) float64, mm, corners of the box
@@ -29,10 +31,12 @@ def point_of_mesh_in_box(mesh: TriangleMesh, lower: F64, upper: F64) -> F64 | No
 
 
 def is_inside(mesh: TriangleMesh, point: F64) -> bool:
-    """Whether a point lies inside a closed mesh: the solid angle of the surface round it is a whole sphere.
+    """Whether a point lies inside a closed mesh: the solid angle of the surface around it is a whole sphere.
+
+    The formula of the solid angle of a triangle is that of [VanOosterom1983].
 
     mesh  : TriangleMesh, closed, normals outwards, mm
-    point : (3,) float64, mm, not on the surface
+    point : (3,) float64, mm, frame of the mesh, not on the surface
 
     Source: A. van Oosterom, J. Strackee, "The solid angle of a plane triangle", IEEE Trans. Biomed. Eng. 30 (1983).
     """

@@ -12,7 +12,7 @@ from geometry.mesh import F64, TriangleMesh
 
 
 class TriangleTree:
-    """Hierarchy over the triangles of a mesh, built once and read by every kernel.
+    """Hierarchy over the triangles of a mesh, built once and read by every kernel [MacDonald1990, Wald2007].
 
     mesh      : TriangleMesh, kept as ``.mesh``
     leaf_size : int, most triangles in a leaf
@@ -37,7 +37,7 @@ class TriangleTree:
 
     @cached_property
     def hulls(self) -> F64:
-        """(k, 16) ``hull_rows`` of the nodes: only what asks along many axes needs them, and they are long."""
+        """(k, 16) float64, mm, frame of the mesh: ``hull_rows`` of the nodes, for queries along many axes."""
         t = self.arrays
         return hull_rows(t.lower, t.upper, t.parent, t.first, t.size, t.corners)
 
@@ -48,7 +48,7 @@ class TriangleTree:
 def _arrays(mesh: TriangleMesh, leaf_size: int) -> TreeArrays:
     if len(mesh.faces) == 0:
         return _empty()
-    triangles = mesh.vertices[mesh.faces]  # not mesh.triangles, which would stay
+    triangles = mesh.vertices[mesh.faces]  # mesh.triangles would stay in memory
     lower, upper, child, parent, first, count, order = build_nodes(triangles, leaf_size)
     corners = triangles[order]
     del triangles

@@ -1,8 +1,8 @@
-"""Queries in an order in which neighbours follow each other.
+"""Order of queries along a curve that fills the plane, so that neighbours follow each other.
 
-A query walks through the same nodes as one beside it. Scattered over a hierarchy larger than the cache they wait for
-memory; along a curve that fills the plane they find most of it at hand. Every query is answered by itself, so the order
-changes no byte of the answers.
+Neighbouring queries visit the same nodes of the hierarchy. Scattered queries wait for memory where the hierarchy is
+larger than the cache. Along a space-filling curve most nodes are in the cache already. Queries are independent, so the
+order changes no byte of the answers.
 """
 
 from __future__ import annotations
@@ -21,10 +21,12 @@ NEAR = 8.0  # steps between successive queries, in spacings of as many on a latt
 
 
 def along_curve(xy: F64, triangles: int) -> NDArray[np.intp] | None:
-    """Order of points along a Morton curve, None where it does not pay.
+    """Order of points along a Morton curve [Morton1966], None where sorting does not pay.
 
-    xy        : (n, 2) float64, mm, finite
-    triangles : int, of the mesh that is asked
+    xy        : (n, 2) float64, mm, in plan, finite
+    triangles : int, count of the triangles of the mesh
+
+    Returns (n,) intp, index of each point in the new order.
     """
     n = len(xy)
     if n < MANY or triangles < LARGE:
@@ -39,11 +41,11 @@ def along_curve(xy: F64, triangles: int) -> NDArray[np.intp] | None:
 
 def in_order(call: Callable[[F64, NDArray[np.generic]], None], points: F64, triangles: int,
              out: NDArray[np.generic]) -> None:
-    """Answer queries along the curve: ``call(points, out)`` fills out, one row for each.
+    """Answer queries in the order of the curve: ``call(points, out)`` fills one row of out for each point.
 
-    points    : (n, >= 2) float64, mm, x and y first
-    triangles : int, of the mesh that is asked
-    out       : (n,) array to fill
+    points    : (n, 2) float64 or wider, mm, frame of the mesh, x and y first
+    triangles : int, count of the triangles of the mesh
+    out       : (n,) array to fill, of the dtype and unit that ``call`` writes
     """
     order = along_curve(points[:, :2], triangles)
     if order is None:

@@ -25,11 +25,11 @@ from geometry.mesh import F64, I32
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.curve_order import in_order
 
-FEW = 4000  # queries below this are not worth waking a second thread for
+FEW = 4000  # fewer queries do not pay for a second thread
 
 @dataclass(frozen=True, eq=False)
 class DropContacts:
-    """Tips with what holds them up.
+    """Tip heights with the triangle and point that hold each tip up, in the frame of the mesh.
 
     z        : (n,) float64, mm, tip heights; -inf where nothing is below
     triangle : (n,) int32, triangle of the mesh that is touched; -1 where none
@@ -42,10 +42,10 @@ class DropContacts:
 
 
 def drop_tips(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: float, out: F64 | None = None) -> F64:
-    """Lowest tip height over each point.
+    """Lowest tip height over each point: contact with vertices, edges and facets [Yau2004].
 
     tree          : TriangleTree
-    xy            : (n, 2) float64, mm, places of the axis
+    xy            : (n, 2) float64, mm, places of the axis in the frame of the mesh
     radius        : float, mm, >= 0; 0 gives the height of the mesh itself
     corner_radius : float, mm, 0 <= corner_radius <= radius
     out           : (n,) float64 to write into, new when None
@@ -58,7 +58,7 @@ def drop_tips(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: f
     Raises
     ------
     GeometryError
-        The points or the radii are not as above; the subjects name what.
+        Points or radii differ from the description above; the subjects name them.
     """
     points = finite_points(xy, 2, "xy")
     _check_radii(radius, corner_radius)
@@ -81,7 +81,9 @@ def drop_tips(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: f
 def drop_contacts(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: float) -> DropContacts:
     """``drop_tips`` with the triangle and the point that hold each tip up; parameters and errors as there.
 
-    Where several triangles share the contact (an edge, a vertex), any one of them is named, always the same
+    xy : (n, 2) float64, mm, places of the axis in the frame of the mesh
+
+    Where several triangles share the contact (an edge, a vertex), the result names one of them, always the same
     one for the same mesh.
     """
     points = finite_points(xy, 2, "xy")
@@ -95,7 +97,7 @@ def drop_contacts(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radiu
 def blocked_many(tree: TriangleTree, tips: ArrayLike, radius: float, corner_radius: float) -> NDArray[np.bool_]:
     """Whether the body enters the mesh with its tip at each point.
 
-    tips : (n, 3) float64, mm; the other parameters and the errors are those of ``drop_tips``
+    tips : (n, 3) float64, mm, frame of the mesh; the other parameters and the errors are those of ``drop_tips``
 
     Returns
     -------
@@ -128,7 +130,12 @@ def drop_grid(tree: TriangleTree, x0: float, y0: float, step: float, nx: int, ny
     Returns
     -------
     (ny, nx) float64, mm
-        Element [j, i] is the tip over (x0 + i step, y0 + j step), as ``drop_tips`` gives it.
+        Element [j, i] is the tip over (x0 + i step, y0 + j step), as ``drop_tips`` gives it; frame of the mesh.
+
+    Raises
+    ------
+    GeometryError
+        Code 'bad_grid': a corner is not finite, or the step or a count is not positive. The errors of ``drop_tips``.
     """
     _check_radii(radius, corner_radius)
     if not (np.isfinite([x0, y0]).all() and np.isfinite(step) and step > 0.0) or nx < 0 or ny < 0:
@@ -144,7 +151,7 @@ def drop_grid(tree: TriangleTree, x0: float, y0: float, step: float, nx: int, ny
 
 
 def one_thread(queries: int) -> bool:
-    """Whether numba's threading layer is left alone: it has one thread, or the queries are not worth waking another."""
+    """Whether the work stays on this thread: numba has one, or the queries do not pay for another."""
     return queries < FEW or bool(numba.get_num_threads() == 1)
 
 

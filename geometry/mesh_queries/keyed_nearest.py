@@ -12,10 +12,10 @@ APART = 4.0  # times the extent of the points: how far one key is from the next 
 
 
 class KeyedPoints:
-    """A hierarchy over points with one axis more, along which different keys lie out of each other's reach.
+    """A hierarchy over points with one more axis, along which points of different keys lie far apart.
 
-    key    : (n,) int64, any values
-    points : (n, d) float64, mm
+    key    : (n,) int64, index, any values
+    points : (n, d) float64, mm, in one frame
     """
 
     def __init__(self, key: NDArray[np.int64], points: F64) -> None:
@@ -29,9 +29,9 @@ class KeyedPoints:
     def nearest(self, key: NDArray[np.int64], points: F64, k: int = 1) -> NDArray[np.int64]:
         """Rows of the nearest points of the same key.
 
-        key    : (m,) int64
-        points : (m, d) float64, mm, not farther from the indexed ones than twice their extent
-        Returns (m, k) int64, nearest first; -1 where the key has fewer.
+        key    : (m,) int64, index
+        points : (m, d) float64, mm, same frame, not farther from the indexed points than twice their extent
+        Returns (m, k) int64, index of the points, nearest first; -1 where the key has fewer.
         """
         out = np.full((len(points), k), -1, np.int64)
         if not len(self.keys) or not len(points):

@@ -1,7 +1,8 @@
 """Drop of any body of revolution over a mesh: tapered balls, barrels, whole assemblies.
 
 The body is an ``Outline``, lines and arcs from the tip upwards. For balls, flat ends and bull noses alone
-``geometry.mesh_queries.drop`` gives the same tips with less work. Threads and bytes are as there. Theory: docs/theory/drop.md.
+``geometry.mesh_queries.drop`` gives the same tips with less work. Threads and bytes are as there.
+Theory: docs/theory/drop.md.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ from geometry.mesh_queries.revolved_outline import Outline
 
 
 def drop_turned(tree: TriangleTree, xy: ArrayLike, outline: Outline) -> F64:
-    """Lowest tip height of a body over each point.
+    """Lowest tip height of a body of revolution over each point [Yau2004].
 
     tree    : TriangleTree
-    xy      : (n, 2) float64, mm, places of the axis
+    xy      : (n, 2) float64, mm, places of the axis in the frame of the mesh
     outline : Outline
 
     Returns
@@ -35,7 +36,7 @@ def drop_turned(tree: TriangleTree, xy: ArrayLike, outline: Outline) -> F64:
     Raises
     ------
     GeometryError
-        The points are not as above; the subjects name what.
+        The points differ from the description above; the subjects name them.
     """
     points = finite_points(xy, 2, "xy")
     out = np.empty(len(points))
@@ -51,7 +52,10 @@ def drop_turned(tree: TriangleTree, xy: ArrayLike, outline: Outline) -> F64:
 
 
 def turned_contacts(tree: TriangleTree, xy: ArrayLike, outline: Outline) -> DropContacts:
-    """``drop_turned`` with the triangle and the point that hold each tip up; parameters and errors as there."""
+    """``drop_turned`` with the triangle and the point that hold each tip up; parameters and errors as there.
+
+    xy : (n, 2) float64, mm, places of the axis in the frame of the mesh
+    """
     points = finite_points(xy, 2, "xy")
     n = len(points)
     z, triangle, contact = np.empty(n), np.empty(n, np.int32), np.empty((n, 3))

@@ -24,7 +24,7 @@ from geometry.mesh_queries.revolved_outline import Outline
 
 @dataclass(frozen=True, eq=False)
 class PushContacts:
-    """Stops with what is touched there.
+    """Stops with the triangle and point of each contact, in the frame of the mesh.
 
     distance : (n,) float64, mm, from the given tip along the direction; +inf where nothing is in the way
     triangle : (n,) int32, triangle of the mesh that is touched; -1 where none
@@ -40,8 +40,8 @@ def push_stops(tree: TriangleTree, tips: ArrayLike, direction: ArrayLike, outlin
     """How far a body that comes from far away gets along a direction until it first touches the mesh.
 
     tree      : TriangleTree
-    tips      : (n, 3) float64, mm, a point of each way; the body's tip passes through it
-    direction : (2,) float64, of any length above 0
+    tips      : (n, 3) float64, mm, frame of the mesh, a point of each way; the body's tip passes through it
+    direction : (2,) float64, dimensionless, frame of the mesh, of any length above 0
     outline   : Outline
 
     Returns
@@ -53,7 +53,7 @@ def push_stops(tree: TriangleTree, tips: ArrayLike, direction: ArrayLike, outlin
     Raises
     ------
     GeometryError
-        The tips are not as above, or the direction is zero or not finite; the subjects name what.
+        The tips differ from the description above, or the direction is zero or not finite; the subjects name which.
     """
     points, (dx, dy) = finite_points(tips, 3, "tips"), _unit(direction)
     out = np.empty(len(points))
@@ -69,7 +69,11 @@ def push_stops(tree: TriangleTree, tips: ArrayLike, direction: ArrayLike, outlin
 
 
 def push_contacts(tree: TriangleTree, tips: ArrayLike, direction: ArrayLike, outline: Outline) -> PushContacts:
-    """``push_stops`` with the triangle and the point that end each way; parameters and errors as there."""
+    """``push_stops`` with the triangle and the point that end each way; parameters and errors as there.
+
+    tips      : (n, 3) float64, mm, frame of the mesh
+    direction : (2,) float64, dimensionless, frame of the mesh
+    """
     points, (dx, dy) = finite_points(tips, 3, "tips"), _unit(direction)
     n = len(points)
     stop, triangle, contact = np.empty(n), np.empty(n, np.int32), np.empty((n, 3))
@@ -84,4 +88,4 @@ def _unit(direction: ArrayLike) -> tuple[float, float]:
         x, y = (d / np.hypot(*d)).tolist()
         return x, y
     raise GeometryError(f"a direction is two finite numbers, not both 0, got {d.tolist()}", code="bad_direction",
-                        subjects=("direction",), measured=d.tolist(), remedy="give (x, y) of the way")
+                        subjects=("direction",), measured=d.tolist(), remedy="give (x, y) of the direction")

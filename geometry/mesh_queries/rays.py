@@ -15,13 +15,14 @@ from geometry.mesh_queries.bvh import TriangleTree
 
 def first_hits(tree: TriangleTree, origins: ArrayLike, directions: ArrayLike, t_min: float = 0.0,
                t_max: float = np.inf) -> tuple[F64, I32]:
-    """First triangle that each ray meets, from either side.
+    """First triangle that each ray meets, from either side [Moller1997].
 
     tree       : TriangleTree
-    origins    : (n, 3) float64, mm
-    directions : (n, 3) float64, or (3,) for all rays; not zero. t counts in their lengths: mm for unit vectors
-    t_min      : float, hits nearer than this are passed over (an offset for rays that start on the mesh)
-    t_max      : float, hits farther than this do not count
+    origins    : (n, 3) float64, mm, frame of the mesh
+    directions : (n, 3) float64, or (3,) for all rays, frame of the mesh; not zero. t counts in their lengths: mm for
+                 unit vectors
+    t_min      : float, nearer hits do not count (an offset for rays that start on the mesh)
+    t_max      : float, farther hits do not count
 
     Returns
     -------
@@ -31,7 +32,7 @@ def first_hits(tree: TriangleTree, origins: ArrayLike, directions: ArrayLike, t_
     Raises
     ------
     GeometryError
-        Arrays of another shape, not finite, or a direction of zero; the subjects name what.
+        Code 'bad_array': another shape, a value that is not finite, or a direction of zero. The subjects name which.
 
     Notes
     -----

@@ -1,9 +1,9 @@
 """Outlines of bodies of revolution: lines and arcs from the tip outwards and upwards.
 
-A tool is turned: its half section is a chain of lines and arcs. What a drop meets of it is, at each radius, the lowest
-point there: the *lower outline*. Where that bends upwards all the way it is one convex body; where it bends down (a
-step to the shank, a cone that ends in a wider collar) another body begins, flat-bottomed from the axis to there, which
-adds nothing to the tool. So any tool is a stack of convex bodies, and its tip is the highest that one of them asks for.
+The half section of a tool is a chain of lines and arcs. In a drop only the lowest point at each radius can touch: the
+*lower outline*. Where it bends upwards all the way, the tool is one convex body. Where it bends down (a step to the
+shank, a cone that ends in a wider collar), another body begins. That body has a flat bottom from the axis to there,
+which adds nothing to the tool. So any tool is a stack of convex bodies, and its tip is the highest tip of any of them.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from geometry.kernels.outline import Stack
 from geometry.mesh import F64
 
 BOWLS = 256  # paraboloids below an outline, evenly spread over the radius
-STEEPEST = 5.0  # slope of a paraboloid at its radius: at the rim the outline may be upright
-SAMPLES = 4096  # places at which they are held below it
-LEAST = 1e-9  # mm a radius has to grow by to be wider
-CHORD = 1e-3  # mm by which chords of a hollow arc may stand out of it
+STEEPEST = 5.0  # largest slope of a paraboloid at its radius: at the rim the outline may be upright
+SAMPLES = 4096  # places at which the paraboloids are kept below the outline
+MIN_GROWTH = 1e-9  # mm, least growth of a radius that counts as wider
+CHORD = 1e-3  # mm, largest distance of a chord from its hollow arc
 
 
 @dataclass(frozen=True)
-class Line:
+class OutlineLine:
     """A straight piece to (rho, z), mm."""
 
     rho: float
@@ -34,7 +34,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Arc:
+class OutlineArc:
     """A piece of a circle to (rho, z) round ``centre`` (rho, z), mm; bulging outwards unless ``hollow``."""
 
     rho: float
@@ -47,8 +47,9 @@ class Arc:
 class Outline:
     """Half section of a tool from its tip, which is at (0, 0) or on the level z = 0.
 
-    pieces : Line and Arc in order, each from the end of the one before, the first from (0, 0); z never falls, rho may
-             (what is above a wider place is not met). After the last piece the tool goes on upwards as a cylinder.
+    pieces : OutlineLine and OutlineArc in order, each from the end of the one before, the first from (0, 0). z never
+             falls; rho may fall, and a drop does not meet what lies above a wider place. After the last piece the tool
+             goes on upwards as a cylinder.
 
     Raises
     ------
@@ -57,17 +58,17 @@ class Outline:
         piece.
     """
 
-    pieces: tuple[Line | Arc, ...]
+    pieces: tuple[OutlineLine | OutlineArc, ...]
 
     def __post_init__(self) -> None:
         at = (0.0, 0.0)
         for k, p in enumerate(self.pieces):
-            numbers = (p.rho, p.z, *(p.centre if isinstance(p, Arc) else ()))
+            numbers = (p.rho, p.z, *(p.centre if isinstance(p, OutlineArc) else ()))
             if not all(map(math.isfinite, numbers)) or p.rho < 0.0:
                 raise _wrong(k, f"has the end ({p.rho}, {p.z}) mm", "finite, rho >= 0")
-            if p.z < at[1] - LEAST:
+            if p.z < at[1] - MIN_GROWTH:
                 raise _wrong(k, f"falls from z = {at[1]} to {p.z} mm", "z never falls")
-            if isinstance(p, Arc):
+            if isinstance(p, OutlineArc):
                 a, b = math.dist(at, p.centre), math.dist((p.rho, p.z), p.centre)
                 if abs(a - b) > 1e-6 * max(a, b) or a <= 0.0:
                     raise _wrong(k, f"begins {a} mm and ends {b} mm from its centre", "one radius")
@@ -80,8 +81,8 @@ class Outline:
     @lru_cache(maxsize=64)
     def bull(cls, radius: float, corner_radius: float) -> Outline:
         """A ball (corner_radius = radius), a flat end (0) or a bull nose, mm; the same object for the same radii."""
-        flat = (Line(radius - corner_radius, 0.0),) if radius > corner_radius else ()
-        arc = (Arc(radius, corner_radius, (radius - corner_radius, corner_radius)),) if corner_radius else ()
+        flat = (OutlineLine(radius - corner_radius, 0.0),) if radius > corner_radius else ()
+        arc = (OutlineArc(radius, corner_radius, (radius - corner_radius, corner_radius)),) if corner_radius else ()
         return cls((*flat, *arc))
 
     @property
@@ -90,17 +91,17 @@ class Outline:
         return max((p.rho for p in self._cut), default=0.0)
 
     @cached_property
-    def _cut(self) -> list[Line | Arc]:
+    def _cut(self) -> list[OutlineLine | OutlineArc]:
         """Pieces with hollow arcs as chords outside of them, arcs cut where they are widest."""
-        out: list[Line | Arc] = []
+        out: list[OutlineLine | OutlineArc] = []
         at = (0.0, 0.0)
         for p in self.pieces:
-            if isinstance(p, Arc):
+            if isinstance(p, OutlineArc):
                 c, a = p.centre, math.dist(at, p.centre)
                 if p.hollow:
                     out += _chords(at, p)
-                elif p.z > c[1] + LEAST:  # goes on above its widest place: what is there is not met
-                    out.append(Arc(c[0] + a, c[1], c))
+                elif p.z > c[1] + MIN_GROWTH:  # the arc goes on above its widest place, where a drop does not meet it
+                    out.append(OutlineArc(c[0] + a, c[1], c))
                 else:
                     out.append(p)
             else:
@@ -117,8 +118,8 @@ class Outline:
         rows: list[F64] = []
         offset = 0.0
         for p in self._cut:
-            if p.rho > widest + LEAST:
-                begin = (rho, z) if rho >= widest - LEAST else _where(rho, z, p, widest)
+            if p.rho > widest + MIN_GROWTH:
+                begin = (rho, z) if rho >= widest - MIN_GROWTH else _where(rho, z, p, widest)
                 row = _row(begin, p)
                 if rows and row[4] < steepest - 1e-9:
                     bodies.append((offset, rows))
@@ -131,8 +132,8 @@ class Outline:
                 row[7] -= offset if row[8] > 0.0 else 0.0
                 rows.append(row)
                 widest, steepest = p.rho, float(row[5])
-            elif p.z > z + LEAST and rho >= widest - LEAST:
-                steepest = 1.0  # an upright stretch: whatever widens above it is another body
+            elif p.z > z + MIN_GROWTH and rho >= widest - MIN_GROWTH:
+                steepest = 1.0  # an upright stretch: a wider place above it belongs to another body
             rho, z = p.rho, p.z
         bodies.append((offset, rows))
         tables = [np.array(r) for _, r in bodies]
@@ -141,14 +142,14 @@ class Outline:
                      np.array([o for o, _ in bodies]))
 
 
-def _wrong(k: int, what: str, limit: str) -> SetupError:
-    return SetupError(f"piece {k + 1} of the outline {what}", code="bad_cutter", subjects=(f"piece {k + 1}",),
+def _wrong(k: int, fault: str, limit: str) -> SetupError:
+    return SetupError(f"piece {k + 1} of the outline {fault}", code="bad_cutter", subjects=(f"piece {k + 1}",),
                       limit=limit, remedy="give the half section from the tip upwards in mm")
 
 
-def _row(begin: tuple[float, float], p: Line | Arc) -> F64:
+def _row(begin: tuple[float, float], p: OutlineLine | OutlineArc) -> F64:
     """One piece from ``begin`` on as a row for the kernels, z as it stands."""
-    if isinstance(p, Arc):
+    if isinstance(p, OutlineArc):
         (c, level), a = p.centre, math.dist(begin, p.centre)
         sines = [min(max((rho - c) / a, 0.0), 1.0) for rho in (begin[0], p.rho)]
         return np.array([begin[0], p.rho, begin[1], p.z, *sines, c, level, a])
@@ -157,23 +158,23 @@ def _row(begin: tuple[float, float], p: Line | Arc) -> F64:
     return np.array([begin[0], p.rho, begin[1], p.z, sine, sine, 0.0, 0.0, 0.0])
 
 
-def _where(rho: float, z: float, p: Line | Arc, widest: float) -> tuple[float, float]:
+def _where(rho: float, z: float, p: OutlineLine | OutlineArc, widest: float) -> tuple[float, float]:
     """Where a piece from (rho, z) passes a radius."""
-    if isinstance(p, Arc):
+    if isinstance(p, OutlineArc):
         (c, level), a = p.centre, math.dist((rho, z), p.centre)
         return widest, level - math.sqrt(max(a * a - (widest - c) ** 2, 0.0))
     return widest, z + (p.z - z) * (widest - rho) / (p.rho - rho)
 
 
-def _chords(at: tuple[float, float], p: Arc) -> list[Line | Arc]:
+def _chords(at: tuple[float, float], p: OutlineArc) -> list[OutlineLine | OutlineArc]:
     """A hollow arc as chords, which lie in the tool's air: the tool becomes larger by at most CHORD."""
     (c, level), a = p.centre, math.dist(at, p.centre)
     begin, end = (math.atan2(z - level, rho - c) for rho, z in (at, (p.rho, p.z)))
     turn = math.remainder(end - begin, 2 * math.pi)
     n = max(1, math.ceil(abs(turn) / (2 * math.acos(max(1.0 - CHORD / a, 0.0)))))
     angles = begin + turn * np.arange(1, n) / n
-    inner = [Line(c + a * math.cos(t), level + a * math.sin(t)) for t in angles.tolist()]
-    return [*inner, Line(p.rho, p.z)]
+    inner = [OutlineLine(c + a * math.cos(t), level + a * math.sin(t)) for t in angles.tolist()]
+    return [*inner, OutlineLine(p.rho, p.z)]
 
 
 def _bowls(table: F64) -> F64:
@@ -202,7 +203,13 @@ def _bowls(table: F64) -> F64:
 
 
 def heights(table: F64, rho: F64) -> F64:
-    """h at radii rho (any shape) float64, mm, within those of one body; table (k, 9), its rows for the kernels."""
+    """Height h of the outline of one body at radii, mm.
+
+    table : (k, 9) float64, mm, rows of the body for the kernels, in the plane of the half section
+    rho   : float64 of any shape such as (n,), mm, radii within those of the body
+
+    Returns float64 of the shape of rho, mm.
+    """
     k = np.minimum(np.searchsorted(table[:, 1], rho), len(table) - 1)
     s = table[k]
     t = np.clip(rho, s[..., 0], s[..., 1])

@@ -1,7 +1,7 @@
 """Whether a body of revolution enters a mesh along any axis, without turning the mesh or building its tree again.
 
-A tool of several bodies (cutting part, shank, holder) is asked for in one walk. Every body goes on along its axis
-without end, as in ``geometry.mesh_queries.drop``: the machine stands there. Theory: docs/theory/approach.md.
+One walk answers for all bodies of a tool (cutting part, shank, holder). Every body goes on along its axis without end,
+as in ``geometry.mesh_queries.drop``: the machine stands there. Theory: docs/theory/approach.md.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 def axis_frames(axes: ArrayLike) -> F64:
     """A frame for each axis, its z along the axis.
 
-    axes : (d, 3) float64, any length but zero, in the frame of the part
+    axes : (d, 3) float64, dimensionless, any length but zero, in the frame of the part
 
     Returns
     -------
@@ -41,7 +41,7 @@ def axis_frames(axes: ArrayLike) -> F64:
         row = int(np.flatnonzero(length == 0.0)[0])
         raise GeometryError(f"axes[{row}] is zero", code="bad_array", subjects=(f"axes[{row}]",))
     unit = way / length[:, None]
-    flip = np.where(unit[:, 2:] < 0.0, [1.0, -1.0, -1.0], 1.0)  # what points down is turned about X first
+    flip = np.where(unit[:, 2:] < 0.0, [1.0, -1.0, -1.0], 1.0)  # an axis that points down is turned about X first
     x, y, z = (unit * flip).T
     f = 1.0 / (1.0 + z)
     out = np.empty((len(unit), 3, 3))
@@ -58,21 +58,21 @@ def blocked_along(tree: TriangleTree, frames: ArrayLike, which: ArrayLike, tips:
     """Whether a tool enters the mesh, each time along its own axis.
 
     tree   : TriangleTree in the frame of the part
-    frames : (d, 3, 3) float64, rotations as of ``axis_frames``
-    which  : (n,) int, the frame each tip is given in
+    frames : (d, 3, 3) float64, dimensionless, rotations as of ``axis_frames``
+    which  : (n,) int, index of the frame each tip is given in
     tips   : (n, 3) float64, mm, in that frame, whose z is the tool axis
     bodies : (k, 3) float64, mm: radius, corner radius, height of the body's lower end above the tip
 
     Returns
     -------
     (n,) bool
-        True where some body would have to be lifted by more than 1e-9 mm along the axis to be free: for each what
-        ``geometry.mesh_queries.drop.blocked_many`` says of the turned mesh, to rounding.
+        True where some body has to be lifted by more than 1e-9 mm along the axis to be free. That is, to rounding, the
+        answer of ``geometry.mesh_queries.drop.blocked_many`` for the turned mesh.
 
     Raises
     ------
     GeometryError
-        Arrays of another shape, not finite, a frame that does not exist, or radii no body has.
+        An array has another shape or is not finite, a frame does not exist, or radii contradict each other.
     """
     turns = np.ascontiguousarray(frames, dtype=np.float64)
     points, rows = finite_points(tips, 3, "tips"), finite_points(bodies, 3, "bodies")

@@ -1,4 +1,4 @@
 """Four-sided grids and smooth maps on trimmed faces, so that passes can run along parameters.
 
-No tool and no tool path is known here.
+Tools and tool paths do not belong here.
 """

@@ -15,8 +15,8 @@ from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.parameterization.quad_grid import corner_jacobians
 
-FINER = 4  # places a cell, each way, at which the map is looked at for folds
-STRAIGHT = 0.05  # of the mean: at a corner of the square where the border goes straight on, the map may be as flat
+FINER = 4  # places a cell, each way, at which the map is checked for folds
+STRAIGHT = 0.05  # of the mean: largest flatness allowed at a corner of the square where the border goes straight on
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,10 @@ class GridMap:
 
     @classmethod
     def of(cls, grid: F64) -> GridMap:
-        """The map through a grid (m, n, 2) of parameters, m and n at least 4, which lies counterclockwise.
+        """The map through a grid of parameters.
+
+        grid : (m, n, 2) float64, (u, v) in the plane of the parameters, dimensionless; m and n at least 4,
+               counterclockwise
 
         Raises
         ------
@@ -59,19 +62,25 @@ class GridMap:
         return out
 
     def __call__(self, xi: F64, eta: F64) -> F64:
-        """(p, 2) float64, (u, v) at xi and eta, both (p,)."""
+        """Parameters at places of the unit square: (p, 2) float64, (u, v), dimensionless; xi, eta : (p,) float64."""
         x, y = self._within(xi, eta)
         return np.column_stack([self.u.ev(y, x), self.v.ev(y, x)])
 
     def tangents(self, xi: F64, eta: F64) -> tuple[F64, F64]:
-        """Derivatives of (u, v) along xi and along eta at xi and eta, both (p, 2) float64, parameters by 1."""
+        """Derivatives of (u, v) along xi and along eta, each (p, 2) float64, dimensionless, parameters of the surface.
+
+        xi, eta : (p,) float64, dimensionless, places of the unit square
+        """
         x, y = self._within(xi, eta)
         wide, tall = (b - a for a, b in zip(self.low, self.high, strict=True))
         along = np.column_stack([self.u.ev(y, x, dy=1), self.v.ev(y, x, dy=1)])
         return wide * along, tall * np.column_stack([self.u.ev(y, x, dx=1), self.v.ev(y, x, dx=1)])
 
     def part(self, low: F64, high: F64) -> GridMap:
-        """The map of what lies between two corners of this one, low and high (2,) xi and eta, as a unit square."""
+        """The part of this map between two corners, as a map of the whole unit square.
+
+        low, high : (2,) float64, dimensionless, xi and eta of the two corners in the unit square
+        """
         x, y = self._within(*np.stack([low, high], axis=1))
         return replace(self, low=(float(x[0]), float(y[0])), high=(float(x[1]), float(y[1])))
 

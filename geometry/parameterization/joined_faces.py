@@ -1,13 +1,13 @@
 """Several faces that join smoothly, as one region of a plane.
 
-Their facets are laid into a plane so that angles change as little as they can (least squares conformal maps: Lévy,
-Petitjean, Ray and Maillot 2002): of all ways to lay a sheet of triangles down, with two places held, the one for which
+Least squares conformal maps [Levy2002] lay their facets into a plane so that angles change least. Two places are fixed.
+Of all maps of the sheet of triangles into the plane, the one is taken for which
 
     sum over triangles of |W1 U1 + W2 U2 + W3 U3|² / 2 A      is least,
 
-U the corners as complex numbers, W the opposite sides of the triangle in its own plane. What is one region there is
-squared like the parameters of a face (``geometry.parameterization.square_patches``), and each place goes back through its facet to the nearest
-place of the exact surface.
+U the corners as complex numbers, W the opposite sides of the triangle in its own plane. The region there is mapped to
+squares like the parameters of a face (``geometry.parameterization.square_patches``). Each place goes back through its
+facet to the nearest place of the exact surface.
 
 Notation
     k, t : corners and triangles of the facets
@@ -33,8 +33,8 @@ from geometry.parameterization.planar_embedding import located
 from geometry.surfaces.foot_points import foot_points
 from geometry.surfaces.nurbs import NurbsSurface
 
-MOST_STRETCHED = 3.0  # lengths in the plane: least to greatest; more, and passes would be nowhere near even
-ROUGH = 1e-9  # of the size: sides of a triangle that are shorter are none
+MAX_STRETCH = 3.0  # ratio of greatest to least scale of lengths in the plane; above it passes are far from even
+ROUGH = 1e-9  # of the largest area: smaller triangles do not count
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,17 +56,17 @@ class Joined:
 
     @classmethod
     def of(cls, mesh: TriangleMesh, uv: F64, surfaces: Mapping[int, NurbsSurface]) -> Joined:
-        """Faces of a part as one sheet.
+        """Faces of a part as one sheet in a plane, by least squares conformal maps [Levy2002].
 
         mesh     : TriangleMesh of a part, its corners shared between faces
         uv       : (m, 3, 2) float64, parameters on ``surfaces`` of the corners of every facet of the mesh
-        surfaces : by the numbers of the faces that are wanted
+        surfaces : NurbsSurface of each wanted face, by its number
 
         Raises
         ------
         GeometryError
-            Code 'not_a_sheet': the faces do not hang together, or have a hole, or close round something; 'not_flat':
-            they bend so much that laid into a plane they fold or stretch three times more in one place than another.
+            Code 'not_a_sheet': the faces are not connected, have a hole, or close up. Code 'not_flat': in the plane
+            they fold, overlap, or stretch three times more in one place than in another.
         """
         rows = np.flatnonzero(np.isin(mesh.face_ids, list(surfaces)))
         used, corners = np.unique(mesh.faces[rows], return_inverse=True)
@@ -78,13 +78,19 @@ class Joined:
         return cls(surfaces, own, uv[rows], plane, plane[loop])
 
     def places(self, at: F64) -> F64:
-        """The places (n, 3) mm of the exact faces that lie at places (n, 2) mm of the plane."""
+        """Places of the exact faces, (n, 3) float64, mm, frame of the mesh.
+
+        at : (n, 2) float64, mm, places in the plane
+        """
         row, share = located(self.plane, self.mesh.faces, at)
         return self._feet(np.einsum("nk,nkc->nc", share, self.mesh.vertices[self.mesh.faces[row]]), row,
                           np.einsum("nk,nkc->nc", share, self.uv[row]))[0]
 
     def feet(self, points: F64) -> tuple[F64, F64]:
-        """Places (n, 3) mm of the exact faces nearest to points (n, 3) mm close by, and unit normals (n, 3) there."""
+        """Nearest places of the exact faces, (n, 3) mm, and unit normals there, (n, 3), float64, frame of the mesh.
+
+        points : (n, 3) float64, mm, frame of the mesh, close to the faces
+        """
         _, row, foot = nearest(self._tree, points)
         a, b, c = (self.mesh.vertices[self.mesh.faces[row, k]] for k in range(3))
         u, v, w = b - a, c - a, foot - a
@@ -123,12 +129,12 @@ def _border(faces: NDArray[np.int32], count: int, names: tuple[str, ...]) -> NDA
     sheet = count - edges + len(faces) == 1 and len(loop) == len(following) == int(rim.sum())
     if not sheet:
         raise GeometryError(f"{' '.join(names)} are not one sheet with one border", code="not_a_sheet", subjects=names,
-                            measured=count - edges + len(faces), limit=1, remedy="take them one by one")
+                            measured=count - edges + len(faces), limit=1, remedy="machine the faces one by one")
     return np.array(loop)
 
 
 def _laid_flat(vertices: F64, faces: NDArray[np.int32], loop: NDArray[np.int64], names: tuple[str, ...]) -> F64:
-    """(k, 2) mm, the corners in a plane, as far apart all in all as on the sheet."""
+    """(k, 2) mm, the corners in a plane, scaled so that the total area is that of the sheet."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     u, v = b - a, c - a
     long = np.linalg.norm(u, axis=1)
@@ -150,13 +156,13 @@ def _laid_flat(vertices: F64, faces: NDArray[np.int32], loop: NDArray[np.int64],
     p, q, r = (out[faces[:, k]] for k in range(3))
     laid = 0.5 * ((q - p).conj() * (r - p)).imag
     ratio = laid[whole] / area[whole]
-    if not (np.isfinite(ratio).all() and ratio.min() > 0.0 and ratio.max() < MOST_STRETCHED**2 * ratio.min()):
+    if not (np.isfinite(ratio).all() and ratio.min() > 0.0 and ratio.max() < MAX_STRETCH**2 * ratio.min()):
         stretch = float(np.sqrt(ratio.max() / ratio.min())) if ratio.min() > 0.0 else float("inf")
-        raise GeometryError(f"{' '.join(names)} cannot be laid into a plane without folds or much stretch",
-                            code="not_flat", subjects=names, measured=stretch, limit=MOST_STRETCHED,
-                            remedy="take them one by one")
+        raise GeometryError(f"{' '.join(names)} cannot be laid into a plane without folds or large stretch",
+                            code="not_flat", subjects=names, measured=stretch, limit=MAX_STRETCH,
+                            remedy="machine the faces one by one")
     plane = np.column_stack([out.real, out.imag]) * np.sqrt(area.sum() / laid.sum())
     if not shapely.Polygon(plane[loop]).is_valid:
         raise GeometryError(f"{' '.join(names)} overlap themselves when laid into a plane", code="not_flat",
-                            subjects=names, measured=1, limit=0, remedy="take them one by one")
+                            subjects=names, measured=1, limit=0, remedy="machine the faces one by one")
     return plane

@@ -1,11 +1,11 @@
-"""Re-parameterisation by Laplace's equation (papers/000, equations 2.1 to 2.5).
+"""Re-parameterisation by Laplace's equation [Sarkar2015, equations 2.1 to 2.5].
 
-xi and eta are harmonic in the plane of the region. Turned round, places obey
+xi and eta are harmonic in the plane of the region. Inverted, the places obey
 
     a r_xixi - 2 b r_xieta + c r_etaeta = 0,   a = |r_eta|²,  b = r_xi . r_eta,  c = |r_xi|²
 
-The coefficients are held while one sparse system is solved for both coordinates, then taken anew, until places move no
-more. The continuous map onto the square is one to one; the discrete one folds at re-entrant corners (see ``folds``).
+Each round fixes the coefficients and solves one sparse system for both coordinates. The rounds end when no place moves.
+The continuous map onto the square is one to one. The discrete map folds at re-entrant corners (see ``folds``).
 """
 
 from __future__ import annotations
@@ -18,18 +18,19 @@ from geometry.mesh import F64
 from geometry.parameterization.quad_grid import Quad, coons
 
 SETTLED = 1e-9  # of the size of the region
-MOST_ROUNDS = 100
+MAX_ROUNDS = 100
 
 
 def laplace(quad: Quad) -> tuple[F64, int]:
-    """The grid of a region by Laplace's equation, from the Coons patch on.
+    """The grid of a region by Laplace's equation [Sarkar2015, equations 2.1 to 2.5; Thompson1985].
 
-    Returns the grid, (m, n, 2) float64 in mm, and the number of systems solved; at most 100, settled or not.
+    The first grid is the Coons patch. Returns the grid, (m, n, 2) float64, mm, in the plane of the region, and the
+    number of systems solved. There are at most 100 rounds, even where places still move.
     """
     grid = coons(quad)
     size = float(np.ptp(grid.reshape(-1, 2), axis=0).max())
     moved, count = np.inf, 0
-    while moved > SETTLED * size and count < MOST_ROUNDS:
+    while moved > SETTLED * size and count < MAX_ROUNDS:
         inner = _solved(grid)
         moved = float(np.abs(inner - grid[1:-1, 1:-1]).max(initial=0.0))
         grid[1:-1, 1:-1] = inner
@@ -38,7 +39,7 @@ def laplace(quad: Quad) -> tuple[F64, int]:
 
 
 def _solved(grid: F64) -> F64:
-    """Inner places (m - 2, n - 2, 2), mm, with the coefficients of the grid as it stands."""
+    """Inner places (m - 2, n - 2, 2), mm, with the coefficients of the given grid."""
     m, n, _ = grid.shape
     x, y = n - 1.0, m - 1.0  # central differences in unit square coordinates
     r_x, r_y = 0.5 * x * (grid[1:-1, 2:] - grid[1:-1, :-2]), 0.5 * y * (grid[2:, 1:-1] - grid[:-2, 1:-1])

@@ -1,11 +1,11 @@
-"""Re-parameterisation by boundary interpolation (papers/000, equations 2.6 to 2.16), mended.
+"""Re-parameterisation by boundary interpolation [Sarkar2015, equations 2.6 to 2.16], with corrections.
 
-Two fronts start at opposite sides and move towards each other, point by point, partly along their normals and more and
-more straight at each other. A front moves faster out of its notches and slower off its peaks, so it smooths out.
+Two fronts start at opposite sides and move towards each other. Each point moves partly along its normal, and more and
+more straight at the other front. A front moves faster out of its notches and slower off its peaks, so it smooths out.
 
-As printed the fronts need not meet, leave the other two sides and bunch up in valleys. So the correction of the way
-fades to 1 as they near, the ends are held on the sides and what they were off is shared along the front, and the points
-of a front are spread evenly along it after every step.
+As printed, the fronts may fail to meet, leave the other two sides, and bunch up in valleys. Three changes prevent this:
+the correction of the step fades to 1 as the fronts approach; the ends stay on the sides, with their shift shared along
+the front; and after every step the points are spread evenly along the front.
 """
 
 from __future__ import annotations
@@ -18,12 +18,15 @@ from geometry.mesh import F64
 from geometry.parameterization.quad_grid import Quad, even
 
 SHARPNESS, POWER = 1.0, 50.0
-"""gamma of 2.13 and p of 2.15: from 0.5 to 1, and from 50 to 100, the grids are the same to the eye."""
+"""gamma of equation 2.13 and p of 2.15. From 0.5 to 1, and from 50 to 100, the grids look the same."""
 _T = math.tanh(math.pi**2 / 12.0)
 
 
 def interpolated(quad: Quad, power: float = POWER, sharpness: float = SHARPNESS) -> F64:
-    """The grid of a region by fronts from its bottom and its top: (m, n, 2) float64, mm."""
+    """The grid of a region by fronts from its bottom and its top [Sarkar2015, equations 2.6 to 2.16].
+
+    Returns (m, n, 2) float64, mm, in the plane of the region.
+    """
     m, n = quad.shape
     q = (m - 1) // 2 if m % 2 else m // 2 - 1
     grid, x = quad.frame(), np.linspace(0.0, 1.0, n)[:, None]
@@ -50,9 +53,11 @@ def interpolated(quad: Quad, power: float = POWER, sharpness: float = SHARPNESS)
 
 
 def correction(angle: F64, sharpness: float = SHARPNESS) -> F64:
-    """How much faster a place of a front moves, 1 where it is straight (2.13).
+    """Factor on the speed of a place of a front, 1 where the front is straight [Sarkar2015, equation 2.13].
 
     angle : (n,) float64, rad, 0 to 2 pi, between the two edges of the front on the side it moves to
+
+    Returns (n,) float64, dimensionless.
     """
     base = -np.tanh(angle**3 / (12.0 * np.pi)) + (angle - np.pi) / np.pi * (0.4 - _T) + 1.0 + _T
     return np.asarray(base**sharpness)
@@ -85,5 +90,5 @@ def _heading(front: F64, side: float, straight: F64, f: float) -> F64:
 
 
 def _held(front: F64, start: F64, end: F64, x: F64) -> F64:
-    """A front (n, 2) with its ends put on start and end (2,), mm, the change shared along it, and spread evenly."""
+    """A front (n, 2), mm, with its ends moved to start and end (2,), the shift shared along it, and even spacing."""
     return even(front + (1.0 - x) * (start - front[0]) + x * (end - front[-1]), len(front))

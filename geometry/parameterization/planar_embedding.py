@@ -1,10 +1,10 @@
 """Re-parameterisation that cannot fold: a triangulated region laid into the unit square.
 
-The border goes onto the sides of the square by its length, and every inner place becomes a mean of its neighbours with
-positive weights; then no triangle turns over (Tutte 1963, Floater 1997: the square is convex). Mean value weights make
-that nearly harmonic on the surface the triangles lie on. So where the surface is stretched against the square, the
-weights towards stretched places are lowered and it is laid out again, as long as that makes it evener (Yoshizawa,
-Belyaev and Seidel 2004): still positive, still no fold, and what bulges inwards crowds no more.
+The border goes onto the sides of the square by its length. Every inner place becomes a mean of its neighbours with
+positive weights; then no triangle turns over, because the square is convex [Tutte1963, Floater1997]. Mean value weights
+make the map nearly harmonic on the surface of the triangles [Floater2003]. Where the surface is stretched against the
+square, the weights towards stretched places are lowered and the map is solved again, as long as it becomes more even
+[Yoshizawa2004]. The weights stay positive, so nothing folds, and bulges inwards do not crowd.
 """
 
 from __future__ import annotations
@@ -21,27 +21,27 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.nearest import nearest
 from geometry.parameterization.quad_grid import even
 
-MOST_ROUNDS = 20
-ROUNDS = 12  # of putting places on edges between two places of the border
-LEAST_TURN = 1e-12  # of the mean area in the square: what is less is a triangle laid flat
+MAX_ROUNDS = 20
+ROUNDS = 12  # rounds that put places on edges between two places of the border
+MIN_TURN = 1e-12  # of the mean area in the square: a smaller triangle counts as flat
 
 
 def embedded(vertices: F64, faces: np.ndarray, sides: tuple[np.ndarray, ...]) -> F64:
-    """Places in the unit square of the vertices of a region.
+    """Places in the unit square of the vertices of a region [Tutte1963, Floater1997, Floater2003, Yoshizawa2004].
 
-    vertices : (k, 2) or (k, 3) float64, mm, of a plane region or of a piece of surface, without holes
-    faces    : (m, 3) int, counterclockwise
-    sides    : vertices along bottom, right, top and left, each going on where the last one ends
+    vertices : (k, 2) or (k, 3) float64, mm, of a plane region or of a piece of surface, without holes; any frame
+    faces    : (m, 3) int64, index, counterclockwise
+    sides    : vertices along bottom, right, top and left, each beginning where the one before ends
 
     Returns
     -------
-    (k, 2) float64, xi and eta; every triangle lies counterclockwise
+    (k, 2) float64, dimensionless, xi and eta in the unit square; every triangle lies counterclockwise
 
     Raises
     ------
     GeometryError
-        Code 'flat_triangle': an edge joins two places of one side through the region, so that what it cuts off has no
-        room; the triangulation is to have a place between them.
+        Code 'flat_triangle': an edge joins two places of one side through the region, so that the part it cuts off has
+        no area. The triangulation needs a place between them.
     """
     place = np.full((len(vertices), 2), np.nan)
     corner = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -51,7 +51,7 @@ def embedded(vertices: F64, faces: np.ndarray, sides: tuple[np.ndarray, ...]) ->
     start, end, weight = _mean_values(vertices, faces)
     held = ~np.isnan(place[:, 0])
     best, least = place, np.inf
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         laid = _solved(place, held, start, end, weight)
         stretch, total = _stretch(vertices, faces, laid)
         if not total < least:
@@ -60,7 +60,7 @@ def embedded(vertices: F64, faces: np.ndarray, sides: tuple[np.ndarray, ...]) ->
         weight = weight / stretch[end]
     flat = _turn(best, faces)
     flat = np.where(np.isfinite(flat), flat, -np.inf)
-    if flat.min() <= LEAST_TURN * np.abs(flat).mean():
+    if flat.min() <= MIN_TURN * np.abs(flat).mean():
         worst = int(flat.argmin())
         at = vertices[faces[worst]].mean(axis=0)
         raise GeometryError("a triangle of the region is laid flat on a side of the square", code="flat_triangle",
@@ -73,13 +73,13 @@ def embedded(vertices: F64, faces: np.ndarray, sides: tuple[np.ndarray, ...]) ->
 def triangulated(sides: tuple[F64, ...], spacing: float) -> tuple[F64, np.ndarray, tuple[np.ndarray, ...]]:
     """A plane region as triangles that ``embedded`` takes.
 
-    sides   : bottom, right, top and left, (k, 2) float64, mm, each going on where the last one ends
-    spacing : mm, about, between places
+    sides   : bottom, right, top and left, (k, 2) float64, mm, each beginning where the one before ends
+    spacing : mm, approximate distance between places
 
     Returns
     -------
-    Places (k, 2) float64, mm, triangles (t, 3) int, counterclockwise, and the places along each side. No edge joins two
-    places of the border through the region: where one did, it has a place half way.
+    Places (k, 2) float64, mm, in the plane of the region, triangles (t, 3) int32, index, counterclockwise, and the
+    places along each side. No edge joins two places of the border through the region: it gets a place half way.
     """
     border: list[F64] = []
     rows = []
@@ -103,7 +103,7 @@ def triangulated(sides: tuple[F64, ...], spacing: float) -> tuple[F64, np.ndarra
                                   return_counts=True)
         chords = edges[(edges < count).all(axis=1) & (shared == 2)]
         middle = places[chords].mean(axis=1)
-        # one that is there already was the corner of a triangle without area
+        # a place that exists already was the corner of a triangle without area
         middle = middle[cKDTree(places).query(middle)[0] > 1e-6 * spacing]
         if not len(middle):
             break
@@ -117,29 +117,33 @@ def triangulated(sides: tuple[F64, ...], spacing: float) -> tuple[F64, np.ndarra
 def grid_of(vertices: F64, faces: np.ndarray, laid: F64, n: int, m: int) -> F64:
     """(m, n, d) float64, mm: the places of a region that lie at an even grid of the unit square.
 
-    vertices : (k, d) float64, mm; laid : (k, 2) as ``embedded`` returns it
+    vertices : (k, d) float64, mm, frame of the region
+    faces    : (t, 3) int64, index of the vertices of each triangle, counterclockwise
+    laid     : (k, 2) float64, dimensionless, places in the unit square from ``embedded``
     """
     x, y = np.meshgrid(np.linspace(0.0, 1.0, n), np.linspace(0.0, 1.0, m))
     row, share = located(laid, faces, np.column_stack([x.ravel(), y.ravel()]))
     return np.einsum("ij,ijk->ik", share, vertices[faces[row]]).reshape(m, n, -1)
 
 
-def located(laid: F64, faces: np.ndarray, asked: F64) -> tuple[np.ndarray, F64]:
-    """Where places lie among triangles of a plane.
+def located(laid: F64, faces: np.ndarray, places: F64) -> tuple[np.ndarray, F64]:
+    """Triangle and barycentric coordinates of places among triangles of a plane.
 
-    laid  : (k, 2) float64, mm or unitless, corners
-    faces : (t, 3) int, counterclockwise
-    asked : (n, 2) float64, mm or unitless, places
+    laid   : (k, 2) float64, mm or dimensionless, corners in the plane
+    faces  : (t, 3) int64, index, counterclockwise
+    places : (n, 2) float64, mm or dimensionless, in the same plane
 
     Returns
     -------
-    (n,) int64, the triangle each place lies in, or the nearest one, and (n, 3) float64, its shares of the corners
+    (n,) int64, index of the triangle each place lies in, or the nearest one, and (n, 3) float64, dimensionless, its
+    shares of the corners
     """
     flat = TriangleMesh(np.column_stack([laid, np.zeros(len(laid))]), faces.astype(np.int32),
                         np.zeros(len(faces), np.int32))
-    _, row, _ = nearest(TriangleTree(flat), np.column_stack([asked, np.zeros(len(asked))]))
+    _, row, _ = nearest(TriangleTree(flat), np.column_stack([places, np.zeros(len(places))]))
     a, b, c = (laid[faces[row, k]] for k in range(3))
-    share = np.column_stack([_cross(b - asked, c - asked), _cross(c - asked, a - asked), _cross(a - asked, b - asked)])
+    share = np.column_stack([_cross(b - places, c - places), _cross(c - places, a - places),
+                             _cross(a - places, b - places)])
     return row, share / _cross(b - a, c - a)[:, None]
 
 
@@ -157,33 +161,33 @@ def _mean_values(vertices: F64, faces: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return np.concatenate(start), np.concatenate(end), np.concatenate(weight)
 
 
-def _solved(place: F64, held: np.ndarray, start: np.ndarray, end: np.ndarray, weight: F64) -> F64:
-    """Places (k, 2) with every one that is not held a mean of its neighbours."""
+def _solved(place: F64, fixed: np.ndarray, start: np.ndarray, end: np.ndarray, weight: F64) -> F64:
+    """Places (k, 2) in which every place that is not ``fixed`` is a mean of its neighbours."""
     number = np.full(len(place), -1)
-    number[~held] = np.arange((~held).sum())
-    inner = ~held[start]
+    number[~fixed] = np.arange((~fixed).sum())
+    inner = ~fixed[start]
     i, j, w = number[start[inner]], end[inner], weight[inner]
-    count = int((~held).sum())
+    count = int((~fixed).sum())
     known = np.zeros((count, 2))
-    border = held[j]
+    border = fixed[j]
     np.add.at(known, i[border], w[border, None] * place[j[border]])
     total = np.bincount(i, w, count)
-    total[total == 0.0] = 1.0  # a place in no triangle lies where it likes
+    total[total == 0.0] = 1.0  # a place in no triangle may lie anywhere
     system = coo_matrix((np.concatenate([total, -w[~border]]),
                          (np.concatenate([np.arange(count), i[~border]]),
                           np.concatenate([np.arange(count), number[j[~border]]]))), shape=(count, count)).tocsc()
     out = place.copy()
     try:
-        out[~held] = splu(system).solve(known)
+        out[~fixed] = splu(system).solve(known)
     except RuntimeError as singular:
-        raise GeometryError("triangles of the region hang together with no border", code="flat_triangle",
+        raise GeometryError("some triangles of the region are not connected to its border", code="flat_triangle",
                             subjects=("region",), measured=count, limit=0,
                             remedy="triangulate it as one piece") from singular
     return out
 
 
 def _stretch(vertices: F64, faces: np.ndarray, laid: F64) -> tuple[F64, float]:
-    """How much longer ways are on the surface than in the square: (k,) float64, mm, round each vertex, and over all."""
+    """Stretch of lengths from the square to the surface: (k,) float64, mm, around each vertex, and the total."""
     p, q = vertices[faces], laid[faces]
     u, v = q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]
     turn = np.maximum(_cross(u, v), 1e-100)
@@ -199,7 +203,7 @@ def _stretch(vertices: F64, faces: np.ndarray, laid: F64) -> tuple[F64, float]:
 
 
 def _turn(laid: F64, faces: np.ndarray) -> F64:
-    """(m,) twice the area of each triangle as it is laid; negative where it is turned over."""
+    """(m,) twice the area of each triangle in the square; negative where it is turned over."""
     a, b, c = (laid[faces[:, k]] for k in range(3))
     return _cross(b - a, c - a)
 

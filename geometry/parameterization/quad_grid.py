@@ -1,4 +1,4 @@
-"""Grids on four-sided regions of a plane: their boundaries, how even a grid is, and whether it folds.
+"""Grids on four-sided regions of a plane: their boundaries, evenness and folds. All places lie in the plane, in mm.
 
 Notation
     xi, eta  : coordinates of the unit square; grid[j, i] is the place (mm) at xi = i / (n - 1), eta = j / (m - 1)
@@ -15,7 +15,7 @@ import numpy as np
 from geometry.errors import GeometryError
 from geometry.mesh import F64
 
-SAME = 1e-9  # of the size of a region: ends of sides that are no farther apart are one corner
+SAME = 1e-9  # of the size of a region: ends of sides within this distance are one corner
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Quad:
     def of(cls, sides: tuple[F64, F64, F64, F64], n: int, m: int) -> Quad:
         """Sides of n and m places, evenly along their length.
 
-        sides : bottom, right, top, left as polylines (k, 2), mm, each going on where the last one ends
+        sides : bottom, right, top, left as polylines (k, 2) float64, mm, each beginning where the one before ends
 
         Raises
         ------
@@ -60,14 +60,17 @@ class Quad:
         return len(self.left), len(self.bottom)
 
     def frame(self) -> F64:
-        """(m, n, 2) float64, mm: a grid with its sides filled in and nan inside."""
+        """(m, n, 2) float64, mm: a grid in the plane with its sides filled in and NaN inside."""
         out = np.full((*self.shape, 2), np.nan)
         out[0], out[-1], out[:, 0], out[:, -1] = self.bottom, self.top, self.left, self.right
         return out
 
 
 def even(line: F64, count: int) -> F64:
-    """(count, d) float64: places at even distances along a polyline (k, d), its ends included."""
+    """(count, d) float64, mm: places at even distances along a polyline, its ends included.
+
+    line : (k, d) float64, mm, any frame
+    """
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     at = np.linspace(0.0, way[-1], count)
     out = np.column_stack([np.interp(at, way, column) for column in line.T])
@@ -76,7 +79,7 @@ def even(line: F64, count: int) -> F64:
 
 
 def coons(quad: Quad) -> F64:
-    """(m, n, 2) float64, mm: the sides blended linearly, the corners taken off once."""
+    """(m, n, 2) float64, mm, in the plane: the linear blend of the sides, less that of the corners [Coons1967]."""
     m, n = quad.shape
     x, y = np.linspace(0, 1, n)[None, :, None], np.linspace(0, 1, m)[:, None, None]
     across = (1 - y) * quad.bottom + y * quad.top
@@ -86,25 +89,33 @@ def coons(quad: Quad) -> F64:
 
 
 def corner_jacobians(grid: F64) -> F64:
-    """(m - 1, n - 1, 4) float64, mm²: cross products of the two sides of each cell at each of its corners."""
+    """(m - 1, n - 1, 4) float64, mm²: cross products of the two sides of each cell at each of its corners.
+
+    grid : (m, n, 2) float64, mm, in the plane
+    """
     a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
     return np.stack([_cross(b - a, d - a), _cross(c - b, a - b), _cross(d - c, b - c), _cross(a - d, c - d)], axis=-1)
 
 
 def folds(grid: F64) -> int:
-    """How many cells of a grid (m, n, 2), mm, have a corner at which they are turned over, or flat."""
+    """Count of the cells with a corner at which they are turned over or flat.
+
+    grid : (m, n, 2) float64, mm, in the plane
+    """
     return int((corner_jacobians(grid) <= 0.0).any(axis=2).sum())
 
 
 def areas(grid: F64) -> F64:
-    """(m - 1, n - 1) float64, mm²: areas of the cells of a grid (m, n, 2), mm."""
+    """(m - 1, n - 1) float64, mm²: areas of the cells of a grid, (m, n, 2) float64, mm, in the plane."""
     return np.asarray(0.5 * _cross(grid[1:, 1:] - grid[:-1, :-1], grid[1:, :-1] - grid[:-1, 1:]))
 
 
 def evenness(grid: F64) -> tuple[float, float]:
     """Largest over smallest area of a cell, and of the distance between neighbouring eta-curves; inf where it folds.
 
-    grid : (m, n, 2) float64, mm
+    grid : (m, n, 2) float64, mm, in the plane
+
+    Returns two ratios, dimensionless.
     """
     if folds(grid):
         return np.inf, np.inf

@@ -1,15 +1,15 @@
-"""The four sides of a region: which places of its border are to be corners of the unit square.
+"""The four sides of a region: which places of its border become corners of the unit square.
 
-A border turns by 2 pi in all. Four places are wanted that turn by a right angle each, with little turning left between
-them and opposite sides of like length. Every choice of four from the sharpest places and some evenly along the border
-costs
+A border turns by 2 pi in total. The search looks for four places that turn by a right angle each, with little turning
+between them and opposite sides of similar length. It tries every choice of four from the sharpest places and some
+places evenly along the border. A choice costs
 
     sum over corners ((pi/2 - turn) / (pi/2))²  +  sum over what is left (turn / (pi/2))²
         +  SHAPE (ln² + ln²)  +  ASPECT ln²
 
-with turns outwards counted as they are, turns inwards not at all (a side may have those, a corner may not), and ln of
-the ratios of opposite sides, and of one pair of them to the other. The cheapest is taken. So a triangle gets its fourth
-corner on a side, a pentagon loses its bluntest, a disc is quartered.
+The sum counts turns outwards only: a side may turn inwards, a corner may not. The logarithms are of the ratios of
+opposite sides, and of the ratio of one pair of sides to the other. The cheapest choice wins. So a triangle gets its
+fourth corner on a side, a pentagon loses its bluntest corner, and a disc is cut into quarters.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from geometry.errors import GeometryError
 from geometry.mesh import F64
 
 SHAPE, ASPECT = 0.25, 0.05
-NARROW, WINDOW = 0.004, 0.02  # of the border, to each side, over which a turn is measured: corners, and rounded ones
+NARROW, WINDOW = 0.004, 0.02  # of the border, to each side: a turn is measured over it, at sharp and at rounded corners
 SHARP = np.radians(20.0)
-MOST_SHARP = 14
+MAX_SHARP = 14
 EVENLY = 12  # further places to choose from
 
 
@@ -33,10 +33,10 @@ EVENLY = 12  # further places to choose from
 class Corners:
     """Four corners of a closed border.
 
-    at    : (4,) int64, places of the border, counterclockwise, the first side the one with the least number
+    at    : (4,) int64, index of the places in the border, counterclockwise, the least number first
     turn  : (4,) float64, rad, by which the border turns there, positive outwards
-    sharp : how many places of the border turn outwards by 20 degrees or more
-    cost  : unitless, of the choice
+    sharp : count of the places of the border that turn outwards by 20 degrees or more
+    cost  : dimensionless, of the choice
     """
 
     at: np.ndarray
@@ -45,7 +45,10 @@ class Corners:
     cost: float
 
     def sides(self, border: F64) -> tuple[F64, F64, F64, F64]:
-        """Bottom, right, top and left, each (k, d) float64 from corner to corner, of a border (n, d)."""
+        """Bottom, right, top and left of a border, each (k, d) float64, mm, from corner to corner.
+
+        border : (n, d) float64, mm, in the plane of the parameters or in space
+        """
         n = len(border)
         out = []
         for a, b in zip(self.at.tolist(), np.roll(self.at, -1).tolist(), strict=True):
@@ -56,19 +59,20 @@ class Corners:
 def find_corners(border: F64) -> Corners:
     """The corners of a region.
 
-    border : (n, 2) float64, mm, closed, counterclockwise, the first place not repeated; n at least 4
+    border : (n, 2) float64, mm, in the plane, closed, counterclockwise, the first place not repeated; n at least 4
 
     Raises
     ------
     GeometryError
-        Code 'bad_border': fewer than four places, none without length, or clockwise.
+        Code 'bad_border': fewer than four places, two equal neighbours, or clockwise.
     """
     around = np.vstack([border, border[:1]])
     step = np.linalg.norm(np.diff(around, axis=0), axis=1)
     area = 0.5 * float((around[:-1, 0] * around[1:, 1] - around[1:, 0] * around[:-1, 1]).sum())
     if len(border) < 4 or not (step > 0.0).all() or not area > 0.0:
-        raise GeometryError(f"a border of {len(border)} places and {area:g} mm² is none: four places at least, "
-                            "no two alike, counterclockwise", code="bad_border", measured=area, limit=0.0)
+        raise GeometryError(f"the border has {len(border)} places and {area:g} mm²; it needs at least four places, "
+                            "no two equal neighbours, and a counterclockwise order", code="bad_border", measured=area,
+                            limit=0.0)
     way = np.concatenate([[0.0], np.cumsum(step)])
     chosen, sharp = _candidates(around, way)
     best, cost = None, np.inf
@@ -91,7 +95,7 @@ def find_corners(border: F64) -> Corners:
 
 
 def _turns(around: F64, way: F64, window: float) -> F64:
-    """(n,) float64, rad: by how much the border turns about each place, over a share of it to both sides."""
+    """(n,) float64, rad: turn of the border at each place, over a share of its length to both sides."""
     total = way[-1]
     long = np.concatenate([way[:-1] - total, way, way[1:] + total])
     tour = np.vstack([around[:-1], around, around[1:]])
@@ -105,10 +109,10 @@ def _turns(around: F64, way: F64, window: float) -> F64:
 
 
 def _candidates(around: F64, way: F64) -> tuple[np.ndarray, F64]:
-    """Places to choose from, in order, and by how much the border turns there, rad.
+    """Candidate places in order, and the turn of the border there, rad.
 
-    The sharpest first: by the narrow window, so that the two corners of a narrow end are two; then those that only the
-    wide one sees, which are rounded; then some evenly along the border.
+    The search adds the sharpest places by the narrow window first, so that the two corners of a narrow end count as
+    two. Then it adds rounded corners, which only the wide window sees, and then some places evenly along the border.
     """
     total, s = way[-1], way[:-1]
     out: list[int] = []
@@ -120,12 +124,12 @@ def _candidates(around: F64, way: F64) -> tuple[np.ndarray, F64]:
     for window in (NARROW, WINDOW):
         turn = _turns(around, way, window)
         for k in np.argsort(-turn, kind="stable").tolist():
-            if turn[k] < SHARP or len(out) == MOST_SHARP:
+            if turn[k] < SHARP or len(out) == MAX_SHARP:
                 break
             if apart(k) > 1.5 * window * total:
                 out.append(k)
                 value.append(float(turn[k]))
-    first = s[out[0]] if out else 0.0  # so that it does not matter where the border begins
+    first = s[out[0]] if out else 0.0  # the result does not depend on where the border begins
     evenly = np.searchsorted(s, np.sort((first + np.arange(EVENLY) * total / EVENLY) % total)) % len(s)
     spare = evenly.tolist() if len(s) > 3 * EVENLY else range(len(s))
     for k in spare:

@@ -1,12 +1,14 @@
 """A trimmed region of the parameters of a surface as pieces, each a smooth map of the unit square.
 
-1. Holes are filled: passes go over them, and what has nothing under it is left out where the passes are walked.
-2. A border that turns inwards sharply (an L, a slit) is cut there, straight across to the nearest border: no grid known
-   is free of folds at such a corner (docs/theory/isoparametric.md).
-3. Each piece gets its four corners (``geometry.parameterization.region_corners``) and the first of these grids that does not fold: fronts from
-   two sides, fronts blended with Laplace's grid by a quarter, a half, three quarters, Laplace's, and the triangulated
-   piece laid into the square. Where all fold, turns in count that take more of the border, and it is cut there.
-What was filled, cut, tried and not taken is kept with each piece.
+1. Holes are filled. Passes run over them, and the walk along the passes leaves out stretches without surface.
+2. Where the border turns inwards sharply (an L, a slit), the region is cut straight across to the nearest border. No
+   known grid is free of folds at such a corner (docs/theory/isoparametric.md).
+3. Each piece gets its four corners (``geometry.parameterization.region_corners``) and the first of these grids that
+   does not fold: fronts from two sides; fronts blended with Laplace's grid by a quarter, a half, three quarters;
+   Laplace's grid; the triangulated piece laid into the square. Where all fold, the turn is measured over more of the
+   border, and the piece is cut where that turns inwards.
+
+Each piece keeps notes of filled holes, cuts and rejected grids.
 """
 
 from __future__ import annotations
@@ -28,17 +30,17 @@ from geometry.parameterization.planar_embedding import embedded, grid_of, triang
 from geometry.parameterization.quad_grid import Quad, evenness
 from geometry.parameterization.region_corners import Corners, find_corners
 
-INWARDS = np.radians(50.0)  # a border that turns in by more is cut there
-NEAR = (0.002, 0.01, 0.03)  # of the border, to each side, over which such a turn is measured: first, and if need be
-MOST_CUTS = 24
+INWARDS = np.radians(50.0)  # a border that turns inwards by more is cut there
+NEAR = (0.002, 0.01, 0.03)  # of the border, to each side: such a turn is measured over it, the wider ones if needed
+MAX_CUTS = 24
 BLENDS = (0.25, 0.5, 0.75)
-LEAST_PIECE = 1e-4  # of the region: what is cut off smaller is dust
-TAIL = 0.03  # of the region: a piece that small may be left out where it folds
-THIN = (0.004, 0.008)  # of the border: a tail no wider than twice that
+MIN_PIECE = 1e-4  # of the region: smaller pieces are dropped
+TAIL = 0.03  # of the region: a smaller piece that folds may be left out
+THIN = (0.004, 0.008)  # of the border: half the largest width of a tail
 
 
 class Method(StrEnum):
-    """How a piece was laid into the unit square."""
+    """Method that maps a piece to the unit square."""
 
     FRONTS = "fronts"
     BLEND = "blend"
@@ -52,9 +54,9 @@ class Squared:
 
     map      : GridMap to (u, v)
     method   : Method
-    evenness : largest over smallest area of a cell, and distance of neighbouring lines across, unitless
-    corners  : (4, 2) float64, (u, v), counterclockwise from xi = eta = 0
-    notes    : what was filled, cut or not taken, with figures
+    evenness : ratio of largest to smallest area of a cell, and of the distance of neighbouring lines, dimensionless
+    corners  : (4, 2) float64, parameters (u, v), dimensionless, counterclockwise from xi = eta = 0
+    notes    : filled holes, cuts and rejected grids, with figures
     """
 
     map: GridMap
@@ -66,9 +68,10 @@ class Squared:
 
 def squared(loops: tuple[F64, ...], scale: tuple[float, float], shape: tuple[int, int] = (31, 41),
             only: Method | None = None) -> list[Squared]:
-    """The pieces of a region.
+    """The pieces of a region, each mapped to the unit square, by the grids of [Sarkar2015] where they do not fold.
 
-    loops : closed borders (k, 2) in (u, v), first place not repeated, the outer one first, either way round
+    loops : closed borders (k, 2) float64, parameters (u, v), dimensionless; first place not repeated, the outer border
+            first, in either direction
     scale : mm by 1 of u and of v, so that lengths in the plane are about those on the surface
     shape : places of a grid along eta and along xi
     only  : one method, for comparisons
@@ -76,13 +79,13 @@ def squared(loops: tuple[F64, ...], scale: tuple[float, float], shape: tuple[int
     Returns
     -------
     list of Squared
-        Xi runs along the longer sides. Pieces and thin tails of under 3 % of the area that fold whatever is tried are
-        left out, and the others say so.
+        Xi runs along the longer sides. Pieces and thin tails below 3 % of the area that fold with every method are
+        left out, and the notes of the others name their area.
 
     Raises
     ------
     GeometryError
-        Code 'no_square': a piece folds whatever is tried; 'bad_border' for one that is none.
+        Code 'no_square': a piece folds with every method. Code 'bad_border': a border crosses itself or has no area.
     """
     by = np.asarray(scale, dtype=np.float64)
     notes = [f"{len(loops) - 1} holes filled"] if len(loops) > 1 else []
@@ -108,18 +111,20 @@ def squared(loops: tuple[F64, ...], scale: tuple[float, float], shape: tuple[int
                 raise
             left += piece.area - sum(part.area for part in parts)
             todo[:0] = [(part, k) for part in parts]
-    if left > LEAST_PIECE * outer.area:
-        tails = f"thin tails of {left:.3g} mm², which fold whatever is tried, are left out"
+    if left > MIN_PIECE * outer.area:
+        tails = f"thin tails of {left:.3g} mm² are left out, because they fold with every method"
         out = [replace(piece, notes=(tails, *piece.notes)) for piece in out]
     if len(out) > 1:
-        cut = f"cut into {len(out)} pieces where the border turns in by more than 50 degrees"
+        cut = f"cut into {len(out)} pieces where the border turns inwards by more than 50 degrees"
         out = [replace(piece, notes=(cut, *piece.notes)) for piece in out]
     return out
 
 
 def _smaller(piece: shapely.Polygon, k: int) -> tuple[list[shapely.Polygon], int]:
-    """A piece that folds without its thin tails, or cut where it turns in over more of its border than NEAR[k]; none
-    where there is neither; and the new k."""
+    """A folding piece without its thin tails, or cut by a turn over more of its border than NEAR[k], and the new k.
+
+    The list is empty where the piece has neither.
+    """
     for thin in THIN:
         wide = thin * piece.length
         body = piece.buffer(-wide, join_style="mitre").buffer(wide, join_style="mitre", mitre_limit=10.0)
@@ -134,14 +139,14 @@ def _smaller(piece: shapely.Polygon, k: int) -> tuple[list[shapely.Polygon], int
 
 
 def _ring(piece: shapely.Polygon) -> F64:
-    """(n, 2) border, mm, counterclockwise, no two places alike."""
+    """(n, 2) border, mm, counterclockwise, no two equal places."""
     ring = shapely.get_coordinates(shapely.geometry.polygon.orient(piece).exterior)[:-1]
     apart = np.linalg.norm(ring - np.roll(ring, 1, axis=0), axis=1)
     return np.asarray(ring[apart > 1e-9 * piece.length])
 
 
 def _even_ring(piece: shapely.Polygon, spacing: float) -> F64:
-    """The border with places no farther apart than ``spacing`` mm, those it has among them."""
+    """The border with places no farther apart than ``spacing`` mm, its own places included."""
     ring = _ring(piece)
     edge = np.roll(ring, -1, axis=0) - ring
     count = np.ceil(np.linalg.norm(edge, axis=1) / spacing).astype(np.int64)
@@ -151,13 +156,13 @@ def _even_ring(piece: shapely.Polygon, spacing: float) -> F64:
 
 
 def _cut(region: shapely.Polygon, near: float) -> list[shapely.Polygon]:
-    """The region in pieces none of which turns in sharply; at most 24 cuts."""
+    """The region in pieces without a sharp turn inwards; at most 24 cuts."""
     done: list[shapely.Polygon] = []
     todo = [region]
     while todo:
         piece = todo.pop()
-        cut = _chord(piece, near) if len(done) + len(todo) < MOST_CUTS else None
-        parts = [p for p in split(piece, cut).geoms if p.area > LEAST_PIECE * region.area] if cut is not None else []
+        cut = _chord(piece, near) if len(done) + len(todo) < MAX_CUTS else None
+        parts = [p for p in split(piece, cut).geoms if p.area > MIN_PIECE * region.area] if cut is not None else []
         if len(parts) < 2:
             done.append(piece)
         else:
@@ -166,7 +171,7 @@ def _cut(region: shapely.Polygon, near: float) -> list[shapely.Polygon]:
 
 
 def _chord(piece: shapely.Polygon, near: float) -> shapely.LineString | None:
-    """The shortest of the ways from the sharpest inward turn straight across: on along either side, or between."""
+    """The shortest straight cut from the sharpest inward turn: along either side produced, or between them."""
     ring = _even_ring(piece, 0.25 * near * piece.length)
     way = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
     at = np.concatenate([[0.0], np.cumsum(way)])
@@ -200,7 +205,7 @@ def _chord(piece: shapely.Polygon, near: float) -> shapely.LineString | None:
     return None if best is None else best[1]
 
 
-def _laid(piece: shapely.Polygon, by: F64, shape: tuple[int, int], only: Method | None,
+def _laid(piece: shapely.Polygon, scale: F64, shape: tuple[int, int], only: Method | None,
           notes: tuple[str, ...]) -> Squared:
     """One piece over the unit square, by the first grid that does not fold."""
     m, n = shape
@@ -215,20 +220,20 @@ def _laid(piece: shapely.Polygon, by: F64, shape: tuple[int, int], only: Method 
             continue
         try:
             grid = _grid(method, blend, quad, piece, sides, shape)
-            mapped = GridMap.of(grid / by)
-        except (GeometryError, QhullError) as refusal:  # the latter where places of a sliver lie on one line
+            mapped = GridMap.of(grid / scale)
+        except (GeometryError, QhullError) as refusal:  # QhullError where places of a sliver lie on one line
             tried.append(f"{method}{f' {blend:g}' if method is Method.BLEND else ''}: {refusal}")
             continue
-        return Squared(mapped, method, evenness(grid), grid[[0, 0, -1, -1], [0, -1, -1, 0]] / by,
+        return Squared(mapped, method, evenness(grid), grid[[0, 0, -1, -1], [0, -1, -1, 0]] / scale,
                        (*notes, *tried))
-    middle = (shapely.get_coordinates(piece.representative_point())[0] / by).round(4).tolist()
-    raise GeometryError(f"a piece of a region round uv {middle} folds whatever is tried",
+    middle = (shapely.get_coordinates(piece.representative_point())[0] / scale).round(4).tolist()
+    raise GeometryError(f"a piece of a region around uv {middle} folds with every method",
                         code="no_square", subjects=(f"uv {middle}",), measured=tried, limit=0,
                         remedy="machine it by another strategy")
 
 
 def _along_the_longer(corners: Corners, ring: F64) -> Corners:
-    """The corners turned so that bottom and top are the longer sides."""
+    """The corners in an order that makes bottom and top the longer sides."""
     length = [float(np.linalg.norm(np.diff(s, axis=0), axis=1).sum()) for s in corners.sides(ring)]
     if length[0] + length[2] >= length[1] + length[3]:
         return corners

@@ -1,4 +1,4 @@
-"""The door to STEP files: text checks, the reading child process and the surfaces of its faces.
+"""Import of STEP files: text checks, the reading child process and the surfaces of the faces.
 
 Only ``occ`` below this folder calls the CAD kernel.
 """

@@ -3,7 +3,7 @@
     patches = read_patches("wheel.step", [12, 13])
     patches[12].surface.curvature(patches[12].parameters(part.uv[part.mesh.face_ids == 12].reshape(-1, 2)))
 
-A patch covers the rectangle of parameters its face lies in; the face itself is the part of it that its borders trim.
+A patch covers the rectangle of parameters that its face lies in. The borders of the face trim the patch.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from numpy.typing import ArrayLike
 from geometry.array_checks import finite_points
 from geometry.errors import GeometryError
 from geometry.mesh import F64
-from geometry.setup_frame import Placement
+from geometry.setup_frame import SetupFrame
 from geometry.step_import.reader import ask_reader
 from geometry.surfaces.nurbs import NurbsSurface
 
 
 @dataclass(frozen=True, eq=False)
-class FacePatch:
+class FaceSurface:
     """A face as a NURBS surface over the rectangle of parameters it lies in.
 
     number    : 1-based, the ``12`` of ``F12``, as in ``read_part`` of the same file and solid
     surface   : NurbsSurface, mm, setup frame, its normal out of the material
     box       : (2, 2) float64, least and greatest (u, v) of the face in the parameters of ``Part.uv``
-    angular   : whether u, v are angles (rad) in ``Part.uv``, which arcs written as splines do not keep
+    angular   : whether u, v are angles (rad) in ``Part.uv``; arcs written as splines have other parameters
     deviation : float, mm, largest distance measured between the patch and the surface of the file
     """
 
@@ -48,9 +48,9 @@ class FacePatch:
         return f"F{self.number}"
 
     def parameters(self, uv: ArrayLike) -> F64:
-        """Parameters of the patch where the face has its own.
+        """Parameters of the patch at parameters of the face.
 
-        uv : (n, 2), parameters of the face as in ``Part.uv``
+        uv : (n, 2) float64, parameters of the face as in ``Part.uv``, rad, mm or dimensionless
         Returns (n, 2) float64, parameters for ``surface``.
 
         Notes
@@ -70,8 +70,8 @@ class FacePatch:
 
 
 def read_patches(path: str | os.PathLike[str], faces: Iterable[int] | None = None, *,
-                 placement: Placement | None = None, solid: int | None = None, time_limit: float = 120.0,
-                 memory_limit: float = 6e9) -> dict[int, FacePatch]:
+                 placement: SetupFrame | None = None, solid: int | None = None, time_limit: float = 120.0,
+                 memory_limit: float = 6e9) -> dict[int, FaceSurface]:
     """Faces of one solid of a STEP file as NURBS surfaces.
 
     path         : STEP file
@@ -84,14 +84,14 @@ def read_patches(path: str | os.PathLike[str], faces: Iterable[int] | None = Non
     Returns
     -------
     dict of FacePatch by number, in order
-        Planes, cylinders, cones, spheres, tori and splines are exact; an offset surface, which no spline is, comes as
-        near as ``deviation`` says.
+        Planes, cylinders, cones, spheres, tori and splines are exact. No spline equals an offset surface; its error is
+        ``deviation``.
 
     Raises
     ------
     CamError
-        What ``geometry.step_import.reader.read_part`` raises about the file, its solids and the limits; GeometryError
-        (``no_such_face``).
+        The errors of ``geometry.step_import.reader.read_part`` about the file, its solids and the limits;
+        GeometryError (``no_such_face``).
     """
     request = {"wanted": "patches", "path": os.path.abspath(path), "solid": solid,
                "faces": None if faces is None else [int(f) for f in faces],
@@ -99,7 +99,7 @@ def read_patches(path: str | os.PathLike[str], faces: Iterable[int] | None = Non
     return patches_from_bytes(ask_reader(request, time_limit, memory_limit))
 
 
-def patches_to_bytes(patches: Iterable[FacePatch]) -> bytes:
+def patches_to_bytes(patches: Iterable[FaceSurface]) -> bytes:
     """Patches without pickle (an .npz in memory), for a pipe between processes."""
     about: list[dict[str, Any]] = []
     arrays: dict[str, Any] = {}
@@ -116,7 +116,7 @@ def patches_to_bytes(patches: Iterable[FacePatch]) -> bytes:
     return out.getvalue()
 
 
-def patches_from_bytes(data: bytes) -> dict[int, FacePatch]:
+def patches_from_bytes(data: bytes) -> dict[int, FaceSurface]:
     """The patches that ``patches_to_bytes`` wrote, by number."""
     out = {}
     with np.load(io.BytesIO(data), allow_pickle=False) as z:
@@ -124,7 +124,7 @@ def patches_from_bytes(data: bytes) -> dict[int, FacePatch]:
             n = a["number"]
             surface = NurbsSurface(z[f"control{n}"], z[f"u{n}"], z[f"v{n}"], tuple(a["orders"]),
                                    z[f"weights{n}"] if a["rational"] else None, a["side"])
-            out[n] = FacePatch(n, surface, z[f"box{n}"], tuple(a["angular"]), a["deviation"])
+            out[n] = FaceSurface(n, surface, z[f"box{n}"], tuple(a["angular"]), a["deviation"])
     return out
 
 
@@ -132,4 +132,4 @@ def no_such_face(number: int, count: int) -> GeometryError:
     """The error for a face number out of range."""
     return GeometryError(f"face F{number} does not exist; the solid has {count} faces", code="no_such_face",
                          subjects=(f"F{number}",), measured=number, limit=count,
-                         remedy="number faces as read_part does")
+                         remedy=f"give a number from 1 to {count}")

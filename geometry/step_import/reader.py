@@ -1,9 +1,9 @@
-"""The door from a STEP file to a ``Part``.
+"""Reads a STEP file into a ``Part``.
 
     part = read_part("wheel.step", placement=Placement(z_axis=(0, 1, 0), x_axis=(1, 0, 0)))
 
-The CAD kernel runs in a child process (``geometry.step_import.reader_process``), so a file that crashes it, hangs it or eats
-memory ends as a typed error here. Importing this module does not import the kernel.
+The CAD kernel runs in a child process (``geometry.step_import.reader_process``). So a file that crashes the kernel,
+blocks it or takes too much memory ends as a typed error here. Importing this module does not import the kernel.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from typing import Any
 from geometry.child_process import run_limited
 from geometry.errors import PartError, ResourceError, SetupError
 from geometry.part import Part
-from geometry.setup_frame import Placement
+from geometry.setup_frame import SetupFrame
 
 READER_MODULE = "geometry.step_import.reader_process"
 
 
-def read_part(path: str | os.PathLike[str], *, placement: Placement | None = None, solid: int | None = None,
+def read_part(path: str | os.PathLike[str], *, placement: SetupFrame | None = None, solid: int | None = None,
               chord: float = 0.002, angle: float = 0.2, time_limit: float = 120.0,
               memory_limit: float = 6e9) -> Part:
-    """Read one solid from a STEP file, heal it where that is safe, and mesh it.
+    """Read one solid from a STEP file [ISO10303-21], heal it where that is safe, and mesh it.
 
-    path         : STEP file (ISO 10303-21 clear text); mm, cm, m, inch ... are converted to mm
+    path         : STEP file in clear text; mm, cm, m, inch ... are converted to mm
     placement    : Placement, the setup frame in STEP coordinates (mm); the file's own frame when None
     solid        : int, 1-based number of one of several separate solids; None when there is one
-    chord        : float, mm, largest distance between mesh and exact surface asked for
-    angle        : float, rad, largest turn of the normal between neighbouring mesh points asked for
+    chord        : float, mm, requested limit of the distance between mesh and exact surface
+    angle        : float, rad, requested limit of the turn of the normal between neighbouring mesh points
     time_limit   : float, s of wall time
     memory_limit : float, bytes of resident memory
 
@@ -38,9 +38,9 @@ def read_part(path: str | os.PathLike[str], *, placement: Placement | None = Non
     Raises StepError (``no_file``, ``empty_file``, ``not_step``, ``truncated_step``, ``dangling_reference``,
     ``bad_number``, ``file_too_large``, ``unreadable_step``, ``no_solid``), PartError (``open_shell``,
     ``several_solids``, ``no_such_solid``, ``part_too_small``, ``part_too_large``), SetupError (``bad_placement``,
-    ``bad_tolerance``), GeometryError (``mesh_failed``, ``kernel_failed``). A part that drives the reader over its
-    limits or into a fault is PartError (``reader_timeout``, ``reader_memory``, ``reader_crashed``): it would do so
-    again. A reader killed from outside is ResourceError (``reader_crashed``).
+    ``bad_tolerance``), GeometryError (``mesh_failed``, ``kernel_failed``). A part that exceeds the limits of the reader
+    or crashes it is PartError (``reader_timeout``, ``reader_memory``, ``reader_crashed``), since a retry fails as well.
+    A reader killed from outside is ResourceError (``reader_crashed``).
     """
     check_tolerances(chord, angle)
     request: dict[str, Any] = {"path": os.path.abspath(path), "solid": solid, "chord": chord, "angle": angle,
@@ -49,7 +49,7 @@ def read_part(path: str | os.PathLike[str], *, placement: Placement | None = Non
 
 
 def ask_reader(request: dict[str, Any], time_limit: float, memory_limit: float) -> bytes:
-    """What the child of ``geometry.step_import.reader_process`` answers; limits in s and bytes, errors as ``read_part`` has them."""
+    """Answer of ``geometry.step_import.reader_process``; limits in s and bytes, errors as in ``read_part``."""
     command = [sys.executable, "-m", READER_MODULE]
     try:
         return run_limited(command, json.dumps(request).encode(), time_limit=time_limit, memory_limit=memory_limit)
@@ -58,13 +58,13 @@ def ask_reader(request: dict[str, Any], time_limit: float, memory_limit: float) 
 
 
 def _by_the_part(error: ResourceError) -> ResourceError | PartError:
-    """Whose fault it is that the reader ended: the part's, unless someone else killed the process."""
+    """The error of the part where its file ended the reader; the same error where another process killed the reader."""
     if error.measured == "SIGKILL":
         return error
     remedy = error.remedy
     if error.code in ("reader_timeout", "reader_memory"):
-        remedy = ("send the part alone, without small details such as threads and lettering; a larger "
-                  "quality.scallop_height_mm and gouge_tolerance_mm mesh it more coarsely")
+        remedy = ("send the part alone, without small details such as threads and lettering; larger values of "
+                  "quality.scallop_height_mm and gouge_tolerance_mm give a coarser mesh")
     return PartError(error.message, code=error.code, subjects=error.subjects, measured=error.measured,
                      limit=error.limit, remedy=remedy)
 

@@ -1,6 +1,6 @@
 """Entry of the reader's child process: request on stdin, part, patches or error in the result file.
 
-Kept free of heavy imports at module level so that limits stand before the CAD kernel is loaded.
+The module has no heavy imports at its top, so that limits are set before the CAD kernel is loaded.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ def main() -> int:
 
 
 def _load(request: dict) -> bytes:
-    from geometry.setup_frame import Placement
+    from geometry.setup_frame import SetupFrame
 
     placement = request.pop("placement")
-    where = Placement(**placement) if placement else None
+    where = SetupFrame(**placement) if placement else None
     try:
         if request.pop("wanted", "part") == "patches":
             from geometry.step_import.occ.patches import load_patches
@@ -44,10 +44,10 @@ def _load(request: dict) -> bytes:
     except CamError:
         raise
     except Exception as problem:
-        # pybind registers the kernel's exceptions below Exception; anything else is a bug and shows as a crash
+        # pybind registers the kernel's exceptions below Exception; others are bugs and appear as a crash
         if not type(problem).__module__.startswith("OCP"):
             raise
-        raise GeometryError(f"the CAD kernel gave up: {type(problem).__name__}: {problem}", code="kernel_failed",
+        raise GeometryError(f"the CAD kernel failed: {type(problem).__name__}: {problem}", code="kernel_failed",
                             remedy="export the part again, if possible from another program") from problem
 
 

@@ -1,10 +1,10 @@
-"""What the bytes of a STEP file say before any CAD kernel sees them.
+"""Checks of the text of a STEP file before any CAD kernel reads it.
 
-A kernel that meets a cut-off or foreign file may return an empty shape, a partial one, or crash. These checks
-read the clear-text encoding (ISO 10303-21) itself: header, sections, end mark, references that lead nowhere.
+On a truncated or foreign file a kernel may return an empty shape, a partial one, or crash. These checks read the
+clear-text encoding [ISO10303-21] itself: header, sections, end mark, dangling references.
 
-The text is that of a stranger and may be built to be slow to read: every search here goes over it once. A pattern that
-starts again at each of many places and runs to the end from each takes hours for a few megabytes.
+The text is untrusted and may be built to be slow to read, so every search here passes over it once. A pattern that
+starts again at many places and runs to the end from each takes hours for a few megabytes.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pathlib import Path
 from geometry.errors import StepError
 
 MAX_BYTES = 512 * 1024 * 1024
-# Looking for dangling references costs about 0.1 s a MB; above this size the kernel's own check must do.
+# The search for dangling references takes about 0.1 s a MB. Above this size the kernel's own check must suffice.
 REFERENCE_CHECK_BYTES = 64 * 1024 * 1024
 
 _STRING = re.compile(rb"'[^']*'")
@@ -32,7 +32,7 @@ _PRODUCT = re.compile(rb"=\s*PRODUCT\s*\(\s*'([^']*)'\s*,\s*'([^']*)'")
 # NAN and INF as C printf writes them, 1.#QNAN as older Windows did; a STEP enumeration stands between dots.
 _NOT_FINITE = re.compile(rb"[(,]\s*([-+]?(?:nan|inf|infinity|1\.#(?:inf|ind|[qs]nan))(?:\([^()]*\))?)\s*(?=[,)])",
                          re.IGNORECASE)
-# No coordinate has a three-digit exponent; kernels write such numbers for "unbounded", but not into points.
+# No coordinate has a three-digit exponent. Kernels write such numbers for "unbounded", but not into points.
 _POINT = re.compile(rb"CARTESIAN_POINT\s*\(", re.IGNORECASE)
 _HUGE = re.compile(rb"(?<=[0-9.])E\+?[1-9][0-9]{2,}", re.IGNORECASE)
 _SHOWN = 60  # characters of a number that an error shows
@@ -59,10 +59,10 @@ class StepText:
 
 
 def check_text(path: str | Path, *, max_bytes: int = MAX_BYTES) -> StepText:
-    """Read a STEP file as text and refuse what no kernel should be given.
+    """Read a STEP file as text and refuse files that no kernel should read [ISO10303-21].
 
     path      : file
-    max_bytes : int, largest size accepted
+    max_bytes : int, largest accepted size
 
     Returns StepText.
     Raises StepError with code ``no_file``, ``empty_file``, ``file_too_large``, ``not_step``, ``truncated_step``
@@ -90,7 +90,7 @@ def _read(path: Path, max_bytes: int) -> bytes:
     try:
         size = path.stat().st_size
         if size > max_bytes:
-            raise StepError(f"the STEP file has {size} bytes, more than the {max_bytes} that are accepted",
+            raise StepError(f"the STEP file has {size} bytes, more than the limit of {max_bytes}",
                             code="file_too_large", subjects=(path.name,), measured=size, limit=max_bytes,
                             remedy="export the part alone, without product data and drawings")
         data = path.read_bytes()
@@ -123,7 +123,7 @@ def _check_frame(data: bytes) -> None:
 
 
 def _check_numbers(bare: bytes) -> None:
-    """Refuse numbers that are none: a CAD kernel may take such a point for a place and never come back."""
+    """Refuse NaN, infinite and huge numbers: a CAD kernel may take such a point as valid and never return."""
     found = _NOT_FINITE.search(bare)
     place = found.span(1) if found else _huge_coordinate(bare)
     if place is None:
@@ -131,13 +131,13 @@ def _check_numbers(bare: bytes) -> None:
     owners = _DEFINED.findall(bare, 0, place[0])
     name = f"#{owners[-1][:_SHOWN].decode()}" if owners else "the header"
     value = bare[place[0]:min(place[1], place[0] + _SHOWN)].decode("latin-1")
-    raise StepError(f"{name} of the STEP file holds {value}, which is no place in space", code="bad_number",
+    raise StepError(f"{name} of the STEP file holds {value}, which is not a valid coordinate", code="bad_number",
                     subjects=(name,), measured=value, limit="a finite number below 1E100",
                     remedy=f"repair the shape that {name} belongs to in the CAD program and export the part again")
 
 
 def _huge_coordinate(bare: bytes) -> tuple[int, int] | None:
-    """Where the first number beyond all space stands between a point and the end of its statement."""
+    """Position of the first huge number between a point and the end of its statement."""
     at = 0 if _HUGE.search(bare) else len(bare)
     while point := _POINT.search(bare, at):
         end = bare.find(b";", point.end())
@@ -151,7 +151,7 @@ def _huge_coordinate(bare: bytes) -> tuple[int, int] | None:
 
 
 def _without_comments(text: bytes) -> bytes:
-    """Without what stands between ``/*`` and ``*/``; one that is never closed stays."""
+    """The text without comments between ``/*`` and ``*/``; an unclosed comment stays."""
     kept, at = [], 0
     while (start := text.find(b"/*", at)) >= 0 and (end := text.find(b"*/", start + 2)) >= 0:
         kept.append(text[at:start])
@@ -166,7 +166,7 @@ def _check_references(bare: bytes) -> None:
     lost = sorted(used - defined, key=lambda digits: (len(digits), digits))
     if lost:
         names = tuple(f"#{n[:_SHOWN].decode()}" for n in lost[:10])
-        raise StepError(f"{len(lost)} entities are used but nowhere defined, the first is {names[0]}; part of the file "
+        raise StepError(f"{len(lost)} entities are used but not defined, the first is {names[0]}; part of the file "
                         "is missing", code="dangling_reference", subjects=names, measured=len(lost), limit=0,
                         remedy="transfer or export the file again")
 
@@ -179,9 +179,9 @@ def _format_hint(data: bytes) -> str:
     if data[:2] == b"\x1f\x8b":
         try:
             inner = gzip.GzipFile(fileobj=io.BytesIO(data)).read(64)
-        except (OSError, EOFError, zlib.error):  # a damaged archive is still one
+        except (OSError, EOFError, zlib.error):  # a damaged archive is still an archive
             inner = b""
-        return "unpack the gzip file first" + (", there is a STEP file inside" if _START in inner else "")
+        return "unpack the gzip file first" + ("; it holds a STEP file" if _START in inner else "")
     if data[:2] == b"PK":
         return "unpack the zip file first"
     if data[:5].lower() == b"solid" or data[:80].lower().startswith(b"solid"):

@@ -1,4 +1,6 @@
-"""B-spline curves in the convention of Arivazhagan (2020), equations 1 to 3: order k, control points P_0 .. P_n.
+"""B-spline curves in the convention of [Arivazhagan2020], equations 1 to 3: order k, control points P_0 .. P_n.
+
+All points lie in one plane, in mm.
 
 Notation
     k        order, degree k - 1 (the text under equation 1 says degree, its numbers are those of the order)
@@ -28,12 +30,12 @@ CONTROL_POINTS = 10
 
 
 class Ends(StrEnum):
-    """What a fit does at the ends of an open curve."""
+    """Treatment of the ends of an open curve in a fit."""
 
     HELD = "held"
     """The first and last control point are the first and last data point."""
     FREE = "free"
-    """Ends are fitted like all other points, so that noise on one point cannot bend them."""
+    """The fit treats ends like all other points, so that noise on one point cannot bend them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,13 +53,13 @@ class SplineCurve:
 
     @property
     def knots(self) -> F64:
-        """(n + order,) float64 knots; (n + 2 order - 1,) when closed, from before 0 to beyond 1."""
+        """(n + order,) float64 knots, dimensionless; (n + 2 order - 1,) when closed, from below 0 to above 1."""
         return knot_vector(len(self.control), self.order, self.closed)
 
     def at(self, u: ArrayLike, derivative: int = 0) -> F64:
-        """Points, or derivatives by u.
+        """Points, or derivatives by u [Arivazhagan2020, equation 1; DeBoor1978].
 
-        u          : (m,) parameters in 0..1
+        u          : (m,) float64, dimensionless, parameters in 0..1
         derivative : 0 for points, r for the r-th derivative
         Returns (m, 2) float64, mm.
         """
@@ -66,10 +68,10 @@ class SplineCurve:
         return np.asarray(spline(u, nu=derivative))
 
     def curvature(self, u: ArrayLike) -> F64:
-        """Signed curvature, positive where the curve turns left.
+        """Signed curvature, positive where the curve turns left [DoCarmo1976].
 
-        u : (m,) parameters in 0..1
-        Returns (m,) float64, 1/mm; zero where the curve stands still.
+        u : (m,) float64, dimensionless, parameters in 0..1
+        Returns (m,) float64, 1/mm; zero where the first derivative vanishes.
         """
         d, dd = self.at(u, 1), self.at(u, 2)
         speed = np.linalg.norm(d, axis=1)
@@ -82,14 +84,14 @@ class SplineCurve:
 
 
 def knot_vector(count: int = CONTROL_POINTS, order: int = ORDER, closed: bool = False) -> F64:
-    """Knots for a number of control points.
+    """Knots for a number of control points [Arivazhagan2020, equation 3].
 
     count, order : control points (at least ``order``), order
     closed       : uniform beyond both ends instead of open uniform
 
     Returns
     -------
-    (count + order,) float64, or (count + 2 order - 1,) when closed; unitless.
+    (count + order,) float64, or (count + 2 order - 1,) when closed; dimensionless.
 
     Raises
     ------
@@ -106,12 +108,12 @@ def knot_vector(count: int = CONTROL_POINTS, order: int = ORDER, closed: bool = 
 
 
 def basis(u: ArrayLike, count: int = CONTROL_POINTS, order: int = ORDER, closed: bool = False) -> F64:
-    """Values of the basis functions of equation 2.
+    """Values of the basis functions [Arivazhagan2020, equation 2; DeBoor1978].
 
-    u            : (m,) parameters in 0..1
+    u            : (m,) float64, dimensionless, parameters in 0..1
     count, order : control points, order
-    closed       : periodic basis; column i then holds every function that control point i carries
-    Returns (m, count) float64, rows sum to 1. Raises GeometryError as ``knot_vector`` does.
+    closed       : periodic basis; column i then holds the sum of the functions of control point i
+    Returns (m, count) float64, dimensionless; rows sum to 1. Raises GeometryError as ``knot_vector`` does.
     """
     u = np.asarray(u, dtype=np.float64)
     knots = knot_vector(count, order, closed)
@@ -124,7 +126,7 @@ def basis(u: ArrayLike, count: int = CONTROL_POINTS, order: int = ORDER, closed:
 def arc_length(points: ArrayLike, closed: bool = False) -> F64:
     """Length along a polyline from its first point.
 
-    points : (n, 2) float64, mm
+    points : (n, 2) float64, mm, in the plane of the curve
     closed : count the way back to the first point as well
     Returns (n,) float64, mm, or (n + 1,) when closed.
     """
@@ -136,7 +138,7 @@ def arc_length(points: ArrayLike, closed: bool = False) -> F64:
 def resample(points: ArrayLike, count: int, closed: bool = False) -> F64:
     """Points at equal steps of length along a polyline.
 
-    points : (n, 2) float64, mm
+    points : (n, 2) float64, mm, in the plane of the curve
     count  : number of points; an open polyline keeps both ends, a closed one its first point
     Returns (count, 2) float64, mm. Raises GeometryError for a polyline without length.
     """
@@ -149,7 +151,9 @@ def fit(points: ArrayLike, count: int = CONTROL_POINTS, order: int = ORDER, clos
         ends: Ends = Ends.HELD) -> SplineCurve:
     """The B-spline nearest to the points of a polyline, by least squares at parameters in proportion to arc length.
 
-    points       : (n, 2) float64, mm; the last not repeated when closed
+    The curve is that of [Arivazhagan2020, equations 1 to 3], the least squares fit that of [DeBoor1978].
+
+    points       : (n, 2) float64, mm, in the plane of the curve; the last not repeated when closed
     count, order : control points, order
     closed       : fit a periodic curve
     ends         : Ends, for open curves
@@ -178,10 +182,10 @@ def fit(points: ArrayLike, count: int = CONTROL_POINTS, order: int = ORDER, clos
 def fit_even(points: ArrayLike, count: int = CONTROL_POINTS, closed: bool = False) -> tuple[SplineCurve, float]:
     """``fit`` with free ends for points at equal steps (as from ``resample``), many times faster.
 
-    points : (n, 2) float64, mm
+    points : (n, 2) float64, mm, in the plane of the curve
     count  : control points, of order 5
     closed : fit a periodic curve
-    Returns the curve and the root of the mean squared distance that is left, mm.
+    Returns the curve and the root of the mean squared residual distance, mm.
     """
     p = finite_points(points, 2, "points")
     design, inverse = _even(len(p), count, closed)
@@ -198,7 +202,7 @@ def _even(samples: int, count: int, closed: bool) -> tuple[F64, F64]:
 
 @lru_cache(maxsize=64)
 def even_errors(samples: int, count: int, closed: bool, steps: int) -> F64:
-    """How noise on the points of ``fit_even`` moves the curve: a row for every ``u`` of ``steps`` equal steps in 0..1.
+    """Effect of noise on the points of ``fit_even``: a row for every ``u`` of ``steps`` equal steps in 0..1.
 
     samples, count : points, control points
     closed         : of a periodic curve
@@ -206,9 +210,9 @@ def even_errors(samples: int, count: int, closed: bool, steps: int) -> F64:
 
     Returns
     -------
-    (steps + 1, count) float64, unitless. For independent noise of standard deviation 1 on every coordinate the length
-    of a row is the standard error of the curve there, along each axis; that of a sum of rows with weights is the
-    standard error of the same sum of places.
+    (steps + 1, count) float64, dimensionless. For independent noise of standard deviation 1 on every coordinate, the
+    length of a row is the standard error of the curve there, along each axis. The length of a weighted sum of rows is
+    the standard error of the same sum of places.
 
     Notes
     -----

@@ -1,4 +1,4 @@
-"""Foot points on a NURBS surface: where, within its domain, it is nearest to given points."""
+"""Foot points on a NURBS surface: the nearest points within its domain to given points."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from geometry.errors import GeometryError
 from geometry.mesh import F64
 from geometry.surfaces.nurbs import NurbsSurface
 
-# Starts to every span of knots and order; fewer and the nearest start may lie in another valley.
+# Starts to every span of knots and order. With fewer starts the nearest one may lie in another valley.
 STARTS = 3
 ROUNDS = 50
-# A step goes over this share of the domain at most; one that gains nothing is cut to a quarter, this often.
+# Largest step as a share of the domain. A step that gains nothing is cut to a quarter, at most this often.
 REACH, CUTS = 0.25, 12
-# A step shorter than this share of the domain ends the search; by then the distance is right to the square of that.
+# A step shorter than this share of the domain ends the search. The error of the distance is then of its square.
 ENOUGH = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class FootPoints:
-    """Nearest points of a surface.
+    """Nearest points of a surface, in its frame.
 
     uv       : (p, 2) float64, parameters
     points   : (p, 3) float64, mm
@@ -37,22 +37,22 @@ class FootPoints:
 
 
 def foot_points(surface: NurbsSurface, points: ArrayLike, start: ArrayLike | None = None) -> FootPoints:
-    """Nearest points of a surface, its borders included.
+    """Nearest points of a surface, its borders included, by Newton's method [Piegl1997].
 
     surface : NurbsSurface
-    points  : (p, 3), mm
-    start   : (p, 2), parameters to begin from; the nearest of an even set of points where None
+    points  : (p, 3) float64, mm, frame of the surface
+    start   : (p, 2) float64, dimensionless, parameters to begin from; the nearest of an even set of points where None
 
     Returns
     -------
     FootPoints
-        Of the valley the start lies in: exact to rounding for points nearer than the least radius of curvature to a
-        start of the same valley, a local nearest point otherwise.
+        The nearest point in the valley of the start. It is exact to rounding where the point is nearer to the surface
+        than the least radius of curvature and its start lies in the same valley; otherwise it is a local nearest point.
 
     Raises
     ------
     GeometryError
-        ``bad_array``; ``outside_domain`` for a start outside of it.
+        ``bad_array``; ``outside_domain`` for a start outside the domain.
     """
     given = finite_points(points, 3, "points")
     uv = _starts(surface, given) if start is None else finite_points(start, 2, "start")
@@ -60,7 +60,7 @@ def foot_points(surface: NurbsSurface, points: ArrayLike, start: ArrayLike | Non
         raise GeometryError(f"{len(given)} points need as many starts, got {len(uv)}", code="bad_array",
                             subjects=("start",), measured=len(uv), limit=len(given))
     found = _search(surface, given, np.clip(uv, *surface.domain) if start is None else uv)
-    # a pole is a trap: there no way along the collapsed side leads on
+    # at a pole no step along the collapsed side changes the point, so the search restarts beside it
     stuck = np.flatnonzero(np.isnan(surface.normals(found.uv)[:, 0]))
     again = _search(surface, given[stuck], _starts(surface, given[stuck]))
     better = again.distance < found.distance[stuck]
@@ -70,14 +70,14 @@ def foot_points(surface: NurbsSurface, points: ArrayLike, start: ArrayLike | Non
     return found
 
 
-def _search(surface: NurbsSurface, given: F64, start: F64) -> FootPoints:
+def _search(surface: NurbsSurface, points: F64, start: F64) -> FootPoints:
     low, high = surface.domain
     uv = start.copy()
     foot = surface.points(uv)
-    left = np.einsum("pi,pi->p", foot - given, foot - given)
-    rows = np.arange(len(given))
+    left = np.einsum("pi,pi->p", foot - points, foot - points)
+    rows = np.arange(len(points))
     for _ in range(ROUNDS):
-        step = _newton(surface, given[rows], uv[rows])
+        step = _newton(surface, points[rows], uv[rows])
         step /= np.maximum(np.abs(step / (REACH * (high - low))).max(axis=1, keepdims=True), 1.0)
         far = (np.abs(step) > ENOUGH * (high - low)).any(axis=1)
         rows, step = rows[far], step[far]
@@ -88,7 +88,7 @@ def _search(surface: NurbsSurface, given: F64, start: F64) -> FootPoints:
                 break
             trial = np.clip(uv[rows[todo]] + step[todo], low, high)
             at = surface.points(trial)
-            gap = np.einsum("pi,pi->p", at - given[rows[todo]], at - given[rows[todo]])
+            gap = np.einsum("pi,pi->p", at - points[rows[todo]], at - points[rows[todo]])
             better = gap < left[rows[todo]]
             gained[todo[better]] = True
             done = rows[todo[better]]
@@ -115,7 +115,7 @@ def _starts(surface: NurbsSurface, points: F64) -> F64:
 
 
 def _newton(surface: NurbsSurface, points: F64, uv: F64) -> F64:
-    """Steps of Newton's method, of Gauss and Newton where that is no descent; none across a border."""
+    """Steps of Newton's method, or of Gauss-Newton where Newton's does not descend; no step crosses a border."""
     d = surface.derivatives(uv)
     off = d.point - points
     slope = np.stack([(off * d.u).sum(axis=1), (off * d.v).sum(axis=1)], axis=1)
@@ -133,7 +133,7 @@ def _newton(surface: NurbsSurface, points: F64, uv: F64) -> F64:
     hessian = np.where(good[:, None, None], hessian, metric)
     hessian[:, [0, 1], [0, 1]] *= 1.0 + 1e-12
     hessian[:, [0, 1], [0, 1]] += 1e-300
-    # a coordinate that is held leaves the system of equations
+    # a coordinate fixed at a border leaves the system of equations
     free = (~held).astype(np.float64)
     hessian *= free[:, :, None] * free[:, None, :]
     hessian[:, [0, 1], [0, 1]] += held

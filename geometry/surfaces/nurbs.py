@@ -1,6 +1,6 @@
 """NURBS surfaces: points, derivatives, normals, curvatures, and their iso-parametric facets.
 
-Notation (Jain 2016, equations 3.6 and 3.7, where n and m are one less)
+Notation ([Jain2016], equations 3.6 and 3.7, where n and m are one less)
     P_ij, h_ij   control points (n, m, 3) and weights (n, m)
     k, l         orders in u and v, degree plus one
     t            knots, n + k and m + l of them; u runs from t[k - 1] to t[n]
@@ -23,17 +23,17 @@ from geometry.errors import GeometryError
 from geometry.kernels.nurbs import heights_along, surface_values
 from geometry.mesh import F64, I32, TriangleMesh
 
-# Parameters may lie outside of the knots by this share of their range: they have been through someone's rounding.
+# Parameters may lie outside the knots by this share of their range, because of rounding.
 SLACK = 1e-9
-# The two tangents of a place with a normal: neither shorter than this share of the size of the net by the range of
-# the parameter, nor their angle less than this (rad). Poles of spheres and tips of cones fail it.
+# A place has a normal where neither tangent is shorter than this share of the size of the net by the range of the
+# parameter, and the angle between them is not less than this (rad). Poles of spheres and tips of cones have none.
 SINGULAR = 1e-9
-MOST_FACETS = 20_000_000
+MAX_FACETS = 20_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class SurfaceDerivatives:
-    """A surface and its derivatives at parameters.
+    """A surface and its derivatives at parameters, in the frame of the control points.
 
     point     : (p, 3) float64, mm
     u, v      : (p, 3) float64, first derivatives
@@ -50,17 +50,17 @@ class SurfaceDerivatives:
 
 @dataclass(frozen=True, eq=False)
 class NurbsSurface:
-    """A rational or plain B-spline surface over a rectangle of parameters.
+    """A rational or plain B-spline surface over a rectangle of parameters, in the frame of its control points.
 
     control : (n, m, 3) float64, mm; first index along u
     knots_u : (n + k,) float64, not decreasing, no inner knot more than k - 1 times
     knots_v : (m + l,) float64, likewise
     orders  : (k, l), degrees plus one, at least 2
-    weights : (n, m) float64, unitless, > 0; None for a plain B-spline
+    weights : (n, m) float64, dimensionless, > 0; None for a plain B-spline
     side    : 1 where the normal, which points out of the material, lies along S_u x S_v, -1 where it lies against it
 
     Raises GeometryError (``bad_surface``) for another shape, an order below 2 or above the number of points, a number
-    that is not finite, a weight that is not positive, knots of another number, decreasing or too often repeated.
+    that is not finite, a weight that is not positive, or knots that decrease, repeat too often or have a wrong count.
     """
 
     control: F64
@@ -85,11 +85,11 @@ class NurbsSurface:
     @classmethod
     def from_control_points(cls, points: ArrayLike, order: int | tuple[int, int] = 4, *,
                             weights: ArrayLike | None = None, side: int = 1) -> NurbsSurface:
-        """The open uniform surface of equations 3.6 and 3.7: knots are whole numbers and u runs from 0 to n - k + 1.
+        """The open uniform surface of [Jain2016, equations 3.6 and 3.7]: integer knots, u from 0 to n - k + 1.
 
-        points  : (n, m, 3), mm
+        points  : (n, m, 3) float64, mm, any frame
         order   : k, or (k, l) where they differ
-        weights : (n, m), unitless
+        weights : (n, m) float64, dimensionless
         side    : as for the class
 
         Returns NurbsSurface; 5 by 5 points at order 4 have u and v from 0 to 2.
@@ -108,18 +108,19 @@ class NurbsSurface:
         return np.array([[self.knots_u[k - 1], self.knots_v[l - 1]], [self.knots_u[n], self.knots_v[m]]])
 
     def points(self, uv: ArrayLike) -> F64:
-        """Points of the surface.
+        """Points of the surface [Jain2016, equation 3.6].
 
-        uv : (p, 2), parameters
+        uv : (p, 2) float64, dimensionless, parameters
         Returns (p, 3) float64, mm.
-        Raises GeometryError (``bad_array``; ``outside_domain`` for parameters outside of the domain).
+        Raises GeometryError (``bad_array``; ``outside_domain`` for parameters outside the domain).
         """
         at = self._inside(uv)
         return _divided(self._value(at, 0, 0))
 
     def derivatives(self, uv: ArrayLike) -> SurfaceDerivatives:
-        """Points with first and second derivatives; parameters and errors are those of ``points``.
+        """Points with first and second derivatives [Piegl1997]; errors are those of ``points``.
 
+        uv : (p, 2) float64, dimensionless, parameters
         Returns SurfaceDerivatives, mm by units of the parameters.
         """
         at = self._inside(uv)
@@ -134,16 +135,18 @@ class NurbsSurface:
                                   (auv - wu * sv - wv * su - wuv * s) / w, (avv - 2.0 * wv * sv - wvv * s) / w)
 
     def normals(self, uv: ArrayLike) -> F64:
-        """Unit normals out of the material, ``side`` times S_u x S_v; parameters and errors are those of ``points``.
+        """Unit normals out of the material, ``side`` times S_u x S_v [DoCarmo1976]; errors are those of ``points``.
 
-        Returns (p, 3) float64; NaN at singular points (poles, tips).
+        uv : (p, 2) float64, dimensionless, parameters
+
+        Returns (p, 3) float64, dimensionless, frame of the surface; NaN at singular points (poles, tips).
         """
         return self._normal(self.derivatives(uv))
 
     def points_and_normals(self, uv: ArrayLike) -> tuple[F64, F64]:
-        """Points (p, 3) mm and unit normals out of the material (p, 3), NaN at singular points, at once.
+        """Points, (p, 3) mm, and unit normals out of the material, (p, 3), float64, NaN at singular points.
 
-        uv : (p, 2), parameters
+        uv : (p, 2) float64, dimensionless, parameters
         Raises GeometryError as ``points``.
         """
         at = self._inside(uv)
@@ -154,7 +157,9 @@ class NurbsSurface:
         return s, self._across(*((way[:, :3] - way[:, 3:] * s) / a[:, 3:] for way in (au, av)))
 
     def forms(self, uv: ArrayLike) -> tuple[F64, F64]:
-        """First and second fundamental form; parameters and errors are those of ``points``.
+        """First and second fundamental form [DoCarmo1976]; errors are those of ``points``.
+
+        uv : (p, 2) float64, dimensionless, parameters
 
         Returns (p, 3) float64 E, F, G and (p, 3) float64 L, M, N, both mm; the second NaN at singular points. L is the
         part of S_uu along the normal, so it is negative where the material is convex along u.
@@ -164,11 +169,11 @@ class NurbsSurface:
         return _dots((d.u, d.u), (d.u, d.v), (d.v, d.v)), _dots((d.uu, normal), (d.uv, normal), (d.vv, normal))
 
     def heights_along(self, points: F64, start: F64, beyond: float = 0.1) -> tuple[F64, F64]:
-        """How high chains of points stand over the surface, each foot searched from the one before it in its chain.
+        """Heights of chains of points over the surface; the search for each foot starts at the previous foot.
 
         points : (m, t, 3) float64, mm, neighbours close together
-        start  : (m, 2), parameters near the foot of the first point of each chain
-        beyond : share of the domain by which feet may lie outside of it, where the surface goes on smoothly
+        start  : (m, 2) float64, dimensionless, parameters near the foot of the first point of each chain
+        beyond : share of the domain by which feet may lie outside it, where the surface goes on smoothly
 
         Returns (m, t) float64, mm along the normal of the foot, negative inside the material, and (m, t, 2)
         parameters of the feet. Both are right where the points are nearer than the least radius of curvature.
@@ -182,7 +187,9 @@ class NurbsSurface:
         return height, uv
 
     def curvature(self, uv: ArrayLike) -> F64:
-        """Principal curvatures; parameters and errors are those of ``points``.
+        """Principal curvatures [DoCarmo1976]; errors are those of ``points``.
+
+        uv : (p, 2) float64, dimensionless, parameters
 
         Returns (p, 2) float64, 1/mm, least and greatest, positive where the material is convex (a ball has 1/R, 1/R);
         NaN at singular points.
@@ -199,7 +206,7 @@ class NurbsSurface:
     def moved(self, matrix: ArrayLike) -> NurbsSurface:
         """The surface moved by a rigid matrix.
 
-        matrix : (4, 4), rotation and shift (mm); not a mirror
+        matrix : (4, 4) float64, rotation and shift (mm) to another frame; not a mirror
         Returns NurbsSurface with the same parameters and side.
         Raises GeometryError (``not_rigid``).
         """
@@ -207,7 +214,7 @@ class NurbsSurface:
         if m.shape != (4, 4) or not np.isfinite(m).all():
             raise GeometryError(f"a motion is a finite matrix of shape (4, 4), got {m.shape}", code="not_rigid",
                                 subjects=("matrix",), measured=list(m.shape), limit=[4, 4],
-                                remedy="use Placement.matrix")
+                                remedy="use SetupFrame.matrix")
         turn = m[:3, :3]
         off = float(np.abs(turn @ turn.T - np.eye(3)).max())
         if off > 1e-9 or np.linalg.det(turn) < 0.0:
@@ -216,10 +223,10 @@ class NurbsSurface:
         return replace(self, control=self.control @ turn.T + m[:3, 3])
 
     def extended(self, share: float) -> NurbsSurface:
-        """The surface carried on beyond its four borders by a share of its domain, as the polynomial it is there.
+        """The surface extended beyond its four borders by a share of its domain, with the polynomial of each border.
 
-        Returns NurbsSurface with the same parameters where it was and others around.
-        Raises GeometryError (``bad_surface``): a weight does not stay positive that far out.
+        Returns NurbsSurface with the same parameters inside and new ones outside.
+        Raises GeometryError (``bad_surface``): a weight does not stay positive in the extension.
         """
         net = self._nets[0, 0][0]
         knots = []
@@ -267,16 +274,22 @@ class NurbsSurface:
         return TriangleMesh(derivatives.point, faces[whole], corner_normals=normals)
 
     def grid_counts(self, du: float, dv: float) -> tuple[int, int]:
-        """Cells along u and v that ``discretised`` makes of the steps; parameters and errors are those of it."""
+        """Count of the cells along u and v in ``discretised``.
+
+        Raises
+        ------
+        GeometryError
+            ``bad_step``: a step is not positive, or there would be more than 20 million facets.
+        """
         size = self.domain[1] - self.domain[0]
         for name, step in (("du", du), ("dv", dv)):
             if not (np.isfinite(step) and step > 0.0):
-                raise GeometryError(f"{name} is {step}; a step is positive", code="bad_step", subjects=(name,),
-                                    measured=step, limit=0.0, remedy="ask steps_for_chord")
+                raise GeometryError(f"{name} is {step}; a step must be positive", code="bad_step", subjects=(name,),
+                                    measured=step, limit=0.0, remedy="give positive steps")
         counts = np.maximum(np.ceil(size / (du, dv) - SLACK), 1.0)
-        if 2.0 * counts.prod() > MOST_FACETS:
+        if 2.0 * counts.prod() > MAX_FACETS:
             raise GeometryError(f"steps of {du:g} and {dv:g} make {2.0 * counts.prod():.3g} facets", code="bad_step",
-                                subjects=("du", "dv"), measured=2.0 * counts.prod(), limit=MOST_FACETS,
+                                subjects=("du", "dv"), measured=2.0 * counts.prod(), limit=MAX_FACETS,
                                 remedy="take longer steps")
         return int(counts[0]), int(counts[1])
 
@@ -324,14 +337,14 @@ class NurbsSurface:
         beyond = np.maximum(low - at, at - high).max(axis=1, initial=-np.inf) > SLACK * (high - low).max()
         if beyond.any():
             row = int(np.flatnonzero(beyond)[0])
-            raise GeometryError(f"uv[{row}] = ({at[row, 0]:g}, {at[row, 1]:g}) lies outside of the domain",
+            raise GeometryError(f"uv[{row}] = ({at[row, 0]:g}, {at[row, 1]:g}) lies outside the domain",
                                 code="outside_domain", subjects=(f"uv[{row}]",), measured=at[row].tolist(),
                                 limit=self.domain.tolist(), remedy="clip the parameters to NurbsSurface.domain")
         return np.clip(at, low, high)
 
 
 def open_uniform_knots(count: int, order: int) -> F64:
-    """Knots of equation 3.7: ``order`` zeros, whole numbers, and ``order`` times count - order + 1.
+    """Knots of [Jain2016, equation 3.7]: ``order`` zeros, whole numbers, and ``order`` times count - order + 1.
 
     count : control points, at least ``order``
     order : degree plus one
@@ -340,7 +353,7 @@ def open_uniform_knots(count: int, order: int) -> F64:
     return np.clip(np.arange(count + order) - order + 1.0, 0.0, count - order + 1.0)
 
 
-# Derivatives in u and v, each after the one it is made of.
+# Derivatives in u and v; each comes after the one it is derived from.
 _WAYS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
 
 

@@ -1,4 +1,4 @@
 """Faces of the mesh cut where a label changes, with smooth borders.
 
-What the labels mean is not known here.
+The meaning of the labels belongs to the callers.
 """

@@ -1,4 +1,4 @@
-"""Cuts between labels bent towards a curved border."""
+"""Bends the cuts between labels towards a curved border."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ import numpy as np
 
 from geometry.kernels.trim import COLUMNS
 from geometry.mesh import F64
-from geometry.trimming.facet_sheet import BOOL, I64, Sheet
-from geometry.trimming.label_query import Asker, bisect
+from geometry.trimming.facet_sheet import BOOL, I64, FacetSheet
+from geometry.trimming.label_query import LabelQuery, bisect
 
-# Rounds of bending; each takes about three quarters off the error that is left.
+# Rounds of bending; each removes about three quarters of the remaining error.
 BEND_ROUNDS = 10
-# Nodes put in for each cut there was; a ragged border would otherwise be followed into every tooth.
+# Largest number of new nodes for each cut. Without it the bending follows a ragged border into every tooth.
 BUDGET = 8
-# A node never comes nearer to the far corner of the facet it is moved in than this fraction of the way.
+# A node keeps at least this fraction of the way from the far corner of the facet it moves in.
 REACH = 0.9
 
 
-def bend(sheet: Sheet, ask: Asker, tolerance: float) -> None:
-    """Where the middle of a cut is farther than the tolerance from the change of label, put a node there.
+def bend(sheet: FacetSheet, query: LabelQuery, tolerance: float) -> None:
+    """Put a node on every cut whose middle is farther than the tolerance from the change of label.
 
-    sheet     : Sheet, every facet with one label; changed in place
-    ask       : Asker
+    sheet     : FacetSheet, every facet with one label; changed in place
+    query       : LabelQuery
     tolerance : float, mm
 
     The node goes along the line to the far corner of the facet on its wrong side, so no facet turns over.
@@ -44,7 +44,7 @@ def bend(sheet: Sheet, ask: Asker, tolerance: float) -> None:
         share = np.minimum(tolerance / np.where(height > 0, height, tolerance), 0.5)
         own = sheet.label[facets]
         probe = middle[:, None] + share[..., None] * (far - middle[:, None])
-        right = ask(probe.reshape(-1, COLUMNS), np.repeat(face, 2)).reshape(-1, 2) == own
+        right = query(probe.reshape(-1, COLUMNS), np.repeat(face, 2)).reshape(-1, 2) == own
         fine = right.all(axis=1) | (chord <= tolerance)
         settled = np.concatenate([settled, key[fine]])
         rows = np.flatnonzero(~fine)
@@ -55,7 +55,7 @@ def bend(sheet: Sheet, ask: Asker, tolerance: float) -> None:
         reach = _reach(p[rows], q[rows], far[rows, side], far[rows, 1 - side])
         end = middle[rows] + reach[:, None] * (far[rows, side] - middle[rows])
         here = own[rows, side]
-        way, _, _ = bisect(ask, end, middle[rows], face[rows], here, here, tolerance, False)
+        way, _, _ = bisect(query, end, middle[rows], face[rows], here, here, tolerance, False)
         node = sheet.add(end + way[:, None] * (middle[rows] - end), face[rows])
         _insert(sheet, facets[rows], places[rows], node)
         if len(sheet.nodes) > most:
@@ -64,7 +64,7 @@ def bend(sheet: Sheet, ask: Asker, tolerance: float) -> None:
 
 
 def _reach(p: F64, q: F64, far: F64, back: F64) -> F64:
-    """Fraction of the way from the middle of p q to the far corner that a node may go and still be seen from the back.
+    """Fraction of the way from the middle of p q to the far corner at which the node is still visible from the back.
 
     p, q, far, back : (k, 8) node rows of the two facets beside the side p q
     """
@@ -74,13 +74,13 @@ def _reach(p: F64, q: F64, far: F64, back: F64) -> F64:
     for a, b in ((p, 1.0), (q, -1.0)):
         at_start, at_end = (b * np.einsum("ij,ij->i", np.cross(a - back, x - back), normal)
                             for x in (0.5 * (p + q), far))
-        # seen while the signed area is positive; it changes linearly along the way
+        # visible while the signed area is positive; it changes linearly along the way
         beyond = at_end * np.sign(at_start) < 0
         out[beyond] = np.minimum(out, REACH * at_start / np.where(beyond, at_start - at_end, 1.0))[beyond]
     return out
 
 
-def _borders(sheet: Sheet) -> tuple[I64, I64, I64]:
+def _borders(sheet: FacetSheet) -> tuple[I64, I64, I64]:
     """Sides between two labels: key (e,) of the nodes, the two facets (e, 2), and its place (e, 2) in them."""
     near = np.flatnonzero((sheet.corners >= sheet.first_cut).sum(axis=1) >= 2)
     a, b = sheet.corners[near], sheet.corners[near][:, [1, 2, 0]]
@@ -101,7 +101,7 @@ def _independent(facets: I64, count: int) -> BOOL:
     return np.asarray((best[facets] == rank[:, None]).all(axis=1))
 
 
-def _insert(sheet: Sheet, facets: I64, places: I64, node: I64) -> None:
+def _insert(sheet: FacetSheet, facets: I64, places: I64, node: I64) -> None:
     """Split the two facets beside each side at a node in its stead."""
     more, labels = [], []
     for k in (0, 1):

@@ -1,4 +1,4 @@
-"""The mesh facets of some faces as a sheet with its own nodes, and their division into small ones.
+"""The mesh facets of some faces as a sheet with its own nodes, and their division into small facets.
 
 A point has one node per face and side of a seam, so that (u, v) is a function of the node.
 """
@@ -21,14 +21,14 @@ BOOL = NDArray[np.bool_]
 
 
 @dataclass(eq=False)
-class Sheet:
-    """Facets of some faces of a part.
+class FacetSheet:
+    """Facets of some faces of a part, in the frame of the part.
 
     nodes    : (n, 8) float64: x, y, z mm, u, v, normal (not unit); a point has one node per face and side of a seam
     face     : (n,) int32, face number of each node
     corners  : (t, 3) int64, node numbers, counter-clockwise seen from outside the material
-    label    : (t,) int64 of each facet; before the cut, of no meaning
-    original : int, the first so many nodes are corners of the part's own mesh
+    label    : (t,) int64 of each facet; without meaning before the cut
+    original : int, this many nodes at the start are corners of the part's own mesh
     first_cut: int, nodes from this one on lie where the label changes
     """
 
@@ -51,21 +51,24 @@ class Sheet:
         return np.asarray(0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]))
 
     def add(self, rows: F64, face: I32) -> I64:
-        """Append nodes; returns their numbers."""
+        """Append nodes and return their numbers, (k,) int64, index.
+
+        rows : (k, 8) float64, node rows as in ``nodes``, mm and parameters; face : (k,) int32, index of their faces
+        """
         first = len(self.nodes)
         self.nodes = np.concatenate([self.nodes, rows])
         self.face = np.concatenate([self.face, face])
         return np.arange(first, first + len(rows))
 
 
-def sheet_of(part: Part, faces: Sequence[int] | None) -> Sheet:
+def sheet_of(part: Part, faces: Sequence[int] | None) -> FacetSheet:
     """The mesh facets of the wanted faces as a sheet.
 
     part  : Part with ``uv``
     faces : face numbers, all when None
 
-    Returns Sheet. Where the surface has a pole, the facets without area that the mesh leaves out there are put back:
-    they have area in (u, v).
+    Returns FacetSheet. At a pole of a surface the mesh leaves out facets without area. The sheet holds them again,
+    since they have area in (u, v).
     Raises GeometryError (``no_parameters``, ``no_such_face``).
     """
     if part.uv is None:
@@ -74,7 +77,7 @@ def sheet_of(part: Part, faces: Sequence[int] | None) -> Sheet:
     wanted = np.arange(1, len(part.faces) + 1) if faces is None else np.unique(np.asarray(faces, dtype=np.int64))
     absent = [f"F{f}" for f in wanted if not 1 <= f <= len(part.faces)]
     if absent:
-        raise GeometryError(f"no such face: {', '.join(absent)}; the solid has {len(part.faces)}",
+        raise GeometryError(f"faces {', '.join(absent)} do not exist; the solid has {len(part.faces)} faces",
                             code="no_such_face", subjects=tuple(absent), limit=len(part.faces))
     rows = np.flatnonzero(np.isin(part.mesh.face_ids, wanted))
     ids, vertex = np.repeat(part.mesh.face_ids[rows], 3), part.mesh.faces[rows].ravel()
@@ -94,11 +97,11 @@ def sheet_of(part: Part, faces: Sequence[int] | None) -> Sheet:
     normal = normal / np.where(length > 0, length, 1.0)[:, None]
     nodes = np.concatenate([part.mesh.vertices[vertex[first]], uv[first], normal[point[first]]], axis=1)
     corners = _with_poles(node.reshape(-1, 3), vertex[first].astype(np.int64))
-    return Sheet(nodes, ids[first].astype(np.int32), corners, np.zeros(len(corners), np.int64), len(nodes))
+    return FacetSheet(nodes, ids[first].astype(np.int32), corners, np.zeros(len(corners), np.int64), len(nodes))
 
 
 def _with_poles(corners: I64, vertex: I64) -> I64:
-    """Where the rim runs from a pole to a node and straight back to the same pole at another u, close the notch."""
+    """Corners with the notches closed where the rim runs from a pole to a node and back to the pole at another u."""
     start, end = corners.ravel(), corners[:, [1, 2, 0]].ravel()
     size = int(corners.max(initial=0)) + 1
     bare = ~np.isin(end * size + start, start * size + end)
@@ -113,23 +116,23 @@ def _with_poles(corners: I64, vertex: I64) -> I64:
 def sides_of(corners: I64) -> tuple[I64, I64, I64]:
     """Undirected sides of facets.
 
-    corners : (t, 3) int64 node numbers
+    corners : (t, 3) int64, index of the nodes in the frame of the sheet
 
     Returns (e,) lower and (e,) higher node number of each edge, and (t, 3) the edge number of the side from corner k to
-    corner k + 1.
+    corner k + 1, all int64, index.
     """
     a, b = corners, corners[:, [1, 2, 0]]
     keys, index = np.unique((np.minimum(a, b) << 32 | np.maximum(a, b)).ravel(), return_inverse=True)
     return keys >> 32, keys & 0xFFFFFFFF, index.reshape(-1, 3)
 
 
-def refined(sheet: Sheet, pitch: float) -> Sheet:
+def refined(sheet: FacetSheet, pitch: float) -> FacetSheet:
     """The sheet with every facet divided so that no side and no row is longer than the pitch.
 
-    sheet : Sheet
+    sheet : FacetSheet
     pitch : float, mm
 
-    Returns a new Sheet; nodes on a side depend on the side alone, so neighbours share them.
+    Returns a new FacetSheet; nodes on a side depend on the side alone, so neighbours share them.
     """
     low, high, sides = sides_of(sheet.corners)
     length = np.linalg.norm(sheet.nodes[high, :3] - sheet.nodes[low, :3], axis=1)
@@ -146,4 +149,4 @@ def refined(sheet: Sheet, pitch: float) -> Sheet:
     corners = np.empty((int(small.sum()), 3), np.int64)
     divide(sheet.corners, sides, parts, length, first, nodes, pitch, node_at, facet_at, corners)
     face = np.concatenate([sheet.face, sheet.face[low[edge]], np.repeat(sheet.face[sheet.corners[:, 0]], inner)])
-    return Sheet(nodes, face, corners, np.zeros(len(corners), np.int64), sheet.original)
+    return FacetSheet(nodes, face, corners, np.zeros(len(corners), np.int64), sheet.original)

@@ -1,4 +1,4 @@
-"""The label of a surface as a function, and where it changes along a line."""
+"""The label of a surface as a function, and the places where it changes along a line."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from geometry.trimming.facet_sheet import BOOL, I64
 Label = Callable[[F64, F64, I32], I64]
 
 
-class Asker:
-    """The label as a function of node rows; ``calls`` and ``asked`` count what it cost."""
+class LabelQuery:
+    """The label as a function of node rows; ``calls`` and ``points`` count calls and points."""
 
     def __init__(self, label: Label) -> None:
-        self.label, self.calls, self.asked = label, 0, 0
+        self.label, self.calls, self.points = label, 0, 0
 
     def __call__(self, rows: F64, face: I32) -> I64:
-        """Labels (k,) of node rows (k, 8) on faces (k,) int32 numbers."""
+        """Labels, (k,) int64, of node rows (k, 8) on faces (k,) int32, index."""
         if not len(rows):
             return np.zeros(0, np.int64)
-        self.calls, self.asked = self.calls + 1, self.asked + len(rows)
+        self.calls, self.points = self.calls + 1, self.points + len(rows)
         normal = rows[:, 5:]
         length = np.linalg.norm(normal, axis=1)
         unit = normal / np.where(length > 0, length, 1.0)[:, None]
@@ -33,15 +33,15 @@ class Asker:
         return out.astype(np.int64, copy=False)
 
 
-def bisect(ask: Asker, start: F64, end: F64, face: I32, at_start: I64, at_end: I64, tolerance: float,
+def bisect(query: LabelQuery, start: F64, end: F64, face: I32, at_start: I64, at_end: I64, tolerance: float,
            stop_at_third: bool) -> tuple[F64, BOOL, I64]:
-    """Where along straight lines the label changes.
+    """Places along straight lines at which the label changes.
 
-    start, end       : (k, 8) float64 node rows
+    start, end       : (k, 8) float64, node rows, mm and parameters
     face             : (k,) int32 numbers
     at_start, at_end : (k,) int64 labels at the ends
-    tolerance        : float, mm, length of the interval that is left
-    stop_at_third    : stop where a label that neither end has is met; else it counts as that of the end
+    tolerance        : float, mm, length of the remaining interval
+    stop_at_third    : stop at a label that neither end has; otherwise it counts as the label of the end
 
     Returns (k,) fraction of the way, (k,) bool where a third label was met, (k,) that label.
     """
@@ -53,7 +53,7 @@ def bisect(ask: Asker, start: F64, end: F64, face: I32, at_start: I64, at_end: I
         if not len(live):
             return 0.5 * (low + high), third, label
         middle = 0.5 * (low[live] + high[live])
-        here = ask(start[live] + middle[:, None] * (end[live] - start[live]), face[live])
+        here = query(start[live] + middle[:, None] * (end[live] - start[live]), face[live])
         same = here == at_start[live]
         low[live[same]], high[live[~same]] = middle[same], middle[~same]
         if stop_at_third:

@@ -1,7 +1,7 @@
-"""Pieces of B-rep faces: a labelling of the surface turned into trimmed faces.
+"""Pieces of B-rep faces: trimmed faces made from labels of the surface.
 
-A label function says what each point of the surface belongs to (a zone, the remainder); ``trim_faces`` finds where it
-changes and returns the pieces with their borders in the parameters of the face. Theory: docs/theory/trim.md.
+A label function gives the label of each point of the surface (a zone, the remainder). ``trim_faces`` finds where the
+label changes and returns the pieces with their borders in the parameters of the face. Theory: docs/theory/trim.md.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from scipy.sparse.csgraph import connected_components
 from geometry.kernels.trim import thin, trace
 from geometry.mesh import F64
 from geometry.part import Part
-from geometry.trimming.facet_sheet import BOOL, I64, Sheet, refined, sheet_of
+from geometry.trimming.facet_sheet import BOOL, I64, FacetSheet, refined, sheet_of
 from geometry.trimming.label_cuts import label_sheet
 from geometry.trimming.label_query import Label
 
-# Pieces narrower than the tolerance are noise of the label along a border; they go to the neighbour, in so many rounds.
+# Pieces narrower than the tolerance are noise of the label along a border. They go to the neighbour, in rounds.
 ABSORB_ROUNDS = 3
 
 
@@ -57,13 +57,14 @@ def trim_faces(part: Part, faces: Sequence[int] | None, label: Label, pitch: flo
     part      : Part with ``uv``
     faces     : face numbers, all when None
     label     : points (k, 3) float64 mm, unit normals (k, 3) float64 out of the material, face numbers (k,) int32 ->
-                labels (k,) integers. It is asked some tens of times with many points; it must give one point one answer
-    pitch     : float, mm, spacing of the first questions: islands and necks narrower may be missed
-    tolerance : float, mm, how near a border is to the change of label
+                labels (k,) integers. It is called some tens of times with many points. One point must always get the
+                same label
+    pitch     : float, mm, spacing of the first points: the search may miss narrower islands and necks
+    tolerance : float, mm, largest distance of a border from the change of label
 
     Returns for each label, in ascending order, its pieces by face number; the pieces of a face partition it.
     Raises GeometryError (``no_parameters``, ``no_such_face``), ValueError for a pitch or tolerance not above 0.
-    Notes   docs/theory/trim.md: error bound, what is decided at seams and poles.
+    Notes   Borders are thinned as in [Douglas1973]. docs/theory/trim.md: error bound, decisions at seams and poles.
     """
     if not (pitch > 0 and tolerance > 0):
         raise ValueError(f"pitch and tolerance must be positive, got {pitch} and {tolerance}")
@@ -89,7 +90,7 @@ def _twins(corners: I64) -> I64:
 
 
 def _components(twin: I64, label: I64) -> I64:
-    """(t,) group number of each facet: facets of one label that hang together."""
+    """(t,) group number of each facet: connected facets of one label."""
     side = np.flatnonzero(twin >= 0)
     a, b = side // 3, twin[side] // 3
     same = label[a] == label[b]
@@ -97,7 +98,7 @@ def _components(twin: I64, label: I64) -> I64:
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
-def _absorb(sheet: Sheet, twin: I64, areas: F64, tolerance: float) -> I64:
+def _absorb(sheet: FacetSheet, twin: I64, areas: F64, tolerance: float) -> I64:
     """Give pieces narrower than the tolerance (twice area over border) to the neighbour with the longest border.
 
     Returns (t,) group numbers; ``sheet.label`` is changed with them.
@@ -111,7 +112,7 @@ def _absorb(sheet: Sheet, twin: I64, areas: F64, tolerance: float) -> I64:
         around = np.bincount(mine, weights=length, minlength=group.max() + 1)
         area = np.bincount(group, weights=areas)
         narrow = (around > 0) & (2.0 * area < tolerance * around)
-        # of two narrow neighbours the lesser waits, lest they swap
+        # the lesser of two narrow neighbours waits; otherwise they swap
         rank = np.where(narrow, area, np.inf)
         lesser = narrow[mine] & ((rank[theirs] > rank[mine]) | ((rank[theirs] == rank[mine]) & (theirs > mine)))
         if not lesser.any():
@@ -128,7 +129,7 @@ def _absorb(sheet: Sheet, twin: I64, areas: F64, tolerance: float) -> I64:
     return group
 
 
-def _patches(sheet: Sheet, twin: I64, group: I64, areas: F64, scale: F64,
+def _patches(sheet: FacetSheet, twin: I64, group: I64, areas: F64, scale: F64,
              tolerance: float) -> dict[int, tuple[FacePatch, ...]]:
     sides = 3 * len(sheet.corners)
     nodes, walked, at = np.empty(sides, np.int64), np.empty(sides, np.int64), np.empty(sides + 1, np.int64)
@@ -165,7 +166,7 @@ def _shoelace(polygon: F64) -> float:
     return float(0.5 * (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum())
 
 
-def _scales(sheet: Sheet) -> F64:
+def _scales(sheet: FacetSheet) -> F64:
     """(f, 2) float64 by face number, mm a unit of u and of v: the 99 % quantile by area over the facets of the face."""
     p, q = sheet.nodes[sheet.corners, :3], sheet.nodes[sheet.corners, 3:5]
     e, f = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
@@ -185,11 +186,11 @@ def _scales(sheet: Sheet) -> F64:
     return out
 
 
-def _kept(sheet: Sheet, nodes: I64, at: I64, owner: I64, other: I64, scale: F64, tolerance: float) -> BOOL:
+def _kept(sheet: FacetSheet, nodes: I64, at: I64, owner: I64, other: I64, scale: F64, tolerance: float) -> BOOL:
     """(n,) nodes that stay in the loops.
 
-    On the rim of a face its own nodes and the ends of borders; on a border between two pieces what Douglas-Peucker
-    leaves, computed once for both sides.
+    On the rim of a face these are its own nodes and the ends of borders. On a border between two pieces they are the
+    nodes that [Douglas1973] keeps, computed once for both sides.
     """
     keep = np.zeros(len(sheet.nodes), bool)
     keep[:sheet.original] = True
@@ -218,7 +219,7 @@ def _thin_chain(chain: I64, points: F64, tolerance: float, keep: BOOL) -> None:
 
 
 def _thin_ring(ring: I64, points: F64, tolerance: float, keep: BOOL) -> None:
-    """A border all round: split at its first node, the one farthest from it, and the one farthest from both."""
+    """A closed border, split at its first node, the node farthest from it, and the node farthest from both."""
     far = int(np.linalg.norm(points[ring, :3] - points[ring[0], :3], axis=1).argmax())
     chord = points[ring[far], :3] - points[ring[0], :3]
     aside = np.linalg.norm(np.cross(points[ring, :3] - points[ring[0], :3], chord), axis=1)
@@ -228,8 +229,8 @@ def _thin_ring(ring: I64, points: F64, tolerance: float, keep: BOOL) -> None:
         _thin_chain(closed[s:e + 1], points, tolerance, keep)
 
 
-def _restore(sheet: Sheet, nodes: I64, at: I64, owner: I64, face_of: I64, keep: BOOL) -> None:
-    """Where thinning made the loops of a piece cross or fall flat, the borders of its face keep all their nodes."""
+def _restore(sheet: FacetSheet, nodes: I64, at: I64, owner: I64, face_of: I64, keep: BOOL) -> None:
+    """Keep all nodes on the borders of a face where thinning made the loops of a piece cross or collapse."""
     rings: dict[int, list[F64]] = {}
     bad = set()
     for k in range(len(at) - 1):

@@ -41,7 +41,7 @@ from service.viewer.preview_picture import draw_preview
 from service.viewer.view_data import VIEW_NAME, plan_view
 from verify.comparison.program_equivalence import carried
 from verify.model import Proof, ProofSetup
-from zones.remainder.remainder import Remainder
+from zones.remainder.remainder import RemainderEntry
 
 PREVIEW_NAME = "preview.png"
 
@@ -110,7 +110,7 @@ class _Reported:
     report: dict[str, Any]
     written: Sequence[WrittenProgram]
     uncut: NDArray[np.bool_]
-    remainder: Sequence[Remainder]
+    remainder: Sequence[RemainderEntry]
 
 
 def _report(job: ProvedPlan, cautions: Sequence[JobCaution]) -> _Reported:

@@ -65,7 +65,7 @@ def stepnc_under_way(programs: Sequence[WrittenProgram], part: Part, tools: Sequ
         with ThreadPoolExecutor(1) as pool:
             command = [sys.executable, "-m", "service.delivery.stepnc_process"]
             begun = pool.submit(run_limited, command, pickle.dumps(job), time_limit=TIME_LIMIT,
-                                memory_limit=MEMORY_LIMIT, what="stepnc", stop=stop)
+                                memory_limit=MEMORY_LIMIT, name="stepnc", stop=stop)
             try:
                 yield wait
             finally:

@@ -21,7 +21,7 @@ from toolpath.tool_deflection import Bend
 from toolpath.workingsteps import Motion, Workingstep
 from verify.model import Proof
 from zones.plan_view.regions import Labels
-from zones.remainder.remainder import Remainder, explain
+from zones.remainder.remainder import RemainderEntry, explain
 from zones.zoning.zones import ZoneArea, is_open
 
 REMAINDER_FLOOR_MM2 = 0.005
@@ -116,13 +116,13 @@ def _place(ready: Prepared, at: tuple[float, float, float]) -> list[float | None
     return [r(v) for v in ready.views[0].back(np.array(at)).tolist()]
 
 
-def _remainder(ready: Prepared, items: list[Remainder]) -> list[dict[str, Any]]:
+def _remainder(ready: Prepared, items: list[RemainderEntry]) -> list[dict[str, Any]]:
     return [{"faces": faces(x.faces), "area_mm2": r(x.area, 3), "reason": x.reason, "would_need": x.would_need,
              "tool_at_hand": x.tool_at_hand or None, "why_left": x.why_left or None, "at_mm": _place(ready, x.at),
              "patches": _places(ready, x)} for x in items if x.area >= REMAINDER_FLOOR_MM2]
 
 
-def _places(ready: Prepared, item: Remainder) -> list[dict[str, Any]]:
+def _places(ready: Prepared, item: RemainderEntry) -> list[dict[str, Any]]:
     """The area of an entry on each face, and its box in the setup frame."""
     s = item.samples
     if s is None:
@@ -160,7 +160,7 @@ def dry_report(ready: Prepared) -> dict[str, Any]:
 
 def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples, labels: Labels,
                zone: NDArray[np.int32], given_up: NDArray[np.bool_],
-               cautions: Sequence[JobCaution] = ()) -> tuple[dict[str, Any], NDArray[np.bool_], list[Remainder]]:
+               cautions: Sequence[JobCaution] = ()) -> tuple[dict[str, Any], NDArray[np.bool_], list[RemainderEntry]]:
     """report.json without its files, the samples that stay uncut, and the remainder.
 
     Each sample is proved, or a zone answers for it (then it is a finding), or it stands in the remainder.

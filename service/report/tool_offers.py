@@ -17,8 +17,8 @@ from zones.reach.access_reach import Reach
 from zones.reach.access_view import View
 from zones.reach.tip_field import TipField, touchable
 from zones.remainder.obstructions import in_sight
-from zones.remainder.tool_proposal import Proposal, ProposedTool, propose
-from zones.remainder.tool_requirements import Buyer
+from zones.remainder.tool_proposal import ToolProposal, ToolToAdd, propose
+from zones.remainder.tool_requirements import ToolRequirement
 from zones.zoning.zones import LEAST_ZONE_MM2, Zoning, build_zones
 
 LENGTHS = ("diameter_mm", "corner_radius_mm", "flute_length_mm", "neck_diameter_mm", "neck_length_mm",
@@ -36,7 +36,7 @@ class Offer:
     """
 
     access: str
-    proposed: ProposedTool
+    proposed: ToolToAdd
     body: ToolBody
     area_mm2: float = 0.0
 
@@ -85,19 +85,19 @@ def offers(ready: Prepared) -> Offers:
     return Offers(tuple(found), emptied, _stays(proposals, area, zoning.taken, stays))
 
 
-def _proposals(ready: Prepared, rest: NDArray[np.int64]) -> list[tuple[View, NDArray[np.int64], Proposal]]:
+def _proposals(ready: Prepared, rest: NDArray[np.int64]) -> list[tuple[View, NDArray[np.int64], ToolProposal]]:
     """Each view with its samples of the remainder and the proposal for them; the last view gets all that are left."""
     out = []
     for k, view in enumerate(ready.views):
         last = k == len(ready.views) - 1
         here = in_sight(view.samples.subset(rest), view.obstacles) | last
         mine, rest = rest[here], rest[~here]
-        buyer = Buyer(view, ready.lift, ready.inputs.clearances)
-        out.append((view, mine, propose(view.samples.subset(mine), buyer)))
+        requirement = ToolRequirement(view, ready.lift, ready.inputs.clearances)
+        out.append((view, mine, propose(view.samples.subset(mine), requirement)))
     return out
 
 
-def _numbered(inputs: JobInputs, tools: Sequence[tuple[str, ProposedTool]]) -> list[Offer]:
+def _numbered(inputs: JobInputs, tools: Sequence[tuple[str, ToolToAdd]]) -> list[Offer]:
     """The tools with numbers above those of the setup, and ids of 'P' and the number."""
     bodies = {b.id: b for b in inputs.bodies}
     number = max(b.number for b in bodies.values())
@@ -146,12 +146,12 @@ def _worth_it(found: Sequence[Offer]) -> list[Offer]:
     return [o for o in found if o.body.id not in drop]
 
 
-def _stays(proposals: Sequence[tuple[View, NDArray[np.int64], Proposal]], area: NDArray[np.float64],
+def _stays(proposals: Sequence[tuple[View, NDArray[np.int64], ToolProposal]], area: NDArray[np.float64],
            taken: NDArray[np.bool_], total: float) -> dict[str, float]:
     """Area that stays, mm², by reason, scaled from the samples of the proposals to ``total``."""
     stays: dict[str, float] = {}
     for _, mine, proposal in proposals:
-        rows = mine[proposal.asked]
+        rows = mine[proposal.rows]
         why = np.where(proposal.why == "taken", "too little", proposal.why)
         weight = float(area[mine].sum()) / max(float(area[rows].sum()), 1e-300)
         for reason in sorted(set(why[~taken[rows]].tolist())):

@@ -17,7 +17,7 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
 from geometry.mesh import F64, TriangleMesh
-from geometry.setup_frame import Placement
+from geometry.setup_frame import SetupFrame
 from geometry.tool_body import ToolBody
 from output.gcode.dialects import DIALECTS, Switches
 from output.gcode.program_writer import label_number, lowest_tip
@@ -149,7 +149,7 @@ def _clamping(ready: Prepared, frame: ProofFrame, programs: Sequence[WrittenProg
     return SheetSection(f"clamping-{frame.id}", title, tuple(blocks))
 
 
-def _setup_axes(placement: Placement) -> F64:
+def _setup_axes(placement: SetupFrame) -> F64:
     """(3, 3) float64, dimensionless: unit axes of the setup frame as rows, in coordinates of the part's file."""
     x, z = (np.array(v) / np.linalg.norm(v) for v in (placement.x_axis, placement.z_axis))
     return np.array([x, np.cross(z, x), z])

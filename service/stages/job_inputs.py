@@ -16,7 +16,7 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.move_timing import Rates
-from geometry.setup_frame import Placement
+from geometry.setup_frame import SetupFrame
 from geometry.tool_body import ToolBody
 from output.inverse_kinematics import RotaryMachine
 from schemas.machine import Machine
@@ -56,7 +56,7 @@ class JobInputs:
     sha256: str
     labels: Mapping[str, str]
     solid: int | None
-    placement: Placement
+    placement: SetupFrame
     accesses: tuple[Access, ...]
     tools: tuple[Tool, ...]
     bodies: tuple[ToolBody, ...]
@@ -142,10 +142,10 @@ def mesh_chord(quality: Quality) -> float:
     return float(np.clip(0.15 * quality.scallop_height_mm, 0.001, min(0.005, 0.4 * quality.gouge_tolerance_mm)))
 
 
-def placement_of(setup: Setup) -> Placement:
+def placement_of(setup: Setup) -> SetupFrame:
     """The setup frame in the coordinates of the file."""
     p = setup.placement
-    return Placement(origin=tuple(p.origin_mm), z_axis=tuple(p.z_axis), x_axis=tuple(p.x_axis))
+    return SetupFrame(origin=tuple(p.origin_mm), z_axis=tuple(p.z_axis), x_axis=tuple(p.x_axis))
 
 
 def _cut_table(setup: Setup, bodies: Sequence[ToolBody]) -> dict[str, CutData]:

@@ -29,11 +29,11 @@ from zones.machinable_area import machinable_faces
 from zones.model import Decomposition
 from zones.plan_view.categories import Categories
 from zones.plan_view.channel_plan import ChannelPlan
-from zones.plan_view.regions import Regioner
+from zones.plan_view.regions import RegionLocator
 from zones.reach.access_reach import Reach
 from zones.reach.access_view import View, access_rotation, turned, turned_samples
 from zones.reach.approach_cones import directions_over_hemisphere
-from zones.reach.index_orientations import DIRECTIONS, Gatherer, orientations
+from zones.reach.index_orientations import DIRECTIONS, AxisCoverage, orientations
 from zones.reach.tip_field import DiscHeights, TipField
 from zones.remainder.obstructions import AIR
 from zones.zoning.zone_patches import zone_patches
@@ -241,11 +241,11 @@ def _further(inputs: JobInputs, part: Part, blank: Blank, views: list[View], zon
     samples = views[0].samples
     turn = views[0].rotation
     here = turned_samples(samples, turn.T)
-    gatherer = Gatherer(TriangleTree(obstacle_mesh(part, inputs, table=table_height(inputs, blank))), inputs.bodies,
+    coverage = AxisCoverage(TriangleTree(obstacle_mesh(part, inputs, table=table_height(inputs, blank))), inputs.bodies,
                         inputs.clearances, inputs.quality.scallop_height_mm, lift, inputs.quality.stock_allowance_mm)
     worth = max(MIN_ACCESS_GAIN_MM2, MIN_ACCESS_GAIN_SHARE * float(samples.area.sum()))
     known = np.array([v.direction for v in views])
-    axes = orientations(here.subset(np.flatnonzero(~zoning.taken)), gatherer, machine.stands, machine.even, known,
+    axes = orientations(here.subset(np.flatnonzero(~zoning.taken)), coverage, machine.stands, machine.even, known,
                         worth)
     names = (f"I{k}" for k in count(1) if f"I{k}" not in {a.id for a in inputs.accesses})
     offset = inputs.accesses[0].work_offset
@@ -296,10 +296,10 @@ def _view(inputs: JobInputs, name: str, part: Part, blank: Blank, rotation: F64,
     standing = DiscHeights(obstacles)
     fields = {b.id: tip_field(inputs, blank, rotation, standing, here.bounds, b) for b in inputs.bodies}
     seen = turned_samples(samples, rotation @ first.T)
-    regioner = Regioner(here, decomposition, channels, first=is_first)
+    locator = RegionLocator(here, decomposition, channels, first=is_first)
     there = None if is_first else (samples.points, samples.normals)
-    labels = regioner.of(seen.points, seen.normals, seen.face, there)
-    return View(name, rotation, here, tree, obstacles, seen, labels, fields, regioner, first)
+    labels = locator.of(seen.points, seen.normals, seen.face, there)
+    return View(name, rotation, here, tree, obstacles, seen, labels, fields, locator, first)
 
 
 def planning_samples(part: Part, decomposition: Decomposition, inputs: JobInputs, directions: F64) -> SurfaceSamples:

@@ -15,7 +15,7 @@ from geometry.trimming.trim import trim_faces
 from service.stages.preparation import Prepared
 from toolpath.passes.trimmed_faces import Faces, SmoothFaces, TrimmedFace
 from toolpath.strategies.isoparametric import suits
-from zones.machinable_area import Form
+from zones.machinable_area import AreaForm
 
 TURN = 1e-3  # rad between normals at a joint; beyond it two faces are not one sheet
 WIDE = 1e3  # mm between the places where a face is searched for a change of label; there is none
@@ -31,8 +31,8 @@ def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
     """
     curved = {f.number for f in ready.part.faces if f.surface != "plane"}
     leans = ready.inputs.turns and ready.inputs.machine.simultaneous
-    wanted = [z for z in ready.zones if z.form is not Form.LEVEL and suits(z.tool) or leans and z.form is Form.STEEP]
-    flat = {f for z in wanted if leans and z.form is Form.STEEP for f in z.faces} - curved
+    wanted = [z for z in ready.zones if z.form is not AreaForm.LEVEL and suits(z.tool) or leans and z.form is AreaForm.STEEP]
+    flat = {f for z in wanted if leans and z.form is AreaForm.STEEP for f in z.faces} - curved
     numbers = sorted({f for z in wanted for f in z.faces} & curved | flat)
     if not numbers:
         return {}
@@ -66,7 +66,7 @@ def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
             if key not in joined:
                 joined[key] = SmoothFaces(alone, ready.view(z.access).part.mesh, uv)
             mine.append(joined[key])
-        if z.form is Form.STEEP:
+        if z.form is AreaForm.STEEP:
             mine += [face for f in z.faces if f in flat for face in there[z.access].get(f, ())]
         out[z.id] = tuple(mine)
     return out

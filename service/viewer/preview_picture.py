@@ -40,7 +40,7 @@ from service.viewer.view_paths import CUT, RAPID
 
 SIZE = (1760, 960)
 HEADER, LEGEND, GUTTER = 56, 132, 8
-# the same colours as on the page, web/src/colours.ts
+# the same colours as on the page, web/src/scene/colours.ts
 CONNECTION: RGB = (1.0, 0.52, 0.0)
 REMAINDER: RGB = (0.86, 0.10, 0.14)
 HATCHED: RGB = (0.98, 0.86, 0.84)

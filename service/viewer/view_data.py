@@ -27,7 +27,7 @@ from service.viewer.view_stock import stock_chunk
 from verify.checks.program_sequence import Reading, read_all
 from verify.model import NcProgram, Proof, ProofSetup
 from zones.reach.access_view import turned_samples
-from zones.remainder.remainder import Remainder
+from zones.remainder.remainder import RemainderEntry
 
 VIEW_NAME = "view.bin"
 VIEW_VERSION = 2
@@ -38,7 +38,7 @@ I64 = NDArray[np.int64]
 
 
 def plan_view(ready: Prepared, frame: ProofFrame, scored: Score, zone: NDArray[np.int32], uncut: NDArray[np.bool_],
-              remainder: Sequence[Remainder], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
+              remainder: Sequence[RemainderEntry], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
               report: Mapping[str, Any]) -> Files:
     """The view file of a planned job, as ``service.delivery.result_files`` takes it.
 
@@ -56,7 +56,7 @@ def plan_view(ready: Prepared, frame: ProofFrame, scored: Score, zone: NDArray[n
 
 
 def _plan_view(ready: Prepared, frame: ProofFrame, scored: Score, zone: NDArray[np.int32], uncut: NDArray[np.bool_],
-               remainder: Sequence[Remainder], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
+               remainder: Sequence[RemainderEntry], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
                report: Mapping[str, Any]) -> Files:
     zones, entries = report["zones"], report["remainder"]
     label = np.where(zone > 0, zone.astype(np.int64) - 1, len(zones) + len(entries))
@@ -94,7 +94,7 @@ def _or_none(report: Mapping[str, Any], names: str, made: Callable[[], Files]) -
         return {}
 
 
-def _entries(s: SurfaceSamples, remainder: Sequence[Remainder], count: int) -> I64:
+def _entries(s: SurfaceSamples, remainder: Sequence[RemainderEntry], count: int) -> I64:
     """Entry of the remainder for each uncut sample, (r,) int64, index; ``count`` for none.
 
     The entry is that of the nearest sample of the same face that has one.

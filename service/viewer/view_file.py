@@ -8,7 +8,7 @@
 A chunk is a table of whole numbers, column after column. A column of n rows and k values of w bytes is stored as k * w
 planes of n bytes, value by value, the lowest byte first; equal high bytes deflate to nothing. A column of the form
 'steps' stores each row as its difference from the row before, the first from 0. The forms 'steps' and 'signed' store
-0, -1, 1, -2 as 0, 1, 2, 3. The page reads the file in web/src/viewfile.ts.
+0, -1, 1, -2 as 0, 1, 2, 3. The page reads the file in web/src/shared/view-file.ts.
 """
 
 from __future__ import annotations

@@ -17,8 +17,8 @@ from geometry.mesh import F64, I32
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.part import EdgeKind, Part
 from geometry.sampling import SurfaceSamples
-from geometry.trimming.facet_sheet import Sheet, refined, sheet_of, sides_of
-from geometry.trimming.label_query import Asker, bisect
+from geometry.trimming.facet_sheet import FacetSheet, refined, sheet_of, sides_of
+from geometry.trimming.label_query import LabelQuery, bisect
 from service.viewer.view_file import Chunk, Column
 
 PITCH, MAX_FACETS = 0.8, 120_000  # mm between nodes, wider where they would make more facets than that
@@ -92,7 +92,7 @@ def facets_of(part: Part, judged: Judged) -> Facets:
 
         area = float(part.mesh.areas[np.isin(part.mesh.face_ids, faces)].sum())
         pitch = max(PITCH, float(np.sqrt(2.0 * area / MAX_FACETS)))
-        sheets.append(_cut(refined(sheet_of(part, faces), pitch), Asker(label)))
+        sheets.append(_cut(refined(sheet_of(part, faces), pitch), LabelQuery(label)))
     if others:
         bare = sheet_of(part, others)
         bare.label = np.full(len(bare.corners), NOBODY, np.int64)
@@ -106,7 +106,7 @@ def facets_of(part: Part, judged: Judged) -> Facets:
                   np.concatenate([x.label for x in sheets]))
 
 
-def _cut(sheet: Sheet, ask: Asker) -> Sheet:
+def _cut(sheet: FacetSheet, ask: LabelQuery) -> FacetSheet:
     """Cut the facets of a sheet along straight lines where the label of their corners changes."""
     at = ask(sheet.nodes, sheet.face)
     mixed = (at[sheet.corners] != at[sheet.corners[:, :1]]).any(axis=1)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.passes.faceting import facet_deviation
 from examples.family.thesis import Kind, surface
-from geometry.surfaces.faceting import facet_deviation
 
 
 @pytest.mark.parametrize("kind", Kind)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from geometry.part import Part
-from geometry.setup_frame import Placement
+from geometry.setup_frame import SetupFrame
 from geometry.step_import.reader import read_part
 from zones.features.decomposition import decompose
 from zones.model import Decomposition
@@ -99,7 +99,7 @@ def test_fillets_at_the_foot(recipe: str, seed: int, fillet: float, tmp_path: Pa
 @pytest.mark.slow
 def test_compressor_wheel_has_nine_blades(shared_parts: Path) -> None:
     part = read_part(shared_parts / "imp_kj66_compressor_wheel.step", chord=0.01,
-                     placement=Placement(z_axis=(0, 1, 0), x_axis=(1, 0, 0)))
+                     placement=SetupFrame(z_axis=(0, 1, 0), x_axis=(1, 0, 0)))
     d = decompose(part)
     assert (len(d.walls), len(d.connections), len(d.channels)) == (9, 0, 9)
     assert all(0.6 < w.thickness < 0.8 for w in d.walls)
@@ -109,5 +109,5 @@ def test_compressor_wheel_has_nine_blades(shared_parts: Path) -> None:
 @pytest.mark.slow
 def test_propeller_has_no_wall(shared_parts: Path) -> None:
     part = read_part(shared_parts / "blade_seed_propeller.stp", chord=0.02,
-                     placement=Placement(z_axis=(0, 1, 0), x_axis=(1, 0, 0)))
+                     placement=SetupFrame(z_axis=(0, 1, 0), x_axis=(1, 0, 0)))
     assert decompose(part).walls == ()

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.tool_body import HolderSegment, ToolBody
+from geometry.tool_body import HolderFrustum, ToolBody
 from tests.pocket_case import SETUP, TOOL, block, line_of, program, scored, text
 from verify.material.collision import run_clashes
 from verify.material.stock_lines import run_bodies
@@ -60,7 +60,7 @@ def test_a_collision_is_not_hidden_by_a_nearer_looking_miss(turn):
 def test_a_near_segment_of_a_holder_does_not_hide_one_that_collides():
     """A slim segment, whose clearance is 0.1 mm, 0.3 mm deep; a wide one, of 1 mm, 0.05 mm beside."""
     tool = ToolBody("T1", 1, 20.0, 0.0, 5.0, 8.0, 20.0, 8.0, 30.0,
-                    (HolderSegment(19.8, 19.8, 15.0), HolderSegment(26.0, 26.0, 20.0)))
+                    (HolderFrustum(19.8, 19.8, 15.0), HolderFrustum(26.0, 26.0, 20.0)))
     points = np.array([[0.0, 9.6, 40.0], [0.0, 13.05, 50.0]])
     moves = Moves(np.array([[-5.0, 0.0, 0.0]]), np.array([[5.0, 0.0, 0.0]]), np.array([True]), np.zeros(1, np.int32))
     setup = ProofSetup(clearance_holder=1.0)

@@ -8,7 +8,7 @@ import pytest
 
 from geometry.mesh import TriangleMesh
 from geometry.sampling import sample_surface
-from geometry.tool_body import HolderSegment, ToolBody
+from geometry.tool_body import HolderFrustum, ToolBody
 from tests.hand_parts import as_part, prism
 from verify.model import NcProgram, ProofSetup, ScoredSamples
 from verify.prove import prove
@@ -132,7 +132,7 @@ def test_the_tip_of_a_pyramid_counts(turn, depth):
     corners = [(-3.9, -3.88, -4), (4.1, -3.88, -4), (4.1, 4.12, -4), (-3.9, 4.12, -4), (0.1, 0.12, 0)]
     faces = [(0, 2, 1), (0, 3, 2), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)]
     pyramid = as_part(TriangleMesh(np.array(corners, float), np.array(faces, np.int32), np.array([1, 1, 2, 3, 4, 5])))
-    held = ToolBody("T1", 1, 4.0, 0.0, 10.0, 3.8, 15.0, 4.0, 20.0, (HolderSegment(20.0, 20.0, 20.0),))
+    held = ToolBody("T1", 1, 4.0, 0.0, 10.0, 3.8, 15.0, 4.0, 20.0, (HolderFrustum(20.0, 20.0, 20.0),))
     over = depth_of("collision", ["G0 X-8 Y-30", f"Z{-20 - depth}", "G1 Y30 F500"], tool=held, part=pyramid,
                     setup=BARE, turn=turn)
     assert over == pytest.approx(depth, abs=2e-3)

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from geometry.sampling import sample_surface
-from geometry.tool_body import HolderSegment, ToolBody
+from geometry.tool_body import HolderFrustum, ToolBody
 from tests.hand_parts import prism
 from tests.pocket_case import line_of, text
 from verify.model import NcProgram, ProofSetup, ScoredSamples
 from verify.prove import prove
 
 MILL = ToolBody("T1", 1, 10.0, 0.0, 12.0, 9.8, 20.0, 10.0, 40.0)
-SLOT = ToolBody("T2", 2, 12.0, 0.0, 3.0, 6.0, 25.0, 6.0, 40.0, (HolderSegment(20.0, 20.0, 20.0),))
+SLOT = ToolBody("T2", 2, 12.0, 0.0, 3.0, 6.0, 25.0, 6.0, 40.0, (HolderFrustum(20.0, 20.0, 20.0),))
 SETUP = ProofSetup(stock_kind="box", margin=0.5, uncertainty=0.0, rapid_feed=5000.0)
 PROFILE = [(-20, -10), (20, -10), (20, -6), (-2, -6), (-2, -3), (0, -3), (0, 0), (-20, 0)]  # X, Z
 FANS = [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 7), (4, 5, 6), (4, 6, 7)]

@@ -94,13 +94,3 @@ def first_hit(mesh: TriangleMesh, origin, direction, t_min, t_max):
         if u >= 0.0 and v >= 0.0 and u + v <= 1.0 and t_min <= t <= t_max and t < best:
             best, number = t, i
     return best, number
-
-
-def dilate(height, offsets):
-    """Maximum over the cells at the given (dj, di)."""
-    ny, nx = height.shape
-    out = np.full_like(height, -np.inf)
-    for j in range(ny):
-        for i in range(nx):
-            out[j, i] = max(height[j + dj, i + di] for dj, di in offsets if 0 <= j + dj < ny and 0 <= i + di < nx)
-    return out

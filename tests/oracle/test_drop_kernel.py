@@ -7,7 +7,6 @@ from geometry.kernels.drop import drop_tip_below
 from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import blocked_many, drop_contacts, drop_grid, drop_tips
-from geometry.mesh_queries.height_field import heights
 from geometry.sampling import sample_surface
 from tests.oracle.drop_shapes import CUTTERS, SHAPES, smooth, soup
 from tests.oracle.naive_drop import drop, lift_of_points
@@ -86,7 +85,7 @@ def test_blocked_is_drop_above_z(shape, cutter):
 def test_radius_zero_is_the_height_of_the_mesh(shape):
     mesh = SHAPES[shape]()
     xy = _points(mesh, 200, seed=4)
-    got = heights(TriangleTree(mesh), xy)
+    got = drop_tips(TriangleTree(mesh), xy, 0.0, 0.0)
     n = np.cross(mesh.triangles[:, 1] - mesh.triangles[:, 0], mesh.triangles[:, 2] - mesh.triangles[:, 0])
     for (x, y), z in zip(xy, got, strict=True):
         v = mesh.triangles - [x, y, 0.0]

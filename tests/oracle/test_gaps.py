@@ -18,7 +18,7 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.part import EdgeKind
 from zones.features.channels import Facing, find_facings
 from zones.features.face_graph import Link
-from zones.features.smooth_surface import SmoothFaces
+from zones.features.smooth_surface import SmoothSurface
 
 Surface = Callable[[F64, F64], F64]
 """(n,) u and (n,) v, both 0 to 1, to (n, 3) mm; the outward normal is X_u x X_v times a sign."""
@@ -193,7 +193,7 @@ def test_normals_hold_up_to_the_corners_and_improve_with_the_cube_of_the_pitch(r
     worst = []
     for columns in (20, 40):
         mesh, uv, _ = mesh_of([(surface, -1.0)], columns, rows)
-        smooth = SmoothFaces(mesh, uv, np.arange(len(mesh.faces)), 0.05)
+        smooth = SmoothSurface(mesh, uv, np.arange(len(mesh.faces)), 0.05)
         t = np.repeat(np.arange(len(mesh.faces)), 4)
         share = np.tile(np.vstack([np.eye(3), [[0.3, 0.3, 0.4]]]), (len(mesh.faces), 1))
         points = np.einsum("ij,ijk->ik", share, mesh.triangles[t])
@@ -213,7 +213,7 @@ def test_places_lie_on_the_exact_surface() -> None:
     mesh, uv, _ = mesh_of([(surface, -1.0)], 64, 1)
     t = np.arange(len(mesh.faces))
     points = mesh.triangles.mean(axis=1)
-    place, _ = SmoothFaces(mesh, uv, t, 0.05).at(points, t)
+    place, _ = SmoothSurface(mesh, uv, t, 0.05).at(points, t)
 
     def off(p: F64) -> float:
         v = p[:, 2] / HEIGHT
@@ -226,5 +226,5 @@ def test_without_parameters_the_facets_are_taken() -> None:
     mesh, _, _ = mesh_of([PAIRS["parallel"][0:1] + (1.0,)], 8, 1)
     t = np.arange(len(mesh.faces))
     points = mesh.triangles.mean(axis=1)
-    place, normal = SmoothFaces(mesh, None, t, 0.05).at(points, t)
+    place, normal = SmoothSurface(mesh, None, t, 0.05).at(points, t)
     assert np.array_equal(place, points) and np.array_equal(normal, mesh.normals)

@@ -14,27 +14,28 @@ from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import FEW, drop_tips
 from geometry.mesh_queries.outline_drop import drop_turned, turned_contacts
-from geometry.mesh_queries.revolved_outline import CHORD, Arc, Line, Outline, heights
-from geometry.tool_body import HolderSegment, ToolBody
+from geometry.mesh_queries.revolved_outline import CHORD, Outline, OutlineArc, OutlineLine, heights
+from geometry.tool_body import HolderFrustum, ToolBody
 from tests.oracle.drop_shapes import CUTTERS, SHAPES, smooth
 from toolpath.cutter.cutter import Cutter
 from toolpath.drop_cutter import drop_cutter
 
 TOOL = ToolBody("T1", 1, 2.0, 1.0, 3.0, 1.8, 8.0, 4.0, 12.0,
-                (HolderSegment(7.0, 9.0, 4.0), HolderSegment(12.0, 12.0, 3.0)))
+                (HolderFrustum(7.0, 9.0, 4.0), HolderFrustum(12.0, 12.0, 3.0)))
 TURNED = {
     "tapered": Cutter.tapered(diameter=6.0, tip_diameter=1.0, angle_deg=5.0, length=20.0),
     "steep cone": Cutter.tapered(diameter=8.0, tip_diameter=2.0, angle_deg=60.0, length=20.0),
     "barrel": Cutter.barrel(diameter=8.0, tip_diameter=2.0, side_radius=40.0, length=20.0),
-    "drill": Cutter.turned(Outline((Line(3.0, 1.8),)), length=20.0),
-    "chamfered": Cutter.turned(Outline((Line(1.0, 0.0), Line(2.5, 1.0), Arc(3.0, 1.5, (2.5, 1.5)))), length=9.0),
+    "drill": Cutter.turned(Outline((OutlineLine(3.0, 1.8),)), length=20.0),
+    "chamfered": Cutter.turned(
+        Outline((OutlineLine(1.0, 0.0), OutlineLine(2.5, 1.0), OutlineArc(3.0, 1.5, (2.5, 1.5)))), length=9.0),
     "assembly": Cutter.assembly(TOOL),
 }
 
 
 def bull(radius: float, corner: float) -> Outline:
-    flat = (Line(radius - corner, 0.0),) if radius > corner else ()
-    return Outline((*flat, *((Arc(radius, corner, (radius - corner, corner)),) if corner else ())))
+    flat = (OutlineLine(radius - corner, 0.0),) if radius > corner else ()
+    return Outline((*flat, *((OutlineArc(radius, corner, (radius - corner, corner)),) if corner else ())))
 
 
 def points_over(mesh, n, seed=0):
@@ -120,7 +121,7 @@ def test_an_assembly_is_the_highest_of_its_parts():
     mesh = SHAPES["walls"]()
     tree, xy = TriangleTree(mesh), points_over(mesh, 400, seed=3)
     parts = [drop_tips(tree, xy, 1.0, 1.0), drop_tips(tree, xy, 2.0, 0.0) - 8.0, drop_tips(tree, xy, 6.0, 0.0) - 16.0]
-    cone = Outline((Line(3.5, 0.0), Line(4.5, 4.0)))
+    cone = Outline((OutlineLine(3.5, 0.0), OutlineLine(4.5, 4.0)))
     parts.append(drop_turned(tree, xy, cone) - 12.0)
     np.testing.assert_allclose(drop_turned(tree, xy, TURNED["assembly"].outline), np.max(parts, axis=0), rtol=0,
                                atol=1e-10)
@@ -130,12 +131,13 @@ def test_an_assembly_is_the_highest_of_its_parts():
 def test_a_hollow_arc_is_larger_by_less_than_its_chords():
     mesh = SHAPES["soup"]()
     tree, xy = TriangleTree(mesh), points_over(mesh, 200, seed=4)
-    hollow = Outline((Line(1.0, 0.0), Line(1.0, 2.0), Arc(3.0, 4.0, (3.0, 2.0), hollow=True), Line(4.0, 4.0)))
+    hollow = Outline((OutlineLine(1.0, 0.0), OutlineLine(1.0, 2.0), OutlineArc(3.0, 4.0, (3.0, 2.0), hollow=True),
+                      OutlineLine(4.0, 4.0)))
     tip = drop_turned(tree, xy, hollow)
-    inner = (Line(1.0, 0.0), Line(1.0, 2.0))
+    inner = (OutlineLine(1.0, 0.0), OutlineLine(1.0, 2.0))
     angles = np.linspace(0.0, math.pi / 2, 300)[1:]
-    fine = Outline((*inner, *(Line(3.0 - 2.0 * math.cos(t), 2.0 + 2.0 * math.sin(t)) for t in angles.tolist()),
-                    Line(4.0, 4.0)))
+    fine = Outline((*inner, *(OutlineLine(3.0 - 2.0 * math.cos(t), 2.0 + 2.0 * math.sin(t)) for t in angles.tolist()),
+                    OutlineLine(4.0, 4.0)))
     exact = drop_turned(tree, xy, fine)
     assert (tip >= exact - 1e-5).all()
     # chords stand out by CHORD across; where the arc is steep that is more along z, by at most the root of 2 r CHORD
@@ -199,8 +201,9 @@ def test_the_same_bytes_on_one_thread_and_two():
 
 
 def test_outlines_that_are_none():
-    for pieces, word in (((Line(2.0, 1.0), Line(3.0, 0.5)), "falls"), ((Line(-1.0, 0.0),), "end"),
-                         ((Arc(2.0, 1.0, (0.0, 1.0)),), "centre"), ((Line(math.nan, 0.0),), "end"), ((), "width")):
+    for pieces, word in (((OutlineLine(2.0, 1.0), OutlineLine(3.0, 0.5)), "falls"), ((OutlineLine(-1.0, 0.0),), "end"),
+                         ((OutlineArc(2.0, 1.0, (0.0, 1.0)),), "centre"), ((OutlineLine(math.nan, 0.0),), "end"),
+                         ((), "width")):
         with pytest.raises(SetupError, match=word) as caught:
             Outline(pieces)
         assert caught.value.code == "bad_cutter"

@@ -8,10 +8,10 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from zones.plan_view.plan_map import OUTSIDE, Area, PlanMap
+from zones.plan_view.plan_map import OUTSIDE, PlanArea, PlanMap
 
 
-def random_areas(seed: int) -> list[Area]:
+def random_areas(seed: int) -> list[PlanArea]:
     rng = np.random.default_rng(seed)
     out = []
     for k in range(int(rng.integers(1, 7))):
@@ -22,7 +22,7 @@ def random_areas(seed: int) -> list[Area]:
         shape = shapely.Polygon(ring).buffer(0)
         if rng.random() < 0.3:
             shape = shape.difference(shapely.Point(centre).buffer(0.4))
-        out.append(Area(f"A{k}", shape))
+        out.append(PlanArea(f"A{k}", shape))
     return out
 
 
@@ -46,7 +46,7 @@ def test_areas_of_the_cells_add_up_to_the_overlay() -> None:
 
 
 def test_a_line_cuts_without_naming() -> None:
-    square = Area("H1", shapely.box(0, 0, 4, 2))
+    square = PlanArea("H1", shapely.box(0, 0, 4, 2))
     made = PlanMap.of([square], [np.array([[2.0, 0.0], [2.0, 2.0]])])
     left, right, out, far = made.cell_at([[1, 1], [3, 1], [4.5, 1], [50, 1]])
     assert len({left, right, out, far}) == 4 and far == OUTSIDE

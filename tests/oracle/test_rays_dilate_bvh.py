@@ -1,4 +1,4 @@
-"""Rays, disc dilation and the hierarchy itself against slow twins."""
+"""Rays and the hierarchy itself against slow twins."""
 
 import numpy as np
 import pytest
@@ -6,11 +6,10 @@ import pytest
 from geometry.errors import GeometryError
 from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
-from geometry.mesh_queries.dilate import Rounding, dilate_disc
-from geometry.mesh_queries.height_field import height_grid, heights
+from geometry.mesh_queries.drop import drop_grid, drop_tips
 from geometry.mesh_queries.rays import first_hits
 from tests.oracle.drop_shapes import SHAPES, box, smooth
-from tests.oracle.naive_drop import dilate, first_hit
+from tests.oracle.naive_drop import first_hit
 
 
 @pytest.mark.parametrize("shape", ["smooth", "walls", "soup"])
@@ -63,10 +62,10 @@ def test_heights_are_those_of_rays_from_above():
     tree = TriangleTree(smooth())
     xy = np.random.default_rng(3).random((500, 2)) * 22 - 1
     t, triangle = first_hits(tree, np.column_stack([xy, np.full(500, 50.0)]), np.array([0, 0, -1.0]))
-    z = heights(tree, xy)
+    z = drop_tips(tree, xy, 0.0, 0.0)
     np.testing.assert_array_equal(np.isinf(z), triangle < 0)
     np.testing.assert_allclose(z[triangle >= 0], 50.0 - t[triangle >= 0], atol=1e-12)
-    grid = height_grid(tree, 0.0, 0.0, 2.0, 11, 11)  # nodes of the mesh's own lattice and its borders
+    grid = drop_grid(tree, 0.0, 0.0, 2.0, 11, 11, 0.0, 0.0)  # nodes of the mesh's own lattice and its borders
     assert np.isfinite(grid).all()
 
 
@@ -78,36 +77,6 @@ def test_wrong_rays_are_named():
         first_hits(tree, np.zeros((2, 3)), np.ones((3, 3)))
     with pytest.raises(GeometryError, match="origins"):
         first_hits(tree, np.zeros((2, 2)), np.ones((2, 3)))
-
-
-@pytest.mark.parametrize("radius", [0.0, 0.7, 1.0, 1.5, 3.0, 5.0, 7.3, 40.0])
-@pytest.mark.parametrize("rounding", Rounding)
-def test_dilation_is_the_naive_one(radius, rounding):
-    rng = np.random.default_rng(4)
-    field = rng.random((23, 31))
-    field[rng.random(field.shape) < 0.6] = -np.inf
-    reach = range(-int(radius) - 2, int(radius) + 3)
-    gap = abs if rounding is Rounding.CENTRES else (lambda k: max(abs(k) - 1, 0))
-    offsets = [(j, i) for j in reach for i in reach if gap(j) ** 2 + gap(i) ** 2 <= radius**2]
-    np.testing.assert_array_equal(dilate_disc(field, radius, rounding), dilate(field, offsets))
-
-
-def test_outward_dilation_of_cell_maxima_covers_a_disc_anywhere():
-    rng = np.random.default_rng(5)
-    points = np.column_stack([rng.random((400, 2)) * 30.0, rng.random(400)])
-    cells = np.full((30, 30), -np.inf)
-    np.maximum.at(cells, (points[:, 1].astype(int), points[:, 0].astype(int)), points[:, 2])
-    cover = dilate_disc(cells, 3.4, Rounding.OUTWARD)
-    for x, y in rng.random((500, 2)) * 30.0:
-        under = points[np.hypot(points[:, 0] - x, points[:, 1] - y) < 3.4, 2]
-        assert cover[int(y), int(x)] >= under.max(initial=-np.inf)
-
-
-def test_wrong_fields_are_refused():
-    for field, radius in ((np.zeros(3), 1.0), (np.full((2, 2), np.nan), 1.0), (np.zeros((2, 2)), -1.0)):
-        with pytest.raises(GeometryError):
-            dilate_disc(field, radius)
-    assert dilate_disc(np.zeros((0, 4)), 2.0).shape == (0, 4)
 
 
 @pytest.mark.parametrize("shape", [*SHAPES, "piled"])

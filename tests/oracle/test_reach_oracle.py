@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geometry.sampling import sample_surface
-from geometry.tool_body import HolderSegment
+from geometry.tool_body import HolderFrustum
 from tests.hand_parts import ball, dome, field_of, low_walls, tool
 from tests.oracle.naive_drop import lift_of_points
 from zones.reach.assembly import Clearances
@@ -15,8 +15,8 @@ from zones.reach.tip_field import LOOKUP_STEP, touchable
 CLEAR = Clearances(shank=0.2, holder=1.0)
 BODIES = {
     "shank": ball(2.0, neck=2.5, shank=4.0),
-    "holder": ball(2.0, neck=3.0, shank=3.0, stickout=4.0, holder=(HolderSegment(6, 14, 5), HolderSegment(14, 14, 9))),
-    "flat": tool(2.0, 0.0, neck=2.0, shank=3.0, stickout=5.0, holder=(HolderSegment(9, 9, 20),)),
+    "holder": ball(2.0, neck=3.0, shank=3.0, stickout=4.0, holder=(HolderFrustum(6, 14, 5), HolderFrustum(14, 14, 9))),
+    "flat": tool(2.0, 0.0, neck=2.0, shank=3.0, stickout=5.0, holder=(HolderFrustum(9, 9, 20),)),
     "bull": tool(3.0, 0.5, neck=2.0, shank=5.0),
 }
 pytestmark = pytest.mark.slow

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.tool_body import HolderSegment, ToolBody
+from geometry.tool_body import HolderFrustum, ToolBody
 from tests.oracle.turning_twin import random_moves, seen, signed
 from verify.kernels.clash import TOUCHING, is_lift
 from verify.kernels.frustum import contact
@@ -16,7 +16,7 @@ from verify.moves import BOW, Moves
 from verify.tool_axes import ToolAxes
 from verify.tool_bodies import Bodies
 
-TOOL = ToolBody("T1", 1, 4.0, 2.0, 5.0, 3.6, 9.0, 5.0, 14.0, (HolderSegment(10.0, 14.0, 5.0),))
+TOOL = ToolBody("T1", 1, 4.0, 2.0, 5.0, 3.6, 9.0, 5.0, 14.0, (HolderFrustum(10.0, 14.0, 5.0),))
 BULL = replace(TOOL, diameter=5.0, corner_radius=1.0, neck_diameter=5.0)
 SETUP = ProofSetup(gouge_tolerance=0.01, clearance_rapid=1.0)
 STEPS = np.linspace(0.0, 1.0, 4001)

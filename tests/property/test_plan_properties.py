@@ -11,7 +11,7 @@ import pytest
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import drop_tips
 from geometry.sampling import sample_surface
-from geometry.tool_body import HolderSegment
+from geometry.tool_body import HolderFrustum
 from tests.hand_parts import (
     Case,
     ball,
@@ -48,7 +48,7 @@ def valley():
 
 def held():
     """A ball whose shank and holder are wide and low enough to count beside the walls."""
-    return ball(3.0, neck=3.0, shank=4.0, stickout=5.0, holder=(HolderSegment(12, 20, 8),))
+    return ball(3.0, neck=3.0, shank=4.0, stickout=5.0, holder=(HolderFrustum(12, 20, 8),))
 
 
 CASES = {
@@ -274,7 +274,7 @@ def test_shank_and_holder_stay_clear_of_the_walls():
 
 def test_a_wide_holder_keeps_off_a_high_block_also_from_beside_it():
     mesh = terraces([0, 4, 10], [0, 5], [[13, 2]])
-    c = plan_part(mesh, [ball(4.0, stickout=8.0, holder=(HolderSegment(30, 30, 30),))])
+    c = plan_part(mesh, [ball(4.0, stickout=8.0, holder=(HolderFrustum(30, 30, 30),))])
     assert c.moves(Motion.CUT)
     for body, points in c.moves():
         assert body_intrusion(c.tree, body, points, 0.2, 1.0) <= 1e-4

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from geometry.surfaces.bspline import arc_length
 from tests.profile_curves import DRAW, draw
 from zones.plan_view.curve_bends import size_of
-from zones.plan_view.profile_types import Profile, VoidSide, classify
+from zones.plan_view.profile_types import CurveProfile, VoidSide, classify
 
 kinds = st.sampled_from(list(DRAW))
 seeds = st.integers(1000, 9000)
@@ -19,7 +19,7 @@ MIRROR = {"C7": "C8", "C8": "C7"}
 ROUNDNESS = ("C3", "C9")
 
 
-def same(a: Profile, b: Profile, tolerance: float = 0.02) -> None:
+def same(a: CurveProfile, b: CurveProfile, tolerance: float = 0.02) -> None:
     assert a.type == b.type and a.level == b.level and len(a.bends) == len(b.bends)
     assert a.margin == pytest.approx(b.margin, abs=tolerance)
 

@@ -61,7 +61,7 @@ def test_error_crosses_the_process_border(tmp_path):
     (b"Dear machinist,\nplease mill this.\n", "export"),
     (b"solid wall\nfacet normal 0 0 1\n", "STL"),
     (b"PK\x03\x04rest", "zip"),
-    (gzip.compress(b"ISO-10303-21;\nHEADER;", mtime=0), "STEP file inside"),
+    (gzip.compress(b"ISO-10303-21;\nHEADER;", mtime=0), "holds a STEP file"),
 ])
 def test_no_step_file(tmp_path, content, hint):
     path = tmp_path / "letter.step"

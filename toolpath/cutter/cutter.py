@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from geometry.errors import SetupError
-from geometry.mesh_queries.revolved_outline import Arc, Line, Outline
+from geometry.mesh_queries.revolved_outline import Outline, OutlineArc, OutlineLine
 from geometry.tool_body import ToolBody
 
 
@@ -72,7 +72,7 @@ class Cutter:
                              code="bad_cutter", subjects=("tip_diameter",), measured=tip_diameter, limit=diameter)
         z = r * (1.0 - math.sin(half))
         return cls(diameter, 0.0, length,
-                   Outline((Arc(at, z, (0.0, r)), Line(top, z + (top - at) / math.tan(half)))))
+                   Outline((OutlineArc(at, z, (0.0, r)), OutlineLine(top, z + (top - at) / math.tan(half)))))
 
     @classmethod
     def barrel(cls, *, diameter: float, tip_diameter: float, side_radius: float, length: float) -> Cutter:
@@ -90,7 +90,7 @@ class Cutter:
         level = r + math.sqrt((side_radius - r) ** 2 - c * c)
         k = side_radius / (side_radius - r)
         join = (c - k * c, level + k * (r - level))
-        return cls(diameter, 0.0, length, Outline((Arc(*join, (0.0, r)), Arc(widest, level, (c, level)))))
+        return cls(diameter, 0.0, length, Outline((OutlineArc(*join, (0.0, r)), OutlineArc(widest, level, (c, level)))))
 
     @classmethod
     def turned(cls, outline: Outline, *, length: float) -> Cutter:
@@ -101,16 +101,16 @@ class Cutter:
     def assembly(cls, tool: ToolBody) -> Cutter:
         """Cutting part, shank and holder of a tool as one body, without clearances; the neck where it is wider."""
         r, d = tool.corner_radius, 0.5 * tool.diameter - tool.corner_radius
-        pieces: list[Arc | Line] = [Line(d, 0.0)] if d > 0.0 else []
+        pieces: list[OutlineArc | OutlineLine] = [OutlineLine(d, 0.0)] if d > 0.0 else []
         if r > 0.0:
-            pieces.append(Arc(d + r, r, (d, r)))
-        pieces.append(Line(d + r, max(r, tool.flute_length)))
+            pieces.append(OutlineArc(d + r, r, (d, r)))
+        pieces.append(OutlineLine(d + r, max(r, tool.flute_length)))
         z = tool.flute_length
         for radius, top in ((0.5 * tool.neck_diameter, tool.neck_length), (0.5 * tool.shank_diameter, tool.stickout)):
-            pieces += [Line(radius, z), Line(radius, top)]
+            pieces += [OutlineLine(radius, z), OutlineLine(radius, top)]
             z = top
         for s in tool.holder:
-            pieces += [Line(0.5 * s.diameter, z), Line(0.5 * s.diameter_top, z + s.length)]
+            pieces += [OutlineLine(0.5 * s.diameter, z), OutlineLine(0.5 * s.diameter_top, z + s.length)]
             z += s.length
         return cls.turned(Outline(tuple(pieces)), length=tool.flute_length)
 

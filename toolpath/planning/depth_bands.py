@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable
 
 from toolpath.counterexamples import HighWall
-from zones.machinable_area import Form
+from zones.machinable_area import AreaForm
 from zones.zoning.zones import ZoneArea
 
 LEAST_DEPTH = 2.0
@@ -22,7 +22,7 @@ def largest_corner(zones: Iterable[ZoneArea]) -> float:
 
     As far below its contact with an upright wall the tip of a tool is.
     """
-    return max((z.tool.corner_radius for z in zones if z.form is Form.STEEP), default=0.0)
+    return max((z.tool.corner_radius for z in zones if z.form is AreaForm.STEEP), default=0.0)
 
 
 def planes(walls: Iterable[HighWall], corner: float, ratio: float) -> tuple[float, ...]:

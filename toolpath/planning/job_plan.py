@@ -32,7 +32,7 @@ from toolpath.stock.stock_map import SURE_RIM, StockMap
 from toolpath.strategies import depth_layers
 from toolpath.tool_deflection import effective_diameter
 from toolpath.workingsteps import Workingstep
-from zones.machinable_area import Form
+from zones.machinable_area import AreaForm
 from zones.reach.tip_field import TipField
 from zones.zoning.zones import ZoneArea
 
@@ -242,7 +242,7 @@ class _Layers:
         self.tips = tips = np.vstack([z.tips for z in zones])
         self.allowance = max(0.1 * cut.step_down, LATTICE_CARE * lat.step)
         # without a finish to follow, rims take every wall to size layer by layer, where what is below still holds it
-        steep = [z.tips for z in zones if z.form is Form.STEEP and settings.finishing]
+        steep = [z.tips for z in zones if z.form is AreaForm.STEEP and settings.finishing]
         self.walls = np.vstack([np.zeros((0, 3)), *steep])
         self.bounded = cut.engaged < UNBOUNDED
         # the finish of a floor has the whole front in what is left on it
@@ -254,7 +254,7 @@ class _Layers:
         if top <= bottom or now is not None and not now.left:
             return
         heights = depth_layers.layer_heights(top, bottom, step)
-        also = [f.bottom + low for f in zones if f.form is Form.LEVEL] if self.bounded else []
+        also = [f.bottom + low for f in zones if f.form is AreaForm.LEVEL] if self.bounded else []
         also += [plane - under for plane in settings.planes]
         if also:
             heights = sorted({*heights, *(z for z in also if bottom < z < top)}, reverse=True)

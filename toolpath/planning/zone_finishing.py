@@ -52,7 +52,7 @@ from toolpath.strategies import (
 )
 from toolpath.tool_deflection import left_by_layers
 from toolpath.workingsteps import Motion, Trajectory, Workingstep
-from zones.machinable_area import Form
+from zones.machinable_area import AreaForm
 from zones.reach.tip_field import TipField
 from zones.zoning.zones import ZoneArea
 
@@ -105,7 +105,7 @@ class Finish:
         self.full = cut = cut.finish or cut
         self.zone, self.field, self.cut, self.stock, self.settings = zone, field, cut, stock, settings
         self.given = len(checks.points)
-        if len(checks.points) and zone.form is not Form.STEEP and not _has_floor(zone, field.tool):
+        if len(checks.points) and zone.form is not AreaForm.STEEP and not _has_floor(zone, field.tool):
             r = field.tool.corner_radius or field.tool.radius
             checks = checks.joined(beyond(field, checks, settings.lift, BORDER_SHARE * math.sqrt(
                 8.0 * settings.scallop_height * r), zone.faces))
@@ -218,9 +218,9 @@ class Finish:
         alone = [one for face in self.faces for one in face.alone or (face,)]
         given = self.checks, self.field.tool, self.cut, self.settings
         found: list[tuple[str, Runs]] = []
-        if self.zone.form is Form.STEEP:
+        if self.zone.form is AreaForm.STEEP:
             found.append((flank.NAME, flank.flanked(alone, *given, self._surroundings(), self.field.allowance)))
-        if self.zone.form is not Form.LEVEL and curvature_matched.suits(self.field.tool):
+        if self.zone.form is not AreaForm.LEVEL and curvature_matched.suits(self.field.tool):
             curved = [face for face in alone if not face.flat]
             found.append((curvature_matched.NAME, curvature_matched.matched(curved, *given, self._surroundings(), self.field.allowance,
                                                         most)))
@@ -262,9 +262,9 @@ class Finish:
 
     def _along_borders(self) -> tuple[_Strategy | None, tuple[dict[str, object], ...]]:
         """Passes along the borders of the faces, None where there are none worth a try, and why."""
-        settings, usual, steep = self.settings, self.strategy, self.zone.form is Form.STEEP
+        settings, usual, steep = self.settings, self.strategy, self.zone.form is AreaForm.STEEP
         asked = not steep and settings.pattern is not Pattern.AUTO
-        suited = isoparametric.suits(self.field.tool) and self.zone.form is not Form.LEVEL and not asked
+        suited = isoparametric.suits(self.field.tool) and self.zone.form is not AreaForm.LEVEL and not asked
         faces = [face for face in self.faces if not face.flat]
         if not (suited and faces and len(self.checks.points)):
             return None, ()
@@ -306,7 +306,7 @@ class Finish:
     def _eased(self, cut: CutData, strategy: _Strategy) -> CutData:
         """Feeds at which the passes of a strategy do not bend the tool too far, what layers leave in front of them."""
         left = left_by_layers(cut.step_down, self.field.lattice.step)
-        if self.zone.form is Form.STEEP:
+        if self.zone.form is AreaForm.STEEP:
             return cut.under(strategy.side_step, left)
         return cut.under(left, strategy.side_step)
 
@@ -348,7 +348,7 @@ class Finish:
 
     def _linker(self) -> Linker:
         return Linker(self.field, self.stock, motions_of(self.cut, self.settings), self.depths, self.settings.found,
-                      engaged=self.cut.engaged, walls=self.zone.form is Form.STEEP)
+                      engaged=self.cut.engaged, walls=self.zone.form is AreaForm.STEEP)
 
     def plan(self) -> ZonePlan:
         """What became of the zone."""
@@ -389,7 +389,7 @@ class Finish:
 
     def _add_one(self, linker: Linker, line: Line, skin: float, slope: float, thin: float | None) -> None:
         """Walk a line with the layers above it and measure them."""
-        tool, steep = self.field.tool, self.zone.form is Form.STEEP
+        tool, steep = self.field.tool, self.zone.form is AreaForm.STEEP
         before, refused, whole = len(linker.trajectories), linker.refused, False
         care = self.settings.found.care(tool, line.points)
         for layer in zigzag.skimmed(line, self.stock, tool, care * skin, care * slope, steep):
@@ -433,7 +433,7 @@ def _not_taken(reason: str, value: float, limit: float) -> dict[str, object]:
 
 def _has_floor(zone: ZoneArea, tool: ToolBody) -> bool:
     """Whether a zone is finished by a flat end that stands on it."""
-    return zone.form is Form.LEVEL and tool.radius > tool.corner_radius
+    return zone.form is AreaForm.LEVEL and tool.radius > tool.corner_radius
 
 
 Led = tuple[str, Sequence[tuple[Trajectory, ...]]]
@@ -460,7 +460,7 @@ def _strategy(zone: ZoneArea, checks: Target, field: TipField, cut: CutData,
     """How a zone is finished."""
     tool, chord, normals = field.tool, 0.5 * settings.chordal_tolerance, checks.normals
     cusp = CUSP_SHARE * settings.scallop_height
-    if zone.form is Form.STEEP:
+    if zone.form is AreaForm.STEEP:
         step = waterline.level_step(tool, normals, cusp, cut.step_down)
 
         def waterlines(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:

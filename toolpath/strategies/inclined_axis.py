@@ -28,7 +28,7 @@ from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_settings import CutData, Leaned, PlanSettings
 from toolpath.poses import Axes, Blocked, places_along
 from toolpath.strategies.isoparametric import Stretch, course
-from zones.machinable_area import Form
+from zones.machinable_area import AreaForm
 from zones.reach.tip_field import TipField
 
 NAME = "inclined_axis"
@@ -103,11 +103,11 @@ class _Nose:
         return profile.length - sum(b - a for a, b in found.left)
 
 
-def asked(leaned: Leaned | None, form: Form, tool: ToolBody) -> Leaned | None:
+def asked(leaned: Leaned | None, form: AreaForm, tool: ToolBody) -> Leaned | None:
     """How a tool is asked to lean on a zone of a form: not on level ones, nor without a corner; None if it is not."""
-    if leaned is None or form is Form.LEVEL or tool.corner_radius <= 0.0:
+    if leaned is None or form is AreaForm.LEVEL or tool.corner_radius <= 0.0:
         return None
-    if form is not Form.STEEP:
+    if form is not AreaForm.STEEP:
         return leaned if leaned.lead > 0.0 or leaned.tilt > 0.0 else None
     return None if leaned.walls is None else replace(leaned, lead=0.0, tilt=leaned.walls)
 

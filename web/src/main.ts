@@ -1,7 +1,7 @@
-// One document for every path of the page; the path says what is shown.
+// Start of the page: one document for every path, which chooses what is shown.
 import "./style.css";
-import { jobPage } from "./jobpage";
-import { listPage } from "./listpage";
+import { jobPage } from "./pages/job-page";
+import { listPage } from "./pages/job-list";
 
 const app = document.getElementById("app")!;
 const job = /^\/v1\/jobs\/([^/]+)\/view\/?$/.exec(location.pathname);
@@ -9,6 +9,6 @@ let id = job?.[1] ?? "";
 try {
   id = decodeURIComponent(id);
 } catch {
-  // an address that is none: the service has no job of that name, and says so
+  // a malformed address: the service answers that it has no such job
 }
 void (job ? jobPage(app, id) : listPage(app));

@@ -35,10 +35,10 @@ async function upload() {
   await page.setViewportSize({ width: 1280, height: 800 });
   await page.setInputFiles("#part", part);
   await page.setInputFiles("#setupfile", setup);
-  await page.getByText("is in the fields").waitFor();
+  await page.getByText("is loaded").waitFor();
   await page.fill("#order", "Step block 7");
   // the tool editor: a field that makes no sense is refused with its name, and put right
-  const flutes = page.getByLabel("Length of the flutes, mm, tool 1");
+  const flutes = page.getByLabel("Flute length, mm, tool 1");
   const good = await flutes.inputValue();
   await flutes.fill("900");
   await page.click("button.main");
@@ -65,9 +65,9 @@ async function upload() {
   await page.getByText("Step block 7").waitFor();
   await page.setInputFiles("#part", part);
   await page.setInputFiles("#setupfile", setup);
-  await page.getByText("is in the fields").waitFor();
+  await page.getByText("is loaded").waitFor();
   await page.click("button[value=dry]");
-  await page.getByText("are in reach").waitFor();
+  await page.getByText("the tools reach").waitFor();
   await accessible(page, "dry check");
   await page.screenshot({ path: join(shots, "dry.png") });
   await browser.close();
@@ -104,7 +104,7 @@ async function look() {
     assert(/line \d+/.test(jumped), `the line of the finding is not said: ${jumped}`);
     await page.screenshot({ path: stem("finding") });
   }
-  const slider = page.getByLabel("Time of machining");
+  const slider = page.getByLabel("Machining time");
   await slider.evaluate((s) => {
     s.value = String(Math.round(Number(s.max) / 2));
     s.dispatchEvent(new Event("input", { bubbles: true }));
@@ -124,7 +124,7 @@ async function look() {
   await page.waitForTimeout(700);
   assert((await page.evaluate(() => location.hash)).includes("s=1,"), "the section is not in the link");
   await page.evaluate(() => window.scrollTo(0, 0));
-  await page.getByRole("button", { name: "All of the part" }).click();
+  await page.getByRole("button", { name: "Fit the part" }).click();
   await page.waitForTimeout(700);
   await page.screenshot({ path: stem("section") });
 
@@ -172,14 +172,14 @@ async function look() {
 async function key() {
   const { browser, page } = await open(1280, 800);
   await page.goto(url);
-  await page.getByText("asks for a key").waitFor();
+  await page.getByText("needs a key").waitFor();
   await accessible(page, "key");
   await page.fill("#key", "zm_000000000000_" + "x".repeat(43));
-  await page.click("button:has-text('Use it')");
+  await page.click("button:has-text('Use key')");
   await page.waitForTimeout(500);
   await page.fill("#key", rest[0]);
-  await page.click("button:has-text('Use it')");
-  await page.getByText("There are none yet").waitFor();
+  await page.click("button:has-text('Use key')");
+  await page.getByText("There are no jobs yet").waitFor();
   const kept = await page.evaluate(() => ({ session: Object.keys(sessionStorage), local: JSON.stringify(localStorage), cookie: document.cookie }));
   assert(!kept.local.includes(rest[0]) && !kept.cookie && !(await page.evaluate(() => location.href)).includes(rest[0]));
   // what the browser says of the refusals that were asked for

@@ -47,7 +47,7 @@ async function folder() {
   assert(await page.isChecked("#mode-walls") && await page.isChecked("#sflip") && await page.isChecked("#step-1") && !(await page.isChecked("#step-0")));
   assert.equal(await page.locator("#saxis").evaluate((s) => s.value), "0");
   await page.evaluate(() => (location.hash = "#c=50,-10,40,8,6,2&m=zones"));
-  await page.waitForFunction(() => document.querySelector(".clock").textContent.includes("in all"));
+  await page.waitForFunction(() => document.querySelector(".clock").textContent.includes("Total"));
   assert.equal(await page.locator("#saxis").evaluate((s) => s.value), "");
   // from inside the target nothing is seen, and the skip link is no look
   await page.evaluate(() => (location.hash = "#c=1,1,1,1,1,1&m=zones"));
@@ -108,7 +108,7 @@ async function folder() {
   }
   said.lines = 0;
   for (let t = 5; t < 140; t += 2.3) {
-    await page.getByLabel("Time of machining").evaluate((s, v) => {
+    await page.getByLabel("Machining time").evaluate((s, v) => {
       s.value = String(v);
       s.dispatchEvent(new Event("input", { bubbles: true }));
     }, Math.round(10 * t));
@@ -122,7 +122,7 @@ async function folder() {
   }
 
   // browsers stop a page that writes the address at every frame
-  const [writes, ms] = await page.getByLabel("Time of machining").evaluate(async (slider) => {
+  const [writes, ms] = await page.getByLabel("Machining time").evaluate(async (slider) => {
     const from = performance.now();
     window.replaced = 0;
     for (let k = 0; k < 60; k++) {
@@ -134,7 +134,7 @@ async function folder() {
   });
   said.writes = writes;
   assert(writes >= 1 && writes <= ms / 500 + 1, `the address was written ${writes} times in ${ms} ms`);
-  await page.getByLabel("Speed of playing").selectOption("10");
+  await page.getByLabel("Playback speed").selectOption("10");
   await page.locator(".play").click();
   await page.waitForTimeout(1000);
   await page.locator(".play").click();
@@ -142,10 +142,10 @@ async function folder() {
   // over http, or where it is forbidden, there is no clipboard
   await page.locator("summary", { hasText: "Share and keys" }).click();
   await page.getByRole("button", { name: "Copy link" }).click();
-  await page.getByText("The address of this page is the link").waitFor();
+  await page.getByText("Copy the address of this page instead").waitFor();
 
   // a phone takes the card away and gives it back
-  await page.waitForFunction(() => window.zonemill.picture.coarse === 1);
+  await page.waitForFunction(() => window.zonemill.picture.resolution === 1);
   const before = await picture(page);
   await page.evaluate(() => new Promise((done) => {
     const canvas = document.querySelector(".stage canvas");
@@ -173,14 +173,14 @@ async function folder() {
   bad.fill(0x55, 12 + length, 12 + length + 400);
   const long = whole.slice(0, 4000);
   new DataView(long.buffer).setUint32(8, 0xfffffff0, true);
-  for (const [name, bytes, words] of [["none", new TextEncoder().encode("<!doctype html>".repeat(9)), /another form/], ["cut", whole.slice(0, whole.length - 100), /cut off/],
-    ["long", long, /cut off/], ["bad", bad, /damaged/], ["no-webgl", whole, /WebGL/]]) {
+  for (const [name, bytes, words] of [["none", new TextEncoder().encode("<!doctype html>".repeat(9)), /unknown format/], ["cut", whole.slice(0, whole.length - 100), /incomplete/],
+    ["long", long, /incomplete/], ["bad", bad, /damaged/], ["no-webgl", whole, /WebGL/]]) {
     const { browser, page } = await open(url, 390, 664, { before: name === "no-webgl" ? () => {
       HTMLCanvasElement.prototype.getContext = () => null;
     } : undefined });
     await page.route("**/files/view.bin", (route) => route.fulfill({ body: Buffer.from(bytes), contentType: "application/octet-stream" }));
     await page.goto(url);
-    await page.getByText("The picture cannot be shown").waitFor();
+    await page.getByText("The 3D view cannot be shown").waitFor();
     const told = await page.locator(".refusal").textContent();
     assert(words.test(told), `${name}: ${told}`);
     await page.getByRole("button", { name: "report.json" }).waitFor();
@@ -216,22 +216,22 @@ async function service() {
   await page.waitForSelector(".newjob");
 
   // a setup comes out of the form as it went in, whatever the one before had
-  await page.locator("summary", { hasText: "A setup from a file" }).click();
+  await page.locator("summary", { hasText: "Setup as file or text" }).click();
   for (const file of rest) {
     await page.setInputFiles("#setupfile", file);
-    await page.getByText("is in the fields").waitFor();
+    await page.getByText("is loaded").waitFor();
     const got = JSON.parse(await page.locator("#json").inputValue());
     for (const [key, value] of Object.entries(JSON.parse(readFileSync(file, "utf8"))))
       if (typeof value === "object" && !Array.isArray(value)) for (const [k, v] of Object.entries(value)) assert.deepEqual(got[key][k], v, `${file}: ${key}.${k}`);
       else assert.deepEqual(got[key], value, `${file}: ${key}`);
     said.setups.push(got);
-    await page.getByText("is in the fields").evaluate((p) => p.remove());
+    await page.getByText("is loaded").evaluate((p) => p.remove());
   }
   await accessible(page, "form");
 
   // who has keys alone does not lose the place in the table of tools
   const focused = () => page.evaluate(() => document.activeElement.getAttribute("aria-label") ?? document.activeElement.textContent);
-  await page.getByRole("button", { name: "Add a tool like the last" }).focus();
+  await page.getByRole("button", { name: "Add a copy of the last tool" }).focus();
   await page.keyboard.press("Enter");
   assert.equal(await focused(), "T number, tool 2");
   await page.getByLabel("Remove tool 2").focus();
@@ -254,7 +254,7 @@ async function service() {
   });
   await page.goto(new URL("/v1/jobs/j1/view", url).href);
   await page.getByText("42 %, paths").waitFor();
-  await page.getByText("asks again by itself").waitFor();
+  await page.getByText("reconnects by itself").waitFor();
   await page.getByText("it took too long").waitFor();
   assert.equal(asked, 4);
   // names are words, whatever stands in them
@@ -271,11 +271,11 @@ async function service() {
   await page.route("**/v1/jobs?*", (route) => route.fulfill({ status: 401, json: { title: "No key", status: 401, detail: "send a key" } }));
   await page.goto(url);
   await page.fill("#key", "zm_\u200bab");
-  await page.getByRole("button", { name: "Use it" }).click();
-  await page.getByText("Copy it once more").waitFor();
+  await page.getByRole("button", { name: "Use key" }).click();
+  await page.getByText("Copy it again").waitFor();
   assert.equal(await page.evaluate(() => sessionStorage.length), 0);
   await page.fill("#key", "zm_ab");
-  await page.getByRole("button", { name: "Use it" }).click();
+  await page.getByRole("button", { name: "Use key" }).click();
   await page.waitForFunction(() => sessionStorage.length === 1);
   forgive(/401/);
 
@@ -288,11 +288,11 @@ async function service() {
   await page.setInputFiles("#part", { name: "p.step", mimeType: "model/step", buffer: Buffer.from("ISO-10303-21;") });
   await page.fill("#order", "4711");
   await page.locator("button.main", { hasText: "Plan and prove" }).click();
-  await page.getByText("give the key under Jobs").waitFor();
+  await page.getByText("Enter the key under Jobs").waitFor();
   status = 403;
   await page.fill("#key", "zm_cd");
-  await page.getByRole("button", { name: "Use it" }).click();
-  await page.getByText("There are none yet").waitFor();
+  await page.getByRole("button", { name: "Use key" }).click();
+  await page.getByText("There are no jobs yet").waitFor();
   assert.equal(await page.inputValue("#order"), "4711");
   assert.equal(await page.evaluate(() => document.getElementById("part").files.length), 1);
   await page.locator("button.main", { hasText: "Plan and prove" }).click();

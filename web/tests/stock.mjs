@@ -12,17 +12,17 @@ const module_ = async (name, ...replaced) => {
   const { outputText } = ts.transpileModule(text, { compilerOptions: { target: "ES2022", module: "ESNext", verbatimModuleSyntax: true } });
   return `data:text/javascript;base64,${Buffer.from(outputText).toString("base64")}`;
 };
-const field = await module_("field.ts");
+const field = await module_("scene/distance-field.ts");
 const { noNet, surface } = await import(field);
-const { States } = await import(await module_("states.ts", ['"./field"', JSON.stringify(field)]));
-const { readView } = await import(await module_("viewfile.ts"));
+const { StockStates } = await import(await module_("scene/stock-states.ts", ['"./distance-field"', JSON.stringify(field)]));
+const { readView } = await import(await module_("shared/view-file.ts"));
 
 const [file, ...seconds] = process.argv.slice(2);
 const ways = new Map();
 let head = null;
 let states = null;
 await readView(new Blob([readFileSync(file)]).stream(), (h) => (head = h), (entry, t) => {
-  if (entry.kind === "field") states = new States(entry, t);
+  if (entry.kind === "field") states = new StockStates(entry, t);
   if (entry.kind === "path") ways.set(entry.step, t);
 });
 states.follow(head.steps.flatMap((s, i) => {

@@ -1,4 +1,4 @@
 """Walls, connections and channels found on the faces of a part.
 
-No tool is known here.
+Tools do not belong here.
 """

@@ -1,14 +1,15 @@
-"""Channels: the voids between facing walls, and how narrow each becomes.
+"""Channels: the voids between facing walls, and the least gap of each.
 
-From samples of every side a ray leaves along the outward normal; connections, fillets and slivers are left out of
-the mesh it meets. The first hit decides what the side faces. A pair of walls (or one wall with itself) has a
-channel when the side area that faces the other adds up to ``FACING_SHARE`` of half the smaller one's side area.
-The shortest ray is then refined on the triangles around it, and along the borders of both sides (``zones.features.side_borders``).
-Rays start and end on the exact surface with its normal there, as patches through the mesh nodes give it
-(``zones.features.smooth_surface``): facets alone are half a facet wrong at borders.
+From samples of every side a ray leaves along the outward normal. The mesh for these rays has no connections, fillets
+and slivers. The first hit decides what the side faces. A pair of walls (or one wall with itself) has a channel when the
+side area that faces the other adds up to ``FACING_SHARE`` of half the smaller one's side area. The shortest ray is then
+refined on the triangles around it, and along the borders of both sides (``zones.features.side_borders``).
+
+Rays start and end on the exact surface with its normal there, which patches through the mesh nodes give
+(``zones.features.smooth_surface``). Facets alone are half a facet wrong at borders.
 
 A ray from a wall to itself does not count where start and foot lie on one piece of the side within a ball as wide as
-the wall is thick: that is a notch or a corner of the side.
+the wall is thick: it crosses a notch or a corner of the side.
 """
 
 from __future__ import annotations
@@ -25,40 +26,41 @@ from geometry.mesh_queries.nearest import nearest
 from geometry.sampling import sample_surface
 from zones.features.connection_caps import cap_footprints
 from zones.features.face_graph import FaceGraph, cast
-from zones.features.side_borders import Border, Places, neighbours
-from zones.features.smooth_surface import SmoothFaces
+from zones.features.side_borders import BorderPlaces, SideBorder, neighbours
+from zones.features.smooth_surface import SmoothSurface
 from zones.kernels.nearby import one_piece
 
 FACING_DOT = -0.3
 FACING_SHARE = 0.02
-# Of one wall. What sees a side through a narrow opening, over the top of a wall between for example, is found when a
-# sample falls into it; and whether a pair has a channel hangs on 2 % of an area, known to 6 % with so many.
+# Samples of one wall. A side that is visible through a narrow opening, such as the gap over a wall between, is found
+# only when a sample falls into the opening. A channel depends on 2 % of an area, known to 6 % with this many samples.
 SAMPLES_PER_WALL = 12_000
-# Local refinement: starts, random points a round, rounds, and how much the neighbourhood shrinks when the best is well
-# inside it (nearer than INNER of its radius); otherwise it only moves, along a slanting border for example.
+# Local refinement: starts, random points a round, rounds, and shrinkage of the neighbourhood when the best point is
+# nearer to its centre than INNER of its radius. Otherwise the neighbourhood only moves, along a slanting border for
+# example.
 STARTS, POINTS, ROUNDS, SHRINK, INNER = 4, 160, 12, 0.4, 0.5
-# Starts stand 4 and first neighbourhoods reach 3 of the steps at which so many places would cover the sides of a wall.
+# Distance of starts and radius of first neighbourhoods, in steps at which this many places cover the sides of a wall.
 STEPS_PER_WALL = 3000
-# Triangles are looked up once within this multiple of the first radius.
+# The triangles come from one look-up within this multiple of the first radius.
 AROUND = 4.0
 NEAREST, TRIANGLES = 800, 300
-# Points stay these shares of a triangle away from its corners and edges, so that rays do not leave through a border.
+# Points keep these shares of a triangle from its corners and edges, so that rays do not leave through a border.
 INSETS = (1e-3, 1e-5)
-# The foot of a perpendicular lies inside a side where what is left along the side, after so many corrections, is this
-# share of the way, at most.
+# The foot of a perpendicular lies inside a side where, after this many corrections, the rest along the side is at most
+# this share of the distance.
 ASKEW, FOOT_TURNS = 2e-3, 8
-SLOPES = 0.05, 1e3  # of the secant; outside, where nothing is left to turn among others, a step is left as it was
+SLOPES = 0.05, 1e3  # limits of the secant; outside, a step does not change
 ALONG_RIM = np.array([-1.0, -0.6, -0.3, -0.1, 0.0, 0.1, 0.3, 0.6, 1.0])
 
 
 @dataclass(frozen=True)
 class Facing:
-    """Two walls that see each other.
+    """Two walls that face each other.
 
-    walls   : places in the list of walls, first <= second
+    walls   : index of both in the list of walls, first <= second
     gap_min : mm
-    at      : point on a side of the first wall, mm
-    area    : mm² of side area on both that faces the other
+    at      : point on a side of the first wall, mm, frame of the part
+    area    : mm², side area of both walls that faces the other
     """
 
     walls: tuple[int, int]
@@ -69,7 +71,7 @@ class Facing:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A short ray: its length (mm), the wall it leaves and the one it meets, its triangle and point."""
+    """A short ray: its length (mm), the wall it leaves, the wall it meets, its triangle and point."""
 
     distance: float
     wall: int
@@ -85,7 +87,8 @@ class Start:
 def find_facings(graph: FaceGraph, sides: list[np.ndarray], left_out: np.ndarray) -> list[Facing]:
     """Pairs of walls with a channel between them.
 
-    sides    : per wall its 0-based side faces
+    graph    : FaceGraph
+    sides    : (k,) int64 for each wall, index of its side faces, 0-based
     left_out : (n,) bool, faces that rays pass through (connections, fillets, slivers)
     Returns Facing per pair, in order of the pair.
     """
@@ -96,7 +99,7 @@ def find_facings(graph: FaceGraph, sides: list[np.ndarray], left_out: np.ndarray
 
 
 class _Side:
-    """The side triangles of one wall and what is looked up on them.
+    """The side triangles of one wall, with cached look-ups.
 
     mesh      : TriangleMesh
     triangles : (k,) int, its side triangles, ascending
@@ -105,7 +108,7 @@ class _Side:
     def __init__(self, mesh: TriangleMesh, triangles: np.ndarray) -> None:
         self.mesh, self.triangles = mesh, triangles
         self.area = float(mesh.areas[triangles].sum())
-        self.border = Border.of(mesh, triangles)
+        self.border = SideBorder.of(mesh, triangles)
         self.rim = np.unique(self.border.nodes)
 
     @cached_property
@@ -136,7 +139,7 @@ class _Side:
 
 
 class _Field:
-    """The mesh without what rays pass through, and the sides of the walls on it."""
+    """The mesh without the faces that rays pass through, and the sides of the walls on it."""
 
     def __init__(self, graph: FaceGraph, sides: list[np.ndarray], left_out: np.ndarray) -> None:
         keep = ~left_out[graph.face_of]
@@ -150,7 +153,7 @@ class _Field:
         self.owner = owner[self.mesh.face_ids.astype(np.int64) - 1]
         self.tree = TriangleTree(self.mesh)
         self.skin = graph.skin
-        self.smooth = SmoothFaces(self.mesh, None if uv is None else uv[keep], np.flatnonzero(self.owner >= 0),
+        self.smooth = SmoothSurface(self.mesh, None if uv is None else uv[keep], np.flatnonzero(self.owner >= 0),
                                   max(graph.part.chord, graph.part.deviation))
         self.count = len(sides)
         self.walls = [_Side(self.mesh, np.flatnonzero(self.owner == k)) for k in range(self.count)]
@@ -197,16 +200,16 @@ class _Field:
                 out[rows] = found
         return out
 
-    def to_border(self, wall: int, other: int, most: float) -> Callable[[F64, np.ndarray], tuple[F64, F64, F64]]:
-        """The rays from a wall that meet given points of the border of another one, found backwards.
+    def to_border(self, wall: int, other: int, limit: float) -> Callable[[F64, np.ndarray], tuple[F64, F64, F64]]:
+        """The rays from a wall that meet given points of the border of another wall, found backwards.
 
-        most : mm; longer ones are not looked for
+        limit : mm, length at which the search ends
         """
         side = self.walls[wall]
 
         def rays(points: F64, triangles: np.ndarray) -> tuple[F64, F64, F64]:
             length, start, foot = np.full(len(points), np.inf), points.copy(), points.copy()
-            _, at, near = nearest(side.tree, points, most)
+            _, at, near = nearest(side.tree, points, limit)
             rows = np.flatnonzero(at >= 0)
             foot[rows], back = self.smooth.at(points[rows], triangles[rows])
             place, here = at[rows], near[rows]
@@ -217,7 +220,7 @@ class _Field:
                 s = np.einsum("ij,ij->i", way, normal)
                 along = way - s[:, None] * normal
                 if turn < FOOT_TURNS - 1:
-                    # the foot on the facets is where the facet is square to the way, not the surface
+                    # at a foot on the facets the facet is square to the ray, not the surface
                     step = _secant(step, before, along)
                     _, place, here = nearest(side.tree, here + step[:, None] * along)
                     before = along
@@ -242,10 +245,10 @@ class _Field:
         return rays
 
     def facings(self) -> list[Facing]:
-        """Pairs of walls that see each other, in order of the pair."""
+        """Pairs of walls that face each other, in order of the pair."""
         area: dict[tuple[int, int], float] = {}
         best: dict[tuple[int, int], list[Start]] = {}
-        rim: dict[int, tuple[Places, F64, np.ndarray]] = {}
+        rim: dict[int, tuple[BorderPlaces, F64, np.ndarray]] = {}
         for wall, side in enumerate(self.walls):
             if side.area <= 0:
                 continue
@@ -271,7 +274,7 @@ class _Field:
         return out
 
     def _least(self, pair: tuple[int, int], found: list[Start],
-               rim: dict[int, tuple[Places, F64, np.ndarray]]) -> tuple[float, tuple[float, float, float]]:
+               rim: dict[int, tuple[BorderPlaces, F64, np.ndarray]]) -> tuple[float, tuple[float, float, float]]:
         """Least ray length of a pair, inside and along the borders, and the point on the first wall there."""
         gap, point, foot, wall = self._refine(found)
         for a, b in dict.fromkeys((pair, pair[::-1])):
@@ -318,7 +321,7 @@ class _Field:
             if float(np.abs(centre - anchor).max()) > reach - radius:
                 side, low, high, anchor = *self._side_near(start, centre, reach), centre
             close = side[((low <= centre + radius) & (high >= centre - radius)).all(axis=1)]
-            # a regular choice where there are many; later rounds see them all
+            # a regular choice of many triangles; later rounds use all
             close = close[_regular(len(close), TRIANGLES)]
             near = _points_near(self.mesh, close, self.on_rim, centre, radius, turn)
             points, triangles = np.concatenate([points[:1], near[0]]), np.concatenate([triangles[:1], near[1]])
@@ -346,12 +349,12 @@ class _Field:
 
 
 def _secant(step: F64, before: F64, along: F64) -> F64:
-    """Next steps towards a perpendicular foot, as multiples of what is left along a side.
+    """Next steps towards a perpendicular foot, as multiples of the rest along a side.
 
-    step : (n,) float64, the last ones; before, along : (n, 3) float64, mm, what was left before and after them
+    step : (n,) float64, the last steps; before, along : (n, 3) float64, mm, the rest before and after them
 
-    On a side that bulges towards a point at distance s with radius r a step of all that is left turns the normal as
-    well: it overshoots by s / r, and for s > r never arrives. The secant through the last two gives 1 / (1 + s / r).
+    On a side that bulges towards a point at distance s with radius r, a step over the whole rest turns the normal as
+    well. It overshoots by s / r, and for s > r never converges. The secant through the last two gives 1 / (1 + s / r).
     """
     was = np.einsum("ij,ij->i", before, before)
     slope = (1.0 - np.einsum("ij,ij->i", before, along) / np.maximum(was, 1e-300)) / step
@@ -359,9 +362,9 @@ def _secant(step: F64, before: F64, along: F64) -> F64:
     return np.where(sane, 1.0 / np.where(sane, slope, 1.0), step)
 
 
-def _regular(count: int, most: int) -> np.ndarray:
-    """Indices of at most so many of a row, spread evenly."""
-    return np.arange(count) if count <= most else np.linspace(0, count - 1, most).astype(np.int64)
+def _regular(count: int, limit: int) -> np.ndarray:
+    """At most ``limit`` indices below ``count``, spread evenly."""
+    return np.arange(count) if count <= limit else np.linspace(0, count - 1, limit).astype(np.int64)
 
 
 def _with_triangles(mesh: TriangleMesh, more: F64, number: int) -> TriangleMesh:
@@ -392,7 +395,7 @@ def _points_near(mesh: TriangleMesh, triangles: np.ndarray, on_rim: np.ndarray, 
 
 
 def _along_rim(t: F64, rim: np.ndarray, centre: F64, radius: float) -> tuple[F64, np.ndarray]:
-    """Points beside edges with both ends on the rim ((n, 3) bool), round the place nearest to a centre, and rows."""
+    """Points beside edges with both ends on the rim ((n, 3) bool), around the place nearest to a centre, and rows."""
     out, rows = [], []
     for a, b in ((0, 1), (1, 2), (2, 0)):
         row = np.flatnonzero(rim[:, a] & rim[:, b])
@@ -409,7 +412,7 @@ def _along_rim(t: F64, rim: np.ndarray, centre: F64, radius: float) -> tuple[F64
 
 
 def _onto_triangles(t: F64, points: F64) -> tuple[F64, np.ndarray]:
-    """Points projected into the plane of each triangle, kept where they fall inside it: (k, 3), rows of t."""
+    """Points projected into the plane of each triangle where they fall inside it: (k, 3), and rows of t."""
     e1, e2 = t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]
     g11, g12, g22 = ((a * b).sum(axis=1)[:, None] for a, b in ((e1, e1), (e1, e2), (e2, e2)))
     det = np.maximum(g11 * g22 - g12 * g12, 1e-300)

@@ -1,8 +1,8 @@
-"""Caps over the places where connections stand on what is no wall.
+"""Caps over the footprints of connections on hubs and floors.
 
-Rays pass through connections, but not through the hub or floor that a connection stands on: its faces end at the
-border of the footprint, and the mesh without the connection is open there. Every footprint is closed by a fan from the
-mean of its border: flat on a plane, and on a bent hub below the surface by no more than the sagitta of the footprint.
+Rays pass through connections, but not through the hub or floor that a connection stands on. The faces of the hub end at
+the border of the footprint, and the mesh without the connection is open there. A fan from the mean of its border closes
+every footprint. It is flat on a plane, and on a bent hub at most the sagitta of the footprint below the surface.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def cap_footprints(graph: FaceGraph, left_out: np.ndarray, side: np.ndarray) -> 
     graph    : FaceGraph
     left_out : (n,) bool, faces of connections, fillets and slivers
     side     : (n,) bool, faces that are sides of walls
-    Returns (k, 3, 3) float64, mm.
+    Returns (k, 3, 3) float64, mm, frame of the part.
     """
     at_side = np.zeros(graph.n, bool)
     for link in graph.links:

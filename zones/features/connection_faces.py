@@ -1,4 +1,4 @@
-"""What a face is by itself: its region, and the connection it belongs to with its fillets."""
+"""Base region of every face, and the connection that a face or fillet belongs to."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from zones.model import Connection, Decomposition
 
 
 def face_bases(part: Part, decomposition: Decomposition) -> dict[int, str]:
-    """Base region of every face number by its role alone: sides of walls are their wall's outside.
+    """Base region of every face number by its role alone; the side of a wall gets the wall's outside.
 
-    Fillets of a connection are its own (``connection_of``).
+    Fillets of a connection belong to it (``connection_of``).
     """
     base: dict[int, str] = {}
     for w in decomposition.walls:
@@ -25,7 +25,7 @@ def face_bases(part: Part, decomposition: Decomposition) -> dict[int, str]:
 def connection_faces(part: Part, decomposition: Decomposition) -> dict[str, tuple[int, ...]]:
     """Face numbers of every connection with its fillets, by id, ascending.
 
-    A fillet along an edge of the connection is its own. So is one that lies between two of those and meets nothing
+    A fillet along an edge of the connection belongs to it. So does a fillet between two of those that meets nothing
     else but walls: the patch at a corner of the span. A fillet between two connections belongs to both.
     """
     role = decomposition.face_role
@@ -40,17 +40,17 @@ def connection_faces(part: Part, decomposition: Decomposition) -> dict[str, tupl
 
 
 def _with_fillets(c: Connection, fillets: set[int], role: dict[int, str],
-                  beside: dict[int, set[int]]) -> tuple[int, ...]:
+                  neighbours: dict[int, set[int]]) -> tuple[int, ...]:
     body = set(c.faces)
-    own = body | {f for f in fillets if beside.get(f, set()) & body}
-    around = {g for f in own - body for g in beside[f]}
+    own = body | {f for f in fillets if neighbours.get(f, set()) & body}
+    around = {g for f in own - body for g in neighbours[f]}
     patches = {f for f in (around & fillets) - own
-               if len(beside[f] & own) > 1 and all(g in own or role.get(g) == "wall" for g in beside[f])}
+               if len(neighbours[f] & own) > 1 and all(g in own or role.get(g) == "wall" for g in neighbours[f])}
     return tuple(sorted(own | patches))
 
 
 def connection_of(part: Part, decomposition: Decomposition) -> dict[int, str]:
-    """Id of the connection by the number of each of its faces and fillets; a fillet of two is the first one's."""
+    """Id of the connection by the number of each of its faces and fillets; a shared fillet belongs to the first."""
     own = {f: c.id for c in decomposition.connections for f in c.faces}
     for c, faces in connection_faces(part, decomposition).items():
         for f in faces:

@@ -1,10 +1,12 @@
 """Connections: material that bridges a channel and leaves void below some part of its span.
 
-A *body* is a thin sheet (see ``zones.features.walls``) or a component of the remaining faces across convex and smooth edges.
-A body *ends* at a wall where their common concave edges (or fillets) run round it: its normals along that border
-point to different sides. A wall that something else ends at shows one normal there, so a long wall with a window
-or a gate is not mistaken for a bridge between the ribs that meet it.
-A body with two ends and void below is a connection; with floor below its whole span it stays a wall.
+A *body* is a thin sheet (see ``zones.features.walls``) or a component of the remaining faces across convex and smooth
+edges. A body *ends* at a wall where their common concave edges (or fillets) run around it: its normals along that
+border point to different sides. A wall that another body ends at shows one normal there. So a long wall with a window
+or a gate does not count as a bridge between the ribs that meet it.
+A body with two ends and void below is a connection [Arivazhagan2020]; with floor below its whole span it is a wall.
+
+Arrays of faces are (n,), in the order of the faces; normals and places lie in the frame of the part.
 """
 
 from __future__ import annotations
@@ -18,21 +20,21 @@ from geometry.part import EdgeKind
 from zones.features.face_graph import STEEP_NZ, FaceGraph, UnionFind, cast, connected_runs
 from zones.features.walls import NO_WALL, SEAT, Sheets
 
-# Normals of a body along the border it shares with a wall differ by more than 60 degrees where it ends there.
+# Where a body ends at a wall, its normals along the common border differ by more than 60 degrees.
 END_DOT = 0.5
-# A bar over the corner of a wall shows two normals of the wall, but all round its own: the one with the wider spread of
-# normals (the lesser cosine, up to this) ends at the other.
+# A bar over the corner of a wall shows two normals of the wall, but normals all around its own. The body with the wider
+# spread of normals (the lesser cosine, up to this) ends at the other.
 CORNER_SLACK = 0.25
 # Void: the next material below lies deeper than this share of the part's height.
 VOID_SHARE = 0.01
-# The underside of a body is what looks down by more than this; leaning ribs do so too, but have floor contact.
+# The underside of a body faces down by more than this. Leaning ribs do so too, but have floor contact.
 DOWN_NZ = -0.1
 # A span is covered by its floor contact up to gaps of this share.
 SPAN_SLACK = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Border:
+class ConcaveBorder:
     """A concave border between two bodies, of one edge or one fillet.
 
     a, b     : bodies
@@ -61,7 +63,7 @@ class End:
 
 @dataclass(frozen=True, eq=False)
 class Bridges:
-    """Bodies of a part and which of them are connections.
+    """Bodies of a part, and the connections among them.
 
     body        : (n,) int, label of every face; thin bodies keep their label, fillets and slivers have ``NO_WALL``
     connections : per connection the labels of its bodies
@@ -74,13 +76,13 @@ class Bridges:
     connections: list[list[int]]
     ends: list[list[End]]
     base: set[int]
-    borders: list[Border]
+    borders: list[ConcaveBorder]
 
 
 def find_bridges(graph: FaceGraph, sheets: Sheets) -> Bridges:
-    """Tell the connections among the bodies of a part.
+    """Find the connections among the bodies of a part.
 
-    graph, sheets : of the part
+    graph, sheets : FaceGraph and Sheets of the part
     Returns Bridges.
     """
     body = all_bodies(graph, sheets.body)
@@ -114,8 +116,8 @@ def find_bridges(graph: FaceGraph, sheets: Sheets) -> Bridges:
 def all_bodies(graph: FaceGraph, label: np.ndarray) -> np.ndarray:
     """Bodies of the faces that belong to no sheet, added to the labels of the sheets.
 
-    label : (n,) int from Sheets.body
-    Returns (n,) int; new bodies are numbered from n.
+    label : (n,) int64, index, from Sheets.body
+    Returns (n,) int64, index of the body of every face; numbers of new bodies begin at n.
     """
     loose = (label == NO_WALL) & ~graph.fillet & ~graph.sliver
     sets = UnionFind(graph.n)
@@ -125,17 +127,17 @@ def all_bodies(graph: FaceGraph, label: np.ndarray) -> np.ndarray:
     return np.asarray(np.where(loose, sets.labels() + graph.n, label))
 
 
-def find_borders(graph: FaceGraph, body: np.ndarray) -> list[Border]:
+def find_borders(graph: FaceGraph, body: np.ndarray) -> list[ConcaveBorder]:
     """Concave borders between different bodies, by edges and by fillets.
 
-    body : (n,) int labels
+    body : (n,) int64, index of the body of every face
     """
     out = []
     for link in graph.links:
         a, b = int(body[link.a]), int(body[link.b])
         if link.kind == EdgeKind.CONCAVE and a != b and NO_WALL not in (a, b):
             nodes = link.nodes
-            out.append(Border(a, b, graph.normals_at(link.a, nodes), graph.normals_at(link.b, nodes), nodes))
+            out.append(ConcaveBorder(a, b, graph.normals_at(link.a, nodes), graph.normals_at(link.b, nodes), nodes))
     for fillet in np.flatnonzero(graph.fillet):
         links = [k for k in graph.at[fillet] if body[k.other(int(fillet))] != NO_WALL]
         for i, first in enumerate(links):
@@ -144,12 +146,12 @@ def find_borders(graph: FaceGraph, body: np.ndarray) -> list[Border]:
                 g = second.other(int(fillet))
                 if body[f] != body[g]:
                     nodes = np.concatenate([first.nodes, second.nodes])
-                    out.append(Border(int(body[f]), int(body[g]), graph.normals_at(f, first.nodes),
+                    out.append(ConcaveBorder(int(body[f]), int(body[g]), graph.normals_at(f, first.nodes),
                                       graph.normals_at(g, second.nodes), nodes))
     return out
 
 
-def _ends(graph: FaceGraph, group: list[int], borders: list[Border], walls: set[int]) -> list[End]:
+def _ends(graph: FaceGraph, group: list[int], borders: list[ConcaveBorder], walls: set[int]) -> list[End]:
     """Places where a group of bodies ends at walls, each a connected run of borders."""
     mine = set(group)
     out = []
@@ -175,7 +177,7 @@ def _least_dot(normals: F64) -> float:
 
 
 def _supports(graph: FaceGraph, sheets: Sheets, body: np.ndarray) -> set[int]:
-    """Bodies whose underside is what a ray straight down through a wall leaves by: what the wall stands on."""
+    """Bodies that walls stand on: a ray straight down through a wall leaves by their underside."""
     out = set()
     rows = np.flatnonzero(sheets.thin[graph.face] & np.isfinite(graph.inward))
     s = graph.samples
@@ -192,7 +194,7 @@ def _supports(graph: FaceGraph, sheets: Sheets, body: np.ndarray) -> set[int]:
     return out - set(sheets.labels)
 
 
-def _carries(borders: list[Border], x: int, thin: set[int]) -> bool:
+def _carries(borders: list[ConcaveBorder], x: int, thin: set[int]) -> bool:
     """Whether a thin body stands on a body: their border shows the upper side of that body."""
     sides = [own for b in borders for own, mine, other in ((b.na, b.a, b.b), (b.nb, b.b, b.a))
              if mine == x and other in thin]
@@ -200,7 +202,7 @@ def _carries(borders: list[Border], x: int, thin: set[int]) -> bool:
 
 
 def _rises(normals: F64) -> bool:
-    """Whether a border shows an upper side: the mean of its (k, 3) normals, of which some may be NaN, looks up."""
+    """Whether a border shows an upper side: the mean of its (k, 3) normals, some of them NaN, points up."""
     up = normals[np.isfinite(normals[:, 2]), 2]
     return bool(len(up)) and float(up.mean()) > STEEP_NZ
 
@@ -227,11 +229,11 @@ def _looks_up(graph: FaceGraph, faces: np.ndarray) -> bool:
     return bool(mean[2] > STEEP_NZ * np.linalg.norm(mean))
 
 
-def _open_below(graph: FaceGraph, group: set[int], ends: list[End], borders: list[Border], void: F64,
+def _open_below(graph: FaceGraph, group: set[int], ends: list[End], borders: list[ConcaveBorder], void: F64,
                 unsupported: set[int]) -> bool:
-    """Whether a group of bodies leaves void below some part of its span, where no floor or rib carries it either.
+    """Whether a group of bodies leaves void below some part of its span, where no floor or rib carries it.
 
-    unsupported : bodies that carry nothing (bars and the like); what only stands on top carries nothing either
+    unsupported : bodies that carry nothing, such as bars; bodies that only stand on top carry nothing either
     """
     if len(void) == 0:
         return False
@@ -260,10 +262,10 @@ def _open_below(graph: FaceGraph, group: set[int], ends: list[End], borders: lis
 
 
 def _beside(under: F64, tops: list[F64], void: F64) -> bool:
-    """Whether what meets the underside of a body passes it at its side, as a hub does, and carries nothing.
+    """Whether a body that meets an underside passes at its side, as a hub does, and carries nothing.
 
-    It meets the top over the same stretch too, and the void below lies all on one side of it; a rib under the middle
-    has void on both.
+    It meets the top over the same stretch too, and all void below lies on one side of it. A rib under the middle has
+    void on both sides.
 
     under, tops : (k, 2) float64, mm, borders at the underside and at the top, along and across the span
     void        : (n, 2) float64, mm, places with void below
@@ -278,13 +280,13 @@ def _beside(under: F64, tops: list[F64], void: F64) -> bool:
     return bool(left.all() or not left.any())
 
 
-def _hanging(graph: FaceGraph, sheets: Sheets, body: np.ndarray, borders: list[Border], base: set[int],
+def _hanging(graph: FaceGraph, sheets: Sheets, body: np.ndarray, borders: list[ConcaveBorder], base: set[int],
              among: set[int]) -> set[int]:
     """Sheets that stand on no base along any edge or fillet and have void below.
 
     A base that a sheet meets sideways, as the end of a bar meets a hub, does not carry it. The arms of a slender fork
-    are three such sheets, none of which bridges alone; their common underside has the label of one of them, so a sheet
-    also counts that goes on round an edge into an underside of another.
+    are three such sheets, none of which bridges alone. Their common underside has the label of one of them. So a sheet
+    that continues around an edge into an underside of another counts as well.
     """
     standing = {int(body[f]) for k in graph.links for f, g in ((k.a, k.b), (k.b, k.a))
                 if k.kind != EdgeKind.CONCAVE and int(body[g]) in base}
@@ -304,8 +306,8 @@ def _hanging(graph: FaceGraph, sheets: Sheets, body: np.ndarray, borders: list[B
     return out & free
 
 
-def _groups(piece: set[int], borders: list[Border]) -> list[list[int]]:
-    """Bodies that may be one connection: pieces that meet each other (forks)."""
+def _groups(piece: set[int], borders: list[ConcaveBorder]) -> list[list[int]]:
+    """Groups of bodies that may be one connection: pieces that meet each other (forks)."""
     order = sorted(piece)
     place = {x: i for i, x in enumerate(order)}
     sets = UnionFind(len(order))
@@ -316,4 +318,4 @@ def _groups(piece: set[int], borders: list[Border]) -> list[list[int]]:
     return [[order[i] for i in np.flatnonzero(label == k)] for k in np.unique(label)]
 
 
-__all__ = ["Border", "Bridges", "End", "all_bodies", "find_borders", "find_bridges"]
+__all__ = ["ConcaveBorder", "Bridges", "End", "all_bodies", "find_borders", "find_bridges"]

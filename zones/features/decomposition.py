@@ -1,9 +1,9 @@
 """Part -> walls, connections, channels, and the role of every face.
 
-    faces measured (facegraph) -> thin bodies (walls) -> bridges among the bodies (connections)
-    -> walls are the thin bodies that are left and stand on something -> facing walls (channels)
+    measured faces (face_graph) -> thin bodies (walls) -> bridges among the bodies (connections)
+    -> the remaining thin bodies that stand on something are walls -> facing walls (channels)
 
-No step knows where a part comes from; nothing depends on the order of its faces.
+The result does not depend on the origin of the part or on the order of its faces.
 """
 
 from __future__ import annotations
@@ -18,22 +18,23 @@ from zones.features.walls import SEAT, Sheets, find_sheets
 from zones.machinable_area import STEEP
 from zones.model import Channel, Connection, Decomposition, Wall
 
-# Part of its side area that must be steep for a thin body to be a wall: the blades of an inducer twist from upright
-# at the hub to lying at the tip, so most of their area may be less steep.
+# Least share of steep area among the sides of a wall. The blades of an inducer twist from upright at the hub to flat at
+# the tip, so most of their area may be less steep.
 STEEP_SHARE = 0.25
 
 
 def decompose(part: Part) -> Decomposition:
-    """Find walls, connections and channels of a part.
+    """Find walls, connections and channels of a part [Arivazhagan2020].
 
     part : Part in the setup frame, mm, access along +Z
 
     Returns
     -------
     Decomposition
-        Ids W1.., C1.., H1.. follow the centroids (x, then y, then z). Gaps are those between patches through the mesh
-        nodes, which come within 0.1 % of exact surfaces meshed with 20 or more columns (tests/oracle/test_gaps.py);
-        without surface parameters they are those of the mesh and off by at most twice ``part.deviation`` more.
+        Ids W1.., C1.., H1.. follow the centroids (x, then y, then z). Gaps are measured between patches through the
+        mesh nodes. They are within 0.1 % of exact surfaces meshed with 20 or more columns (tests/oracle/test_gaps.py).
+        Without surface parameters they are the gaps of the mesh, with at most twice ``part.deviation`` of further
+        error.
     """
     graph = FaceGraph(part)
     sheets = find_sheets(graph)
@@ -61,7 +62,7 @@ def decompose(part: Part) -> Decomposition:
 def _is_upright(graph: FaceGraph, sheets: Sheets, label: int) -> bool:
     """Whether a thin body holds enough steep area to be a wall."""
     sides = sheets.sides(label)
-    # sides lean up to 45 degrees, the limit that parts waterlines from projected passes
+    # sides lean up to 45 degrees, the limit between waterlines and projected passes
     steep = graph.share(np.abs(graph.mesh.normals[:, 2]) <= STEEP)[sides]
     return bool((graph.area[sides] * steep).sum() >= STEEP_SHARE * graph.area[sides].sum())
 
@@ -96,10 +97,10 @@ def _wall(graph: FaceGraph, sheets: Sheets, body: np.ndarray, label: int, name: 
 def _channel_sides(graph: FaceGraph, sheets: Sheets, label: int) -> np.ndarray:
     """Sides of a wall that bound channels: its thin faces without end faces.
 
-    Rays into the end of a bent wall, or askew into the reveal of an opening, leave by a side, so these may count as
-    thin. An upright face is one of them when two upright convex edges lead from it to other thin faces of the wall, and
-    it is narrower than the material behind it is deep; or those two faces are the two sides of the wall there, and it
-    is no wider than twice the wall's thickness.
+    Rays into the end of a bent wall, or oblique ones into the reveal of an opening, leave by a side, so these faces may
+    count as thin. An upright face is an end face when two upright convex edges lead from it to other thin faces of the
+    wall, and one of two conditions holds: the material behind it is deeper than the face is wide; or those two faces
+    are the two sides of the wall there, and the face is no wider than twice the wall's thickness.
     """
     thin = sheets.sides(label)
     thickness = float(np.median(graph.inward[graph.face_rows(np.isin(np.arange(graph.n), thin))]))
@@ -145,7 +146,7 @@ def _connections(graph: FaceGraph, bridges: Bridges, name: dict[int, str]) -> tu
 
 
 def _roles(graph: FaceGraph, bridges: Bridges, walls: set[int], connections: set[int]) -> dict[int, str]:
-    """Role of every face number; a face of the base that looks up is floor."""
+    """Role of every face number; a face of the base that points up is floor."""
     out = {}
     for face in range(graph.n):
         body = int(bridges.body[face])
@@ -168,10 +169,10 @@ def _warnings(graph: FaceGraph, walls: tuple[Wall, ...], lying: np.ndarray) -> t
     out = []
     if len(lying):
         names = ", ".join(f"F{f + 1}" for f in lying[:10])
-        out.append(f"thin material that leans more than 45 degrees is no wall but free surface: {names}")
+        out.append(f"thin material that leans more than 45 degrees counts as free surface, not as a wall: {names}")
     slivers = [f"F{f + 1}" for f in np.flatnonzero(graph.sliver)]
     if slivers:
-        out.append(f"{len(slivers)} sliver faces take no part in the search for walls: {', '.join(slivers[:10])}")
+        out.append(f"the search for walls ignores {len(slivers)} sliver faces: {', '.join(slivers[:10])}")
     if not graph.seat.any():
         out.append("no plane faces away from the access, so the part has no seat")
     if not walls:

@@ -1,7 +1,8 @@
-"""What the faces of a part look like to a wall finder: samples, material thickness, fillets, links.
+"""Measured faces of a part for the search for walls: samples, material thickness, fillets, links.
 
 Everything here is measured once on the mesh and the B-rep edges; the later stages only read arrays.
-Faces are indexed from 0 here (face ``F12`` is row 11).
+Faces are indexed from 0 here: face ``F12`` has index 11. There are n faces, m triangles and s samples. Places and
+directions lie in the frame of the part.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ STEEP_NZ = 0.5
 SAMPLES_PER_FACE = 24
 SAMPLES_IN_ALL = 24_000
 
-# A fillet turns by at least this much between the two faces it joins (rad), and its radius is at most this share
-# of the height of the part; larger concave faces are shape, not transition.
+# A fillet turns by at least this angle (rad) between the two faces it joins. Its radius is at most this share of the
+# height of the part. Larger concave faces are shape, not transition.
 FILLET_TURN = 0.35
 FILLET_RADIUS_SHARE = 0.35
 
-# A concave face with parallel material behind it over this share is a bend of a wall and no fillet.
+# A concave face with parallel material behind it over this share is a bend of a wall, not a fillet.
 PARALLEL_DOT = -0.94
 PARALLEL_SHARE = 0.7
 
@@ -52,7 +53,7 @@ class Link:
 
     @property
     def joins(self) -> bool:
-        """Whether the surface goes on across the edge: convex or smooth."""
+        """Whether the surface continues across the edge: convex or smooth."""
         return self.kind in (EdgeKind.CONVEX, EdgeKind.SMOOTH)
 
     def other(self, face: int) -> int:
@@ -80,14 +81,14 @@ class UnionFind:
             self.parent[max(i, j)] = min(i, j)
 
     def labels(self) -> np.ndarray:
-        """(n,) int, representative of each."""
+        """(n,) int64, index of the representative of each member."""
         return np.array([self.find(i) for i in range(len(self.parent))], dtype=np.int64)
 
 
 def connected_runs(runs: list[np.ndarray]) -> list[list[int]]:
-    """Runs of mesh vertices that share one, as lists of indices.
+    """Groups of runs of mesh vertices that share a vertex, as lists of indices.
 
-    runs : k arrays (m,) int, vertices of the mesh
+    runs : k arrays (m,) int64, index of vertices of the mesh
     """
     sets = UnionFind(len(runs))
     owner: dict[int, int] = {}
@@ -135,7 +136,7 @@ class FaceGraph:
 
     @cached_property
     def skin(self) -> float:
-        """How far rays start below or above a surface, mm."""
+        """Distance below or above a surface at which rays start, mm."""
         return 1e-6 * self.size
 
     @cached_property
@@ -145,7 +146,7 @@ class FaceGraph:
 
     @cached_property
     def normal(self) -> F64:
-        """(n, 3) float64, area-weighted mean outward normal; not unit where the face bends."""
+        """(n, 3) float64, dimensionless, area-weighted mean outward normal; shorter than 1 where the face bends."""
         w = self.mesh.normals * self.mesh.areas[:, None]
         total = np.column_stack([np.bincount(self.face_of, weights=w[:, k], minlength=self.n) for k in range(3)])
         return np.asarray(total / np.maximum(self.area, 1e-30)[:, None])
@@ -167,30 +168,39 @@ class FaceGraph:
         return out
 
     def share(self, of_triangles: np.ndarray) -> F64:
-        """(n,) float64: share of the area of each face whose triangles fulfil a condition ((m,) bool)."""
+        """Share of the area of each face whose triangles fulfil a condition, (n,) float64, dimensionless.
+
+        of_triangles : (m,) bool, the condition
+        """
         part = np.bincount(self.face_of, weights=self.mesh.areas * of_triangles, minlength=self.n)
         return np.asarray(part / np.maximum(self.area, 1e-30))
 
     def sample_share(self, of_samples: np.ndarray) -> F64:
-        """(n,) float64: share of the samples of each face that fulfil a condition ((s,) bool)."""
+        """Share of the samples of each face that fulfil a condition, (n,) float64, dimensionless.
+
+        of_samples : (s,) bool, the condition
+        """
         count = np.bincount(self.face, minlength=self.n)
         return np.asarray(np.bincount(self.face, weights=of_samples.astype(float), minlength=self.n)
                           / np.maximum(count, 1))
 
     def strip_share(self, of_samples: np.ndarray) -> F64:
-        """(n,) float64: like ``sample_share`` but by area over all faces of one surface (``strip``)."""
+        """``sample_share`` by area over all faces of one surface (``strip``), (n,) float64, dimensionless.
+
+        of_samples : (s,) bool, the condition
+        """
         strip, weight = self.strip[self.face], self.samples.area
         total = np.bincount(strip, weights=weight, minlength=self.n)
         found = np.bincount(strip, weights=weight * of_samples, minlength=self.n)
         return np.asarray((found / np.maximum(total, 1e-30))[self.strip])
 
     def face_rows(self, of_faces: np.ndarray) -> np.ndarray:
-        """(k,) int: samples that lie on the faces selected by a mask (n,) bool."""
+        """(k,) int64, index of the samples on the selected faces. of_faces : (n,) bool, the selection."""
         return np.flatnonzero(of_faces[self.face])
 
     @cached_property
     def steep(self) -> np.ndarray:
-        """(n,) bool: normal more than 60 degrees from +Z, and not facing down, over half of the face."""
+        """(n,) bool: over half of the face the normal is more than 60 degrees from +Z and does not point down."""
         return self.share(np.abs(self.mesh.normals[:, 2]) <= STEEP_NZ) >= 0.5
 
     @cached_property
@@ -212,8 +222,9 @@ class FaceGraph:
     def normals_at(self, face: int, nodes: np.ndarray) -> F64:
         """Unit normals of a face at mesh vertices on its border.
 
-        face : 0-based; nodes : (k,) int vertices of triangles of that face
-        Returns (k, 3) float64; NaN where the face has no triangle at the vertex.
+        face  : 0-based
+        nodes : (k,) int64, index of vertices of triangles of that face
+        Returns (k, 3) float64, dimensionless; NaN where the face has no triangle at the vertex.
         """
         keys, total = self._corner_normals
         key = nodes.astype(np.int64) * self.n + face
@@ -248,7 +259,7 @@ class FaceGraph:
 
     @cached_property
     def strip(self) -> np.ndarray:
-        """(n,) int: faces that the CAD system cut from one surface carry one label."""
+        """(n,) int64, index: faces that the CAD system cut from one surface have one label."""
         sets = UnionFind(self.n)
         for link in self.links:
             if link.kind == EdgeKind.SMOOTH and self._same_surface(link.a, link.b):
@@ -323,7 +334,8 @@ class FaceGraph:
     def _chamfers(self, fillet: np.ndarray) -> np.ndarray:
         """Narrow faces between two concave edges, leaning half way between their neighbours (a weld, a chamfer).
 
-        Not so the flank of a short bar or of a leg of a fork: that is wider than the material behind it is thick.
+        The flank of a short bar or of a leg of a fork is none: it is wider than the thickness of the material behind
+        it.
         """
         out = np.zeros(self.n, bool)
         width = np.zeros(self.n)
@@ -341,7 +353,7 @@ class FaceGraph:
 def cast(tree: TriangleTree, origins: F64, directions: F64, skin: float) -> tuple[F64, np.ndarray]:
     """First hits of rays that leave a surface.
 
-    origins, directions : (n, 3) float64, mm and unit
+    origins, directions : (n, 3) float64, mm and dimensionless, in the frame of the mesh
     skin                : mm, nearer hits are the surface itself
 
     Returns (n,) float64 distances from the origins (inf where nothing is hit) and (n,) int triangles (-1 there).

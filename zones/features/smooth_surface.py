@@ -1,13 +1,13 @@
-"""The exact surface of selected faces, as near as mesh nodes and their surface parameters tell it.
+"""The surface of selected faces, reconstructed from mesh nodes and their surface parameters.
 
-The nodes of the mesh lie on the exact surface. Round every node a cubic patch X(u, v) is fitted to the nodes of the
-same B-rep face within two rings, or up to four until there are sixteen; a point of a triangle gets the blend of the
-patches of its three corners. Facet normals are right in the middle of a facet only; these hold up to the borders of a
-face as well.
+The nodes of the mesh lie on the exact surface. Around every node a cubic patch X(u, v) is fitted to the nodes of the
+same B-rep face within two rings, or up to four until there are sixteen. A point of a triangle gets the blend of the
+patches of its three corners. Facet normals are right only in the middle of a facet; these normals are right up to the
+borders of a face.
 
 Error: fourth order in the size h of a facet for places, third order for normals, one order less where a face has too
-few rows of nodes for a cubic. Measured in tests/oracle/test_gaps.py. Rows that cannot tell v from v^2 make the patch
-ruled along v.
+few rows of nodes for a cubic. Measured in tests/oracle/test_gaps.py. With too few rows along v the patch is ruled
+along v.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ import numpy as np
 from geometry.mesh import F64, TriangleMesh
 from zones.kernels.cubic import blend_patches, fit_patches, local_nodes, rings
 
-# A patch that turns this far from its facet (cosine) or lies this many mesh tolerances off it is not believed.
+# A patch is rejected where it turns this far from its facet (cosine) or lies this many mesh tolerances off it.
 TURN_DOT = 0.7
 FAR = 4.0
 # Parameters of one node agree within this share of their range.
 SAME = 1e-9
 
 
-class SmoothFaces:
-    """Places and normals of the exact surface on chosen triangles of a mesh.
+class SmoothSurface:
+    """Places and normals of the exact surface on chosen triangles of a mesh, in the frame of the mesh.
 
     mesh      : TriangleMesh
     uv        : (m, 3, 2) float64, surface parameters of the corners of its triangles; None: facets as they are
-    triangles : (k,) int, triangles of whole faces
-    tolerance : mm, what the facets may be off the surface
+    triangles : (k,) int64, index of triangles of whole faces
+    tolerance : mm, largest distance of the facets from the surface
     """
 
     def __init__(self, mesh: TriangleMesh, uv: F64 | None, triangles: np.ndarray, tolerance: float) -> None:
@@ -52,8 +52,8 @@ class SmoothFaces:
         """Places on the exact surface next to points of triangles, and outward unit normals there.
 
         points    : (n, 3) float64, mm, on the triangles
-        triangles : (n,) int
-        Returns (n, 3) and (n, 3) float64; the points and facet normals where no patch is known or believed.
+        triangles : (n,) int64, index
+        Returns (n, 3) and (n, 3) float64; the points and facet normals where no patch exists or it is rejected.
         """
         place, normal = points.copy(), self.mesh.normals[triangles].copy()
         known = np.flatnonzero(self.row[triangles] >= 0)

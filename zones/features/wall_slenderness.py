@@ -1,8 +1,8 @@
-"""Walls that are high for their thickness: they give way to the cutter, and swing.
+"""Slender walls, high for their thickness: they deflect under the cutter and vibrate [Xometry2016].
 
-A wall is asked where rays from its sides, inwards along the normal, leave it soon. There it is cut by the upright plane
-square to it: what the plane cuts of its faces in one piece is its profile, whose height is that from the lowest to the
-highest place, whose thickness is the median of rays inwards all along its sides.
+The search looks at places of a side where an inward ray along the normal is short. There an upright plane, square to
+the wall, cuts its faces. One connected piece of that cut is the profile. Its height runs from the lowest to the highest
+place, and its thickness is the median of inward rays all along its sides.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from geometry.part import Part
 from geometry.sampling import sample_surface
 from zones.model import Wall
 
-SAMPLES = 600  # of the sides of a wall
-MOST_ASKED = 24  # places of a wall that profiles are cut at
+SAMPLES = 600  # on the sides of a wall
+MAX_PLACES = 24  # places of a wall with a profile
 PROFILE_RAYS = 40  # over the height of a profile
-SKIN_SHARE = 1e-6  # of the size of the part, that rays start below a surface
+SKIN_SHARE = 1e-6  # of the size of the part: depth below a surface at which rays start
 
 
 @dataclass(frozen=True)
 class Slender:
-    """Where a wall is highest for its thickness.
+    """The place where a wall is highest for its thickness.
 
     thickness, height : mm, of its profile there; at : a place on a side of it, mm
     """
@@ -45,11 +45,11 @@ class Slender:
 
 
 def slender_walls(part: Part, tree: TriangleTree, walls: Sequence[Wall], ratio: float) -> list[Slender]:
-    """Walls that are somewhere more than ``ratio`` times as high as thick, each once, where it is worst.
+    """Walls with a place more than ``ratio`` times as high as thick, each once, at its worst place [Xometry2016].
 
-    part, tree : in the frame the walls are known in, +Z along the access
+    part, tree : in the frame of the walls, +Z along the access
 
-    Returns list of Slender in the order of the walls. What holds a wall at its ends or by a connection is not seen.
+    Returns list of Slender in the order of the walls. Support at the ends of a wall or by a connection is ignored.
     """
     found = [_worst(_WallMesh(part, tree, w), ratio) for w in walls]
     return [s for s in found if s is not None]
@@ -66,12 +66,12 @@ class _WallMesh:
         self.skin = SKIN_SHARE * float(np.linalg.norm(part.bounds[1] - part.bounds[0]))
 
     def thickness(self, points: F64, normals: F64) -> F64:
-        """(n,) mm of wall behind places (n, 3) of it along inward normals; inf where the ray leaves elsewhere."""
+        """(n,) mm, thickness behind places (n, 3) along inward normals; inf where the ray leaves by another face."""
         far, hit = first_hits(self.tree, points, -normals, t_min=self.skin)
         return np.where((hit >= 0) & self.own[np.maximum(hit, 0)], far, np.inf)
 
     def profile(self, at: F64, along: F64, seed: int) -> tuple[F64, F64, NDArray[np.int64]]:
-        """What a plane cuts of the wall in one piece with triangle ``seed``: ends (m, 3) of segments, mm, and theirs.
+        """Cut of the wall by a plane, the piece with triangle ``seed``: ends (m, 3) of segments, mm, and triangles.
 
         at, along : (3,) a place of the plane, mm, and its unit normal
         """
@@ -102,7 +102,7 @@ class _WallMesh:
 
 
 def _connected(a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(m,) label of each of m segments between nodes a and b, (m,): those that hang together share one."""
+    """(m,) label of each of m segments between nodes a and b, (m,): connected segments share a label."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -121,9 +121,9 @@ def _worst(mesh: _WallMesh, ratio: float) -> Slender | None:
     behind = mesh.thickness(samples.points, samples.normals)
     thin = np.flatnonzero(behind * ratio < high)
     order = thin[np.argsort(behind[thin], kind="stable")]
-    asked = order[np.unique(np.linspace(0, max(len(order) - 1, 0), min(len(order), MOST_ASKED)).astype(int))]
+    picked = order[np.unique(np.linspace(0, max(len(order) - 1, 0), min(len(order), MAX_PLACES)).astype(int))]
     best: Slender | None = None
-    for k in asked.tolist():
+    for k in picked.tolist():
         found = _at(mesh, samples.points[k], samples.normals[k], int(samples.triangle[k]))
         if found is not None and found.ratio > max(ratio, 0.0 if best is None else best.ratio):
             best = Slender(wall.id, found.thickness, found.height, found.at)
@@ -150,7 +150,7 @@ def _at(mesh: _WallMesh, at: F64, normal: F64, triangle: int) -> Slender | None:
 
 
 def _spread(start: F64, end: F64, pitch: float) -> tuple[F64, F64, NDArray[np.int64]]:
-    """Places (k, 3) on segments (m, 3), no farther apart than ``pitch``, mm, what each stands for, and its segment."""
+    """Places (k, 3) on segments (m, 3), at most ``pitch`` mm apart, the length each represents, and its segment."""
     length = np.linalg.norm(end - start, axis=1)
     count = np.maximum(1, np.ceil(length / max(pitch, 1e-9))).astype(np.int64)
     of = np.repeat(np.arange(len(start)), count)
@@ -160,7 +160,7 @@ def _spread(start: F64, end: F64, pitch: float) -> tuple[F64, F64, NDArray[np.in
 
 
 def _median(values: F64, weights: F64) -> float:
-    """The value in the middle of the weights."""
+    """The weighted median."""
     order = np.argsort(values, kind="stable")
     total = np.cumsum(weights[order])
     return float(values[order][int(np.searchsorted(total, 0.5 * total[-1]))])

@@ -22,7 +22,7 @@ from zones.features.face_graph import FaceGraph, Link, UnionFind, connected_runs
 
 THIN_SHARE = 0.5
 OPPOSED_DOT = -0.5
-# Sides join through their material when this share of one of them looks at the other ...
+# Sides join through their material when this share of one of them faces the other ...
 BACKED_SHARE = 0.15
 # ... with rays no longer than this multiple of its median thickness; longer ones run along another wall.
 BACKED_REACH = 2.5
@@ -39,8 +39,8 @@ class Sheets:
     """Thin bodies of a part (walls, and webs that may prove to be connections).
 
     thin  : (n,) bool, faces that are sides of thin material
-    body  : (n,) int, label of the thin body of a face, ``NO_WALL`` or ``SEAT`` where there is none;
-            after ``grow`` also tops and ends carry the label of their body
+    body  : (n,) int64, index of the thin body of a face, ``NO_WALL`` or ``SEAT`` where there is none;
+            after ``grow`` tops and ends have the label of their body too
     """
 
     thin: np.ndarray
@@ -52,7 +52,7 @@ class Sheets:
         return [int(k) for k in np.unique(self.body[self.thin]) if k >= 0]
 
     def sides(self, label: int) -> np.ndarray:
-        """0-based thin faces of a body."""
+        """(k,) int64, index of the thin faces of a body, 0-based."""
         return np.flatnonzero(self.thin & (self.body == label))
 
 
@@ -84,7 +84,7 @@ def thin_faces(graph: FaceGraph) -> np.ndarray:
 
 
 def _has_two_sides(graph: FaceGraph, faces: np.ndarray) -> bool:
-    """Whether inward rays from faces ((n,) bool) end on another side rather than on a floor (as from a bore)."""
+    """Whether inward rays from faces ((n,) bool) end on another side, not on a floor (as from a bore)."""
     rows = graph.face_rows(faces)
     back = graph.back[rows]
     two = (back >= 0) & graph.side_like[back] & ~graph.seat[back]
@@ -107,7 +107,7 @@ def _side_heights(graph: FaceGraph) -> F64:
 def _bores(graph: FaceGraph) -> np.ndarray:
     """Hollow round faces that open into the seat while the outside of the same material stands on a floor.
 
-    They are the bore of a hub; without this rule a bored hub would be a ring-shaped wall.
+    They are the bore of a hub. Without this rule a bored hub counts as a ring-shaped wall.
     """
     reaches_seat = np.zeros(graph.n, bool)
     for link in graph.links:
@@ -130,9 +130,9 @@ def _join_across_edges(graph: FaceGraph, thin: np.ndarray) -> np.ndarray:
 def _spans(graph: FaceGraph, thin: np.ndarray) -> np.ndarray:
     """(n,) int: label of the span that each face belongs to, ``NO_WALL`` for all other faces.
 
-    A span is material that touches nothing but sides of thin bodies, in two places or more: faces that go on into each
-    other across convex and smooth edges, whose concave edges and fillets lead to thin faces only. What shows behind it
-    is the far side of what it ends at, however steep or short it is.
+    A span is material that touches only sides of thin bodies, in two places or more. Its faces join across convex and
+    smooth edges, and its concave edges and fillets lead to thin faces only. Behind a span lies the far side of the wall
+    it ends at, however steep or short the span is.
     """
     sets = UnionFind(graph.n)
     for link in graph.links:
@@ -153,7 +153,7 @@ def _spans(graph: FaceGraph, thin: np.ndarray) -> np.ndarray:
 
 
 def _join_through_material(graph: FaceGraph, thin: np.ndarray, body: np.ndarray) -> np.ndarray:
-    """Join bodies whose inward rays end on each other; nothing joins a span but what is of it."""
+    """Join bodies whose inward rays end on each other; only parts of a span join a span."""
     rows = np.flatnonzero(thin[graph.face])
     rows = rows[(graph.back[rows] >= 0) & (graph.back_dot[rows] < OPPOSED_DOT)]
     rows = rows[graph.side_like[graph.back[rows]]]
@@ -174,9 +174,9 @@ def _join_through_material(graph: FaceGraph, thin: np.ndarray, body: np.ndarray)
 def _continue_across_junctions(graph: FaceGraph, thin: np.ndarray, body: np.ndarray) -> np.ndarray:
     """Join the two halves of a wall that a crossing wall cuts over its full height.
 
-    Two sides with concave edges are one surface interrupted when they lie in each other's tangent plane, a short
-    way apart. What interrupts them must be cut itself (another body on the front than on the back): a wall that is
-    whole by itself separates the ribs that meet it from both sides.
+    Two sides with concave edges are one interrupted surface when they lie in each other's tangent plane, a short way
+    apart. The wall between must be cut itself (another body on the front than on the back). A wall that is whole
+    separates the ribs that meet it from both sides.
     """
     ends = [(f, k) for k in graph.links if k.kind == EdgeKind.CONCAVE and thin[k.a] and thin[k.b]
             and body[k.a] != body[k.b] for f in (k.a, k.b)]
@@ -209,7 +209,7 @@ def _interrupted(graph: FaceGraph, f: int, first: Link, g: int, second: Link) ->
 
 
 def _is_pillar(graph: FaceGraph, faces: np.ndarray) -> bool:
-    """Round in plan and hardly longer than thick: a post or a hub."""
+    """Whether faces are round in plan and hardly longer than thick: a post or a hub."""
     rows = graph.face_rows(np.isin(np.arange(graph.n), faces))
     area = graph.samples.area[rows]
     thickness = float(np.median(graph.inward[rows]))
@@ -223,10 +223,10 @@ def _is_pillar(graph: FaceGraph, faces: np.ndarray) -> bool:
 def grow(graph: FaceGraph, thin: np.ndarray, body: np.ndarray) -> np.ndarray:
     """Give tops, ends and roundings to the body they share most border with.
 
-    thin, body : (n,) as in Sheets, before growing
-    Returns (n,) int labels: a body, ``SEAT`` for faces that belong to the underside, ``NO_WALL`` otherwise.
+    thin, body : (n,) bool and (n,) int64, index, as in Sheets, before growing
+    Returns (n,) int64, index: a body, ``SEAT`` for faces that belong to the underside, ``NO_WALL`` otherwise.
 
-    A face with a concave edge to a side of a body is no top of that body: it is a floor, or a bar that ends there.
+    A face with a concave edge to a side of a body is not a top of that body. It is a floor, or a bar that ends there.
     """
     label = np.where(thin, body, NO_WALL)
     label[graph.seat] = SEAT
@@ -270,7 +270,7 @@ def _best_label(graph: FaceGraph, face: int, label: np.ndarray, touching: list[s
 
 
 def _concave_neighbours(graph: FaceGraph, thin: np.ndarray, body: np.ndarray) -> list[set[int]]:
-    """Bodies that each face meets in a concave edge or through a fillet."""
+    """Bodies that each face meets at a concave edge or through a fillet."""
     out: list[set[int]] = [set() for _ in range(graph.n)]
     for link in graph.links:
         if link.kind == EdgeKind.CONCAVE and not (graph.fillet[link.a] or graph.fillet[link.b]):

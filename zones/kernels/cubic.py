@@ -13,7 +13,7 @@ from numba import njit
 
 ENOUGH, RINGS = 16, 4
 RIDGE = np.array([1e-14, 1e-14, 1e-10, 1e-10, 1e-10, 1e-6, 1e-6, 1e-6, 1e-6])
-"""What each term costs. Where few rows of nodes cannot tell v from v^2, or u^2 from u^3, the lower order is taken."""
+"""Cost of each term. Where few rows of nodes do not separate v from v^2, or u^2 from u^3, the lower order wins."""
 
 
 @njit(cache=True, nogil=True)
@@ -66,7 +66,7 @@ def rings(corner, count):
 
 @njit(cache=True, nogil=True)
 def _neighbours(i, start, ring, out):
-    """Nodes round node i, without it, each once: two rings, and up to ``RINGS`` until there are ``ENOUGH``."""
+    """Nodes around node i, without it, each once: two rings, and up to ``RINGS`` until there are ``ENOUGH``."""
     n, done = 0, 0
     for turn in range(RINGS):
         if turn >= 2 and n >= ENOUGH:

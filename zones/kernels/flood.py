@@ -1,4 +1,4 @@
-"""From which height on each node of a height field is joined to the outside."""
+"""Least height at which each node of a height field is connected to the outside."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def escape_heights(height, order):
 
     height : (n, m) float64, mm, may hold inf; order : (n m,) int64, its nodes by height, lowest first
 
-    Nodes are let in from the lowest on and joined to those beside them, along rows and columns; what joins the border
-    has its height. Members of a set hang in a ring, so that each is visited once.
+    Nodes enter from the lowest on and join their neighbours along rows and columns. Nodes that join the border get its
+    height. Members of a set form a ring, so that each is visited once.
     """
     rows, cols = height.shape
     n = rows * cols

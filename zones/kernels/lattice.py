@@ -30,7 +30,7 @@ def noncut_lookup(grid, row, xy):
 
 @njit(cache=True, nogil=True)
 def noncut_blocked(grid, row, tips):
-    """Whether shank or holder stand too low at tips (n, 3)."""
+    """Whether shank or holder are too low at tips (n, 3)."""
     out = np.empty(len(tips), np.bool_)
     for k in range(len(tips)):
         out[k] = noncut_at(grid, row, tips[k, 0], tips[k, 1]) > tips[k, 2] + 1e-9

@@ -1,4 +1,4 @@
-"""Which places of a surface are one piece of it within a ball."""
+"""Places of a surface that are one connected piece of it within a ball."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from geometry.kernels.nearest import triangle2
 
 
 @njit(cache=True, nogil=True)
-def one_piece(beside, corners, starts, goals, centres, radius, out):
+def one_piece(neighbours, corners, starts, goals, centres, radius, out):
     """out[i]: whether triangle goals[i] is reached from starts[i] over neighbours that a ball round centres[i] meets.
 
-    beside  : (k, 3) int64, neighbours of each triangle across its edges, -1 where there is none
+    neighbours : (k, 3) int64, neighbours of each triangle across its edges, -1 where there is none
     corners : (k, 3, 3) float64, mm; radius : mm
     """
     seen = np.full(len(corners), -1, np.int64)
@@ -25,7 +25,7 @@ def one_piece(beside, corners, starts, goals, centres, radius, out):
             depth -= 1
             here = stack[depth]
             for side in range(3):
-                there = beside[here, side]
+                there = neighbours[here, side]
                 if there < 0 or seen[there] == i:
                     continue
                 seen[there] = i

@@ -1,8 +1,7 @@
 """Trapezoidal map of pieces that meet only at their ends, with its search DAG.
 
-Randomised incremental construction of de Berg, Cheong, van Kreveld and Overmars, Computational Geometry (3rd ed.),
-chapter 6: pieces are put in one after the other; each cuts the trapezoids it runs through, and their leaves in the
-search DAG become inner nodes.
+Randomised incremental construction [DeBerg2008, chapter 6]: pieces are inserted one after the other. Each cuts the
+trapezoids it runs through, and their leaves in the search DAG become inner nodes.
 
 Notation: a *point* is an id. Points come sorted by x, then by y, which is the order along x after a shear by an
 infinite small amount; so comparing ids compares points exactly, and a vertical piece is one that leans a little.
@@ -96,7 +95,7 @@ def _crossed(trap, node, ends, points, s, path):
         if ends[s, Q] <= r:
             return count, DONE, -1
         side = orientation(ends, s, points[r, 0], points[r, 1])
-        if side == 0:  # a point on the piece: told with a piece that ends or starts there
+        if side == 0:  # a point on the piece: return a piece that ends or starts there
             return count, MEET, _piece_at(ends, r)
         at = trap[at, LR] if side > 0 else trap[at, UR]
 
@@ -232,11 +231,11 @@ def _rows(points, pieces):
 
 @njit(cache=True, nogil=True)
 def build_map(points, pieces):
-    """Put the pieces in as they stand (the box not among them): the caller has shuffled them.
+    """Insert the pieces (without the box) in the given order, which the caller has shuffled [DeBerg2008, chapter 6].
 
     points (m, 2) int64 sorted, pieces (n + 2, 2) int64.
-    Returns (state, first piece, second piece, trap, node). Slots of trap with TOP = -1 are free. Where state is MEET
-    the two pieces cross, touch or overlap and the rest is of no use.
+    Returns (state, first piece, second piece, trap, node). Slots of trap with TOP = -1 are free. Where state is MEET,
+    the two pieces cross, touch or overlap, and the rest has no meaning.
     """
     n = len(pieces) - 2
     narrow, ends = _rows(points, pieces)
@@ -261,7 +260,7 @@ def build_map(points, pieces):
 
 @njit(cache=True, nogil=True)
 def find_trapezoids(node, points, pieces, places):
-    """Trapezoid and depth (inner nodes asked) for places (k, 2) int64 on the grid SUB times finer than the points.
+    """Trapezoid and depth (visited inner nodes) for places (k, 2) int64 on the grid SUB times finer than the points.
 
     A place is taken as moved up, and then right by much less. So one on a piece belongs above it, one on a vertical
     piece or under or over a point belongs right of it, and no trapezoid without width is ever the answer.

@@ -1,4 +1,4 @@
 """The plan view along an access: sections, strips, cells and regions.
 
-Depth and tools come later, in ``zoning`` and ``reach``.
+Depth and tools belong to ``zoning`` and ``reach``.
 """

@@ -1,9 +1,9 @@
-"""What is drawn in plan: wall traces, channels with their centre lines and ends, footprints of connections.
+"""The plan view of a part: wall traces, channels with their centre lines and ends, footprints of connections.
 
 1. Every side of a wall is cut at mid height (``zones.plan_view.wall_sections``): its trace.
 2. Level rays from the traces sweep strips (``zones.plan_view.channel_strips``).
-3. The strips a pair of walls sends to each other are one area, the channel.
-4. A footprint is what the faces of a connection and its fillets cover, seen along the access.
+3. The strips between a pair of walls form one area, the channel.
+4. A footprint is the area that the faces of a connection and its fillets cover, seen along the access.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from zones.features.connection_faces import connection_faces, face_bases
 from zones.model import Decomposition
 from zones.plan_view.channel_strips import CLEAR, RayIndex, side_rays
 from zones.plan_view.plan_cover import FACES_UP, cover_border, upward
-from zones.plan_view.plan_map import Area, PlanMap
+from zones.plan_view.plan_map import PlanArea, PlanMap
 from zones.plan_view.region_splitting import Parting
 from zones.plan_view.wall_sections import SideCurve, wall_sections
 
-FAR = 0.3  # of the least gap: how far off the next trial is, where a leaning wall hides its channel from above
+FAR = 0.3  # of the least gap: distance of the next trial, where a leaning wall hides its channel from above
 UPRIGHT = 0.3  # |n_xy| below: no side to slide along
-CLOSE = 1e-6  # mm, what union leaves open between strips
+CLOSE = 1e-6  # mm, gaps that the union leaves between strips
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,13 +39,13 @@ class ChannelPlan:
     names    : ids of the channels
     curves   : sides of the walls at mid height
     of_wall  : channels of each wall, as a mask over ``names``
-    wall     : (faces + 1,) int, row in ``of_wall`` of the wall a face is a side of, -1 for other faces
-    height   : (walls,) float64, mm, where each wall was cut
+    wall     : (faces + 1,) int64, index in ``of_wall`` of the wall that a face is a side of, -1 for other faces
+    height   : (walls,) float64, mm, height of the cut through each wall
     gap      : (walls,) float64, mm, least gap of the channels of each wall
-    faced    : per curve the share of its length that faces each channel
-    rays     : where the rays of all curves start and what they belong to
+    faced    : for each curve the share of its length that faces each channel
+    rays     : starts of the rays of all curves, with wall and channel
     shadows  : footprints of the connections by id
-    parting  : in which of its places a point of a region lies
+    parting  : Parting, gives the place of a point of a region
     """
 
     plan: PlanMap
@@ -72,7 +72,8 @@ class ChannelPlan:
         found = side_rays(part, d, curves, [a.shape for a in shadows])
         strips = [s for f in found for s in f.strips]
         names = tuple(c.id for c in d.channels)
-        areas = [Area(n, shapely.union_all([s.area for s in strips if s.channel == n]).buffer(CLOSE)) for n in names]
+        areas = [PlanArea(n, shapely.union_all([s.area for s in strips if s.channel == n]).buffer(CLOSE))
+                 for n in names]
         areas += _traces(d, curves) + shadows
         plan = PlanMap.of([a for a in areas if not a.shape.is_empty], [s.centre_line for s in strips])
         of_wall = np.array([[w.id in c.walls for c in d.channels] for w in d.walls], bool)
@@ -89,15 +90,15 @@ class ChannelPlan:
                            RayIndex.of(d, curves, found, names), {a.name: a.shape for a in shadows}, parting)
 
     def channel_of(self, points: F64, normals: F64, face: NDArray[np.int32]) -> NDArray[np.int64]:
-        """(n,) row in ``names`` of the channel that each point of a wall side faces, -1 for none.
+        """Channel that each point of a wall side faces, (n,) int64, index in ``names``, -1 for none.
 
-        points, normals : (n, 3) float64 in the frame of the first access, mm and unit
-        face            : (n,) face numbers
+        points, normals : (n, 3) float64 in the frame of the first access, mm and dimensionless
+        face            : (n,) int32, index, face numbers
 
-        A point is slid along its tangent plane to the height its wall was cut at, and looked up just off the wall;
-        a point of a side that no channel cell answers for there is tried farther off. Where a side faces a channel
-        over most of its length, what of it looks past the other wall goes to the channel beside it along the side:
-        a zone does not end in the middle of a wall for that.
+        A point slides along its tangent plane to the height at which its wall was cut. The look-up is just off the
+        wall, and farther off where it finds no channel. Where a side faces a channel over most of its length, its
+        stretches that pass the other wall go to the channel next to them along the side. So a zone does not end in the
+        middle of a wall.
         """
         out = np.full(len(points), -1, np.int64)
         wall = self.wall[face]
@@ -125,15 +126,15 @@ class ChannelPlan:
 
     @cached_property
     def by_size(self) -> NDArray[np.int64]:
-        """Rows of the channels that are drawn, the largest in plan first: where two overlap, it has the cell."""
+        """(k,) int64, index of the drawn channels, the largest in plan first, which owns the cells of an overlap."""
         size = {n: float(self.plan.faces.areas[self.plan.over[:, k]].sum()) for k, n in enumerate(self.plan.names)}
         drawn = [k for k, n in enumerate(self.names) if n in size]
         return np.array(sorted(drawn, key=lambda k: (-round(size[self.names[k]], 3), k)), dtype=np.int64)
 
 
-def footprints(part: Part, decomposition: Decomposition) -> list[Area]:
-    """What each connection covers in plan with its fillets, seen along +Z of the frame of the part."""
-    return [Area(c, _shadow(part, faces)) for c, faces in connection_faces(part, decomposition).items()]
+def footprints(part: Part, decomposition: Decomposition) -> list[PlanArea]:
+    """Area that each connection covers in plan with its fillets, seen along +Z of the frame of the part."""
+    return [PlanArea(c, _shadow(part, faces)) for c, faces in connection_faces(part, decomposition).items()]
 
 
 def _shadow(part: Part, faces: Sequence[int]) -> shapely.Geometry:
@@ -144,8 +145,8 @@ def _shadow(part: Part, faces: Sequence[int]) -> shapely.Geometry:
     return shapely.union_all(covers).buffer(0.0)
 
 
-def _traces(decomposition: Decomposition, curves: Sequence[SideCurve]) -> list[Area]:
-    """Outline of each wall at the height it was cut: its sides in turn, or a ring between two closed ones."""
+def _traces(decomposition: Decomposition, curves: Sequence[SideCurve]) -> list[PlanArea]:
+    """Outline of each wall at the height of its cut: its sides in turn, or a ring between two closed sides."""
     out = []
     for w in decomposition.walls:
         mine = [c.points for c in curves if c.wall == w.id]
@@ -158,7 +159,7 @@ def _traces(decomposition: Decomposition, curves: Sequence[SideCurve]) -> list[A
             shape = shapely.make_valid(shapely.Polygon(np.concatenate(mine)))
         else:
             continue
-        out.append(Area(w.id, shape))
+        out.append(PlanArea(w.id, shape))
     return out
 
 

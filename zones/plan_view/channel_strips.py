@@ -1,9 +1,9 @@
 """Channels in plan: strips that rays sweep from one wall to the next.
 
-From points along each side of a wall, cut at mid height, level rays go out; connections, fillets and slivers let them
-through. A run of neighbouring rays that meet one other wall is a strip of a channel; its first and last ray are its
-ends, the middles of its rays the centre line. Where a connection, or a hole no longer than the channel is wide, takes a
-wall away, the strip goes on straight.
+From points along each side of a wall, cut at mid height, level rays go out. They pass through connections, fillets and
+slivers. A run of neighbouring rays that meet one other wall is a strip of a channel. Its first and last ray are its
+ends, and the middles of its rays form the centre line. Where a connection, or a hole no longer than the width of the
+channel, interrupts a wall, the strip continues straight.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from geometry.part import Part
 from zones.model import Channel, Decomposition
 from zones.plan_view.wall_sections import SideCurve
 
-CLEAR = 0.02  # mm off the surface where a ray or a look-up starts, so that it does not fall on the border itself
+CLEAR = 0.02  # mm off the surface: start of a ray or a look-up, so that it does not fall on the border itself
 PITCH = 0.4  # mm between rays along a trace
-ENDS = 8  # halvings of the pitch between the last ray of a strip and the first one that is not of it
+ENDS = 8  # halvings of the pitch between the last ray of a strip and the first ray outside it
 FACING = -0.3  # n1·n2 below: two sides face each other
 FACING_SHARE = 0.2  # of a side that faces channels, below which it is an outside
-NEIGHBOURS = 12  # rays that are asked for the side a point lies on
+NEIGHBOURS = 12  # nearest rays that decide the side of a point
 SAME_SIDE = 0.5  # n1·n2 above: a point and a ray are on one side
 
 
 @dataclass(frozen=True, eq=False)
-class Strip:
+class ChannelStrip:
     """A run of rays from one wall to another: starts and feet, (k, 2) float64, mm, k >= 2."""
 
     channel: str
@@ -44,12 +44,12 @@ class Strip:
 
     @property
     def centre_line(self) -> F64:
-        """(k, 2) float64, mm."""
+        """(k, 2) float64, mm, plan view of the access frame: middles of the rays."""
         return np.asarray(0.5 * (self.start + self.foot))
 
     @property
     def area(self) -> shapely.Geometry:
-        """What the rays sweep, as quadrilaterals between neighbours; crossed ones count as the two triangles."""
+        """Area that the rays sweep, as quadrilaterals between neighbours; a crossed one counts as two triangles."""
         a, b, c, d = self.start[:-1], self.start[1:], self.foot[1:], self.foot[:-1]
         ring = np.stack([a, b, c, d, a], axis=1)
         return shapely.union_all(shapely.make_valid(shapely.polygons(ring)))
@@ -57,12 +57,12 @@ class Strip:
 
 @dataclass(frozen=True, eq=False)
 class SideRays:
-    """One side of a wall as its rays saw it: their starts and normals, (k, 2), the channel of each ('' for none)."""
+    """The rays of one side of a wall: starts and normals, (k, 2), and the channel of each ('' for none)."""
 
     start: F64
     normal: F64
     named: list[str]
-    strips: list[Strip]
+    strips: list[ChannelStrip]
 
     @property
     def faced(self) -> dict[str, float]:
@@ -70,7 +70,7 @@ class SideRays:
         return {n: self.named.count(n) / len(self.named) for n in sorted({s.channel for s in self.strips})}
 
     def spread_names(self, closed: bool) -> list[str]:
-        """Channel of each ray, of those without the nearest along the side; all '' on a side that is an outside."""
+        """Channel of each ray; a ray without one gets the nearest along the side. All '' on an outside."""
         if sum(self.faced.values()) < FACING_SHARE:
             return [""] * len(self.named)
         known = np.array([k for k, n in enumerate(self.named) if n])
@@ -101,9 +101,10 @@ class RayIndex:
                         np.array([names.index(n) if n else -1 for n in named], dtype=np.int64))
 
     def nearest(self, at: F64, side: F64, wall: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(n,) channel of the nearest ray of the same wall that leaves to the same side, -1 for none.
+        """Channel of the nearest ray of the same wall that leaves to the same side, (n,) int64, index, -1 for none.
 
-        at, side : (n, 2) float64, mm and unit; wall : (n,) rows
+        at, side : (n, 2) float64, mm and dimensionless, in plan of the first access's frame
+        wall     : (n,) int64, index of the wall
         """
         if not len(self.wall):
             return np.full(len(at), -1, np.int64)
@@ -120,7 +121,7 @@ class RayIndex:
 
 def side_rays(part: Part, decomposition: Decomposition, curves: Sequence[SideCurve],
               shadows: Sequence[shapely.Geometry]) -> list[SideRays]:
-    """What the rays of every side saw."""
+    """Rays of every side with the channels they cross."""
     d = decomposition
     through = {f for c in d.connections for f in c.faces} | {f.number for f in part.faces if f.sliver}
     through |= {f for f, role in d.face_role.items() if role == "fillet"}
@@ -137,7 +138,7 @@ def side_rays(part: Part, decomposition: Decomposition, curves: Sequence[SideCur
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """What level rays are sent against: mesh and tree, walls by face, channels by walls, mm a ray starts off."""
+    """Obstacles of level rays: mesh and tree, walls by face, channels by walls, start distance of rays in mm."""
 
     mesh: TriangleMesh
     tree: TriangleTree
@@ -164,7 +165,7 @@ def _side(curve: SideCurve, look: _Look, holes: shapely.Geometry) -> SideRays:
     if len(start) < 2:
         return SideRays(start, normal, [""] * len(start), [])
     inset = start.copy()
-    if not curve.closed:  # a ray from the very end of a side would graze the end of the one it meets
+    if not curve.closed:  # a ray from the very end of a side grazes the end of the opposite side
         inset[0] += CLEAR * np.array([normal[0, 1], -normal[0, 0]])
         inset[-1] -= CLEAR * np.array([normal[-1, 1], -normal[-1, 0]])
     named, length = look.along(curve.wall, inset, normal, curve.z)
@@ -176,7 +177,7 @@ def _side(curve: SideCurve, look: _Look, holes: shapely.Geometry) -> SideRays:
     for run, (first, last) in zip(runs, ends, strict=True):
         base = np.vstack([first[:, :2], start[run], last[:, :2]])
         foot = np.vstack([first[:, 2:], start[run] + length[run, None] * normal[run], last[:, 2:]])
-        strips.append(Strip(named[run[0]], base, foot))
+        strips.append(ChannelStrip(named[run[0]], base, foot))
     return SideRays(start, normal, named, strips)
 
 
@@ -184,8 +185,8 @@ def _ends(curve: SideCurve, look: _Look, start: F64, normal: F64, named: Sequenc
           runs: Sequence[Sequence[int]]) -> list[tuple[F64, F64]]:
     """Last ray before and after each run that still meets its wall, (0 or 1, 4) float64: start and foot, mm.
 
-    Between the last ray of a run and the next one the border is halved ENDS times: where a strip ends must not hang on
-    where the rays happen to start. An end of the curve, or a ray named after its neighbours, is left alone.
+    Between the last ray of a run and the next ray the border is halved ENDS times, so that the end of a strip does not
+    depend on the starts of the rays. An end of the curve, or a ray named after its neighbours, does not change.
 
     named, seen : channel of each ray after and before ``_bridge``
     """
@@ -214,7 +215,7 @@ def _ends(curve: SideCurve, look: _Look, start: F64, normal: F64, named: Sequenc
 
 
 def _bridge(names: list[str], length: F64, hole: NDArray[np.bool_], closed: bool) -> None:
-    """Name rays that no wall stopped after the strip on both sides of them, in place; lengths go on straight.
+    """Name rays that no wall stopped after the strip on both sides of them, in place; lengths are interpolated.
 
     names, length (mm) : of the rays in order; hole : (n,) bool, rays that leave a wall where a connection ends at it
     """
@@ -231,7 +232,7 @@ def _bridge(names: list[str], length: F64, hole: NDArray[np.bool_], closed: bool
 
 
 def runs_of(names: Sequence[str], closed: bool) -> list[list[int]]:
-    """Runs of equal names that are not empty, in order; round the end where the curve is closed."""
+    """Runs of equal names that are not empty, in order, and across the end where the curve is closed."""
     runs: list[list[int]] = []
     for k, name in enumerate(names):
         if name and runs and runs[-1][-1] == k - 1 and names[runs[-1][-1]] == name:
@@ -249,7 +250,7 @@ def runs_of(names: Sequence[str], closed: bool) -> list[list[int]]:
 def spread(points: F64, closed: bool, pitch: float) -> tuple[F64, F64]:
     """Evenly spaced points along a polyline and the unit normals to its left, (k, 2) float64 each.
 
-    points : (n, 2) float64, mm; the last joins the first where ``closed``
+    points : (n, 2) float64, mm, in plan of the first access's frame; the last joins the first where ``closed``
     """
     line = np.vstack([points, points[:1]]) if closed else points
     step = np.diff(line, axis=0)

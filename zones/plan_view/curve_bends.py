@@ -1,17 +1,16 @@
-"""Bends of a curve in plan: how far it turns each way, whatever its place, size and noise.
+"""Bends of a curve in plan: how far it turns each way, independent of position, size and noise.
 
 Notation
     s          share of the length of the curve, 0..1
     theta(s)   direction of the tangent, rad; falls where the curve turns right, that is where it bulges to the void
                on its left (an *up* bend)
     leg        stretch between a highest and the next lowest direction; its turn is the difference
-    bridge     of a leg: the straight line that rests on the legs beside it, laid over its mouth
-    height     of a leg: over its own chord or its bridge, in heights of noise, whichever is more. That of noise is
-               0.2 % of the size of the curve or six standard errors of this very height, whichever is more
+    bridge     of a leg: the straight line over its mouth that rests on the legs on both sides
+    height     of a leg: over its own chord or its bridge, the larger of the two, in heights of noise. The height of
+               noise is 0.2 % of the size of the curve or six standard errors of this height, the larger of the two
     strength   of a leg: the lesser of its turn over 20 degrees and its height
-Weak legs are taken away one by one, the weakest first, and their neighbours grow together, as in a walk with
-hysteresis. Those left at strength 1 are the bends. The whole series is kept, since it says how far the curve is
-from another count.
+Weak legs are removed one by one, the weakest first, and their neighbours join, as in a walk with hysteresis. The legs
+left at strength 1 are the bends. The whole series is kept, since it gives the distance of the curve from another count.
 A closed curve without a turn back, such as an oval, is one bend of a whole turn.
 """
 
@@ -27,28 +26,28 @@ from geometry.array_checks import finite_points
 from geometry.mesh import F64
 from geometry.surfaces.bspline import CONTROL_POINTS, SplineCurve, arc_length, even_errors, fit_even, resample
 
-# Control points tried, the paper's ten first; samples per polyline by its number of points.
+# Numbers of control points to try, the paper's ten first; samples of a polyline by its number of points.
 COUNTS = (CONTROL_POINTS, 14, 20, 28, 40, 56, 80)
 SAMPLES = ((400, 512), (200, 256), (100, 128), (0, 64))
 STEPS = 1200
-# A bend turns by this much (rad) and is this high over its chord: in sizes of the curve, and in standard errors. Those
-# are of independent noise; that of a resampled polyline is up to 1.4 times as much, so that six are more than four.
+# A bend turns by at least this angle (rad) and has at least this height over its chord: in sizes of the curve, and in
+# standard errors of independent noise. For a resampled polyline they are up to 1.4 times larger, so six are above four.
 TURN, HEIGHT, ERRORS = float(np.radians(20.0)), 0.002, 6.0
-# Distances below this share of the size of a curve are taken for zero when the number of control points is chosen.
+# Distances below this share of the size of a curve count as zero in the choice of the number of control points.
 FLOOR = 2e-4
-# A walk round a ring starts in its second round, and looks half a round beyond both ends.
+# A walk around a ring starts in its second round and extends half a round beyond both ends.
 ROUNDS = 4
-# A bridge settles in six steps; on 1000 curves of all types, with noise and without, no leg took more.
+# A bridge converges in six steps: on 1000 curves of all types, with and without noise, no leg needs more.
 BRIDGE_STEPS = 8
-# Legs that turn by less (rad) are not looked at one by one.
+# Legs that turn by less (rad) are removed together.
 RIPPLE = float(np.radians(0.2))
-# The middle half of the turn of a bend against what lies between a twentieth from either end of it.
+# The middle half of the turn of a bend against the part between a twentieth from either end of it.
 INNER, OUTER = (0.25, 0.75), (0.05, 0.95)
 ARC_SHARE = 0.5 / 0.9
 
 
-class Way(StrEnum):
-    """Which way a bend bulges."""
+class BendSide(StrEnum):
+    """Side to which a bend bulges."""
 
     UP = "up"
     """Towards the void, on the left of the walk: the curve turns right."""
@@ -57,7 +56,7 @@ class Way(StrEnum):
 
 
 @dataclass(frozen=True)
-class Bend:
+class CurveBend:
     """A stretch of a curve that turns one way.
 
     way        : Way
@@ -66,7 +65,7 @@ class Bend:
     roundness  : length of the middle half of the turn over that of an arc; an arc has 1, a flat sine 0.84
     """
 
-    way: Way
+    way: BendSide
     turn: float
     start: float
     end: float
@@ -75,23 +74,23 @@ class Bend:
 
 @dataclass(frozen=True)
 class BendLevel:
-    """The bends that are left when all of strength ``least`` or below are gone; the weakest of them has ``most``."""
+    """The bends left after the removal of all of strength ``least`` or below; the weakest of them has ``most``."""
 
     least: float
     most: float
-    bends: tuple[Bend, ...]
+    bends: tuple[CurveBend, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class BendMeasures:
-    """What the profile types are decided by.
+    """Measures that decide the profile type.
 
     closed : a ring
     levels : BendLevel by rising strength, from 0 to infinity; the last has no bend, or the one of a ring
-    skew   : the centroid of the area between curve and chord, along the chord, off its middle, in chords; negative
-             towards the start. 0 when closed
+    skew   : distance along the chord, in chords, of the centroid of the area between curve and chord from the middle;
+             negative towards the start. 0 when closed
     turn   : rad, whole turn of the tangent, positive to the left
-    spline : the curve that was measured
+    spline : the measured curve
     """
 
     closed: bool
@@ -102,21 +101,21 @@ class BendMeasures:
 
     @property
     def counted(self) -> int:
-        """Place of the level whose bends are those of the definition."""
+        """Index of the level whose bends are those of the definition."""
         return next(i for i, v in enumerate(self.levels) if v.most >= 1.0)
 
 
 def measure_bends(points: ArrayLike, closed: bool = False) -> BendMeasures:
-    """Bends of a polyline after it was smoothed by a B-spline.
+    """Bends of a polyline, smoothed by a B-spline [Arivazhagan2020, equations 1 to 3].
 
-    points : (n, 2) float64, mm, in plan, walked with the void on the left
+    points : (n, 2) float64, mm, in plan of the access frame, walked with the void on the left
     closed : a ring; the last point is not repeated
 
     Returns
     -------
     BendMeasures
-        Of the B-spline of order 5 and, unless more explain the points better (Bayesian information criterion), ten
-        control points.
+        Measures of the B-spline of order 5 with ten control points, or more where these explain the points better
+        (Bayesian information criterion).
 
     Raises
     ------
@@ -137,9 +136,11 @@ def measure_bends(points: ArrayLike, closed: bool = False) -> BendMeasures:
 
 
 def size_of(points: F64, closed: bool) -> float:
-    """What lengths of a curve are compared with: its chord, or a third of its length where that is more (rings, hooks).
+    """Size of a curve, the unit of its lengths: its chord, or a third of its length in rings and hooks.
 
-    points : (n, 2) float64, mm
+    The larger of the two counts.
+
+    points : (n, 2) float64, mm, in plan of the access frame
     closed : a ring
     Returns mm.
     """
@@ -148,12 +149,12 @@ def size_of(points: F64, closed: bool) -> float:
 
 
 def smooth(points: F64, closed: bool) -> tuple[SplineCurve, float, int]:
-    """The B-spline that stands for a polyline: as few control points as the points call for, ten at least.
+    """The B-spline that represents a polyline, with as few control points as the points need, ten at least.
 
-    points : (n, 2) float64, mm
+    points : (n, 2) float64, mm, in plan of the access frame
     closed : a ring
-    Returns the SplineCurve of order 5, with free ends, the standard deviation along each axis of what it leaves, mm,
-    and the number of points it was fitted to. Raises GeometryError for a polyline without length.
+    Returns the SplineCurve of order 5, with free ends, the standard deviation of its residuals along each axis, mm, and
+    the number of fitted points. Raises GeometryError for a polyline without length.
     """
     samples = next(m for least, m in SAMPLES if len(points) >= least)
     even = resample(points, samples, closed)
@@ -195,7 +196,7 @@ def _skew(p: F64) -> float:
 class _Legs:
     """Share of length, direction (rad) and place (mm) along a curve.
 
-    height : mm, what a bend has at least
+    height : mm, least height of a bend
     errors : rows of ``even_errors``, mm; of a ring once round
     period : steps once round a ring, whose other arrays hold ``ROUNDS`` rounds; 0 for an open curve
     """
@@ -219,11 +220,11 @@ class _Legs:
         return found[:len(found) - len(found) % 2]
 
     def ends(self, pivots: list[int]) -> list[int]:
-        """Pivots with that which ends the last leg."""
+        """Pivots and the end of the last leg."""
         return [*pivots, pivots[0] + self.period] if self.period and pivots else pivots
 
     def strengths(self, pivots: list[int], known: dict[tuple[int, int, int, int], float]) -> list[float]:
-        """Of every leg; ``known`` are those found before, by where the legs beside them end."""
+        """Strength of every leg; ``known`` holds earlier results by the ends of the neighbouring legs."""
         ends = self.ends(pivots)
         around = [ends[0], *ends, ends[-1]]
         if self.period:
@@ -236,7 +237,7 @@ class _Legs:
         return out
 
     def _strength(self, first: int, i: int, j: int, last: int) -> float:
-        """Of the leg from i to j, with one from ``first`` to i before it and one from j to ``last`` behind it."""
+        """Strength of the leg from i to j, between legs from ``first`` to i and from j to ``last``."""
         turn = float(self.theta[j] - self.theta[i])
         enough, high = abs(turn) / TURN, self._height(i, j, i, j, turn)
         if high < enough:
@@ -244,11 +245,11 @@ class _Legs:
         return min(enough, high)
 
     def _bridge(self, first: int, i: int, j: int, last: int, turn: float) -> tuple[int, int]:
-        """Where the straight line rests that is laid over the mouth of a leg.
+        """Places where the straight line over the mouth of a leg rests.
 
-        A sharp bend is low over its own chord, and far along the neighbours may be the far side of a lobe.
+        A sharp bend is low over its own chord. Far along the neighbours may lie the far side of a lobe.
         """
-        # Where the line touches both, they have turned back together what the leg has turned: neither more than that.
+        # At the places of contact the neighbours together have turned back by the turn of the leg, and neither by more.
         back = np.flatnonzero(np.abs(self.theta[first:i] - self.theta[i]) > abs(turn))
         ahead = np.flatnonzero(np.abs(self.theta[j:last] - self.theta[j]) > abs(turn))
         first = first + int(back[-1]) + 1 if len(back) else first
@@ -269,14 +270,14 @@ class _Legs:
         length = max(float(np.linalg.norm(chord)), 1e-12)
         left = (chord[0] * rest[:, 1] - chord[1] * rest[:, 0]) / length * (1 if turn < 0 else -1)
         top = int(np.argmax(left))
-        # The height is a sum of three places of one curve: at an end it is known three times worse than in the middle.
+        # The height depends on three places of one curve; at an end its error is three times that in the middle.
         share = float(rest[top] @ chord) / length**2
         rows = len(self.errors)
         error = self.errors[(i + top) % rows] - (1 - share) * self.errors[a % rows] - share * self.errors[b % rows]
         return max(0.0, float(left[top])) / max(self.height, ERRORS * float(np.linalg.norm(error)))
 
     def without(self, pivots: list[int], leg: int) -> list[int]:
-        """Pivots after a leg has gone: its neighbours become one, or the end of an open curve moves in."""
+        """Pivots without a leg: its neighbours become one, or the end of an open curve moves in."""
         last = len(self.ends(pivots)) - 2
         if self.period:
             return [k for i, k in enumerate(pivots) if i not in (leg, (leg + 1) % len(pivots))]
@@ -284,24 +285,24 @@ class _Legs:
             return pivots[:leg] + pivots[leg + 2:]
         return pivots[1:] if leg == 0 else pivots[:-1]
 
-    def bends(self, pivots: list[int]) -> tuple[Bend, ...]:
-        """One for every leg; a ring that never turns back is one."""
+    def bends(self, pivots: list[int]) -> tuple[CurveBend, ...]:
+        """One bend for every leg; a ring that never turns back is one bend."""
         ends = self.ends(pivots)
         if self.period and not pivots:
             ends = [self.period, 2 * self.period]
         legs = zip(ends[:-1], ends[1:], strict=True)
         return tuple(self._bend(i, j) for i, j in legs if self.theta[i] != self.theta[j])
 
-    def _bend(self, i: int, j: int) -> Bend:
+    def _bend(self, i: int, j: int) -> CurveBend:
         turn = float(self.theta[j] - self.theta[i])
         rounds = float(np.floor(self.s[i]))
         roundness = _roundness(self.s[i:j + 1], self.theta[i:j + 1])
-        way = Way.UP if turn < 0 else Way.DOWN
-        return Bend(way, abs(turn), float(self.s[i]) - rounds, float(self.s[j]) - rounds, roundness)
+        way = BendSide.UP if turn < 0 else BendSide.DOWN
+        return CurveBend(way, abs(turn), float(self.s[i]) - rounds, float(self.s[j]) - rounds, roundness)
 
 
 def _ring(s: F64, theta: F64, p: F64, height: float, errors: F64) -> _Legs:
-    """Several rounds of a closed curve whose last row is its first again."""
+    """Several rounds of a closed curve whose last row repeats its first."""
     n, turn = len(s) - 1, theta[-1] - theta[0]
     rounds = np.repeat(np.arange(ROUNDS), n)
     shares, directions = np.tile(s[:-1], ROUNDS) + rounds, np.tile(theta[:-1], ROUNDS) + turn * rounds
@@ -345,4 +346,4 @@ def _roundness(s: F64, theta: F64) -> float:
     return float(inner / max(outer, 1e-12) / ARC_SHARE)
 
 
-__all__ = ["Bend", "BendLevel", "BendMeasures", "Way", "measure_bends", "size_of", "smooth"]
+__all__ = ["CurveBend", "BendLevel", "BendMeasures", "BendSide", "measure_bends", "size_of", "smooth"]

@@ -2,8 +2,8 @@
 
 Notation
     up edge    the edge of a triangle that runs, counter-clockwise seen from outside, from below the plane to above it
-    down edge  the one that runs back; who walks from the up edge to the down edge has the void on the left
-A vertex in the plane counts as above it, so every triangle that is cut has one edge of each kind.
+    down edge  the edge that runs back; a walk from the up edge to the down edge has the void on the left
+A vertex in the plane counts as above it, so every cut triangle has one edge of each kind.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from geometry.mesh_queries.bvh import TriangleTree
 
 @dataclass(frozen=True, eq=False)
 class Slice:
-    """What a horizontal plane cuts of a mesh.
+    """Cut of a mesh by a horizontal plane.
 
     height    : mm
     start,end : (n, 2) float64, mm, in plan; the void is on the left of start -> end
-    triangle  : (n, 3, 3) float64, mm, the triangles that were cut
+    triangle  : (n, 3, 3) float64, mm, the cut triangles
     face      : (n,) int, B-rep face numbers
     following : (n,) int, the segment that starts where this one ends; -1 where the mesh is open
     """
@@ -37,13 +37,13 @@ class Slice:
 
     @cached_property
     def tree(self) -> TriangleTree:
-        """The triangles that were cut, for rays in the plane; a triangle there has the row of its segment here."""
+        """The cut triangles, for rays in the plane; a triangle there has the index of its segment here."""
         rows = np.arange(3 * len(self.face), dtype=np.int32).reshape(-1, 3)
         return TriangleTree(TriangleMesh(self.triangle.reshape(-1, 3), rows))
 
     @cached_property
     def loops(self) -> list[np.ndarray]:
-        """Segments in walking order, one array of rows for each loop; open strings of a torn mesh come first."""
+        """Segments in walking order, (k,) int64, index, for each loop; open chains of a torn mesh come first."""
         following = self.following.tolist()
         has_before = np.zeros(len(following), bool)
         has_before[self.following[self.following >= 0]] = True
@@ -62,7 +62,7 @@ class Slice:
     def holds(self, point: F64) -> bool:
         """Whether a point in plan lies in the material.
 
-        point : (2,) float64, mm
+        point : (2,) float64, mm, in plan
         """
         (x, y), (x0, y0), (x1, y1) = point, self.start.T, self.end.T
         crossing = (y0 > y) != (y1 > y)
@@ -72,7 +72,7 @@ class Slice:
 
 
 class Slicer:
-    """A mesh made ready to be cut at many heights; what was cut is kept.
+    """A mesh prepared for cuts at many heights; it keeps the results.
 
     mesh : TriangleMesh, mm, closed and outward
     """
@@ -87,9 +87,9 @@ class Slicer:
         self.rows = np.sort(z)
 
     def clear_of_nodes(self, height: float, room: float) -> float:
-        """The height within ``room`` (mm) of one asked for that lies farthest from any node of the mesh, mm.
+        """The height within ``room`` (mm) of a given height that lies farthest from any node of the mesh, mm.
 
-        Nodes of one row differ in height by rounding; a plane through them would run to and fro between its neighbours.
+        Nodes of one row differ in height by rounding, and a plane through them zigzags between its neighbours.
         """
         low, high = np.searchsorted(self.rows, [height - room, height + room])
         marks = np.concatenate([[height - room], self.rows[low:high], [height + room]])

@@ -1,8 +1,8 @@
-"""What triangles cover in plan, told by its border alone.
+"""Area that triangles cover in plan, by its border alone.
 
-An edge that two triangles pass in opposite directions is inside; what is left are directed borders. A place is covered
-as often as they wind round it (``TrapezoidMap.windings``), so overlaps and the small folds that triangles of a steep
-face make in plan need no care, and nothing is joined triangle by triangle.
+An edge that two triangles pass in opposite directions is inside; the other edges form directed borders. Their winding
+number at a place is the number of triangles over it (``TrapezoidMap.windings``). So overlaps and the small folds of
+triangles on a steep face need no special care, and no union of single triangles is needed.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ import shapely
 from geometry.mesh import F64, I32, TriangleMesh
 from zones.plan_view.snap_rounding import I64
 
-FACES_UP = 1e-3  # n_z above: a triangle covers part of the plan; steeper ones 0.05 mm if they are 50 mm high
-THIN = 5e-4  # mm: what borders may be straightened by, half a step of the grid they are rounded to
+FACES_UP = 1e-3  # n_z above: a triangle covers part of the plan; steeper triangles 50 mm high cover 0.05 mm
+THIN = 5e-4  # mm, largest shift of straightened borders, half a step of the grid they are rounded to
 
 
 def upward(mesh: TriangleMesh) -> F64:
-    """(m,) how far each triangle looks up: n_z of the exact surface at its corners, its own where that has none.
+    """n_z of each triangle, (m,) float64, dimensionless: that of the exact surface at its corners, else its own.
 
-    Triangles of a steep twisted face look up and down by turns, its surface does not.
+    Triangles of a steep twisted face point up and down by turns; its surface does not.
     """
     own = mesh.normals[:, 2]
     if mesh.corner_normals is None:
@@ -30,10 +30,11 @@ def upward(mesh: TriangleMesh) -> F64:
 
 
 def cover_border(vertices: F64, faces: I32, level: float = -np.inf) -> F64:
-    """Directed borders in plan, (k, 2, 2) float64, mm, of what triangles cover with their part above a level.
+    """Directed borders in plan, (k, 2, 2) float64, mm, of the area that triangles cover above a level.
 
-    vertices : (n, 3) float64, mm; faces : (m, 3) indices, corners shared where triangles join; what faces up
-    level    : mm; what lies above is to the left of the borders. Straightened by at most ``THIN``.
+    vertices : (n, 3) float64, mm, access frame
+    faces    : (m, 3) int32, index, triangles that face up, with shared corners
+    level    : mm; the covered area lies to the left of the borders, which are straightened by at most ``THIN``
     """
     p, z = vertices[:, :2], vertices[:, 2]
     f = faces.astype(np.int64)
@@ -54,7 +55,7 @@ def cover_border(vertices: F64, faces: I32, level: float = -np.inf) -> F64:
     cut[crossing] = len(p) + at.ravel()
     some = start_high | end_high
     edges = [np.stack([np.where(start_high, start, cut)[some], np.where(end_high, end, cut)[some]], axis=1)]
-    across = crossing.any(axis=1)  # two edges of each: along the level from where it sinks to where it rises
+    across = crossing.any(axis=1)  # two edges of each cross the level; the border runs from falling to rising edge
     sinks, rises = (crossing & start_high)[across], (crossing & end_high)[across]
     edges.append(np.stack([cut[across][sinks], cut[across][rises]], axis=1))
     left = _left_over(np.concatenate(edges), len(places))
@@ -62,7 +63,7 @@ def cover_border(vertices: F64, faces: I32, level: float = -np.inf) -> F64:
 
 
 def _left_over(edges: I64, count: int) -> list[I64]:
-    """Directed edges (k, 2) that others do not take back; what is left twice or oftener in lists of its own."""
+    """Directed edges (k, 2) without an opposite edge; edges left twice or more often come in lists of their own."""
     low, high = edges.min(axis=1), edges.max(axis=1)
     key, at = np.unique(low * count + high, return_inverse=True)
     net = np.zeros(len(key), np.int64)
@@ -74,7 +75,7 @@ def _left_over(edges: I64, count: int) -> list[I64]:
 
 
 def _straight(places: F64, edges: I64) -> F64:
-    """The edges as segments (k, 2, 2), chains of them with fewer points and the same ends."""
+    """The edges as segments (k, 2, 2); chains keep their ends and fewer points."""
     merged = shapely.line_merge(shapely.multilinestrings(places[edges]), directed=True)
     lines = shapely.get_parts(shapely.simplify(merged, THIN, preserve_topology=False))
     points = [shapely.get_coordinates(line) for line in lines]

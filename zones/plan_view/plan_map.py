@@ -1,8 +1,8 @@
-"""The plan view cut into cells: which named areas lie over a place.
+"""The plan view cut into cells, each with the names of the areas over it.
 
 The borders of the areas, and lines that cut without enclosing anything, go into one trapezoidal map
-(``zones.plan_view.trapezoidal_map``). Its faces are the cells; a cell carries the names of the areas that cover it. A look-up
-goes down the search DAG of the map, so it costs O(log n) in the number of segments.
+(``zones.plan_view.trapezoidal_map``). Its faces are the cells, and each cell has the names of the areas that cover it.
+A look-up descends the search DAG of the map, so it costs O(log n) in the number of segments.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ OUTSIDE = -1  # cell of a place outside the box of the map
 
 
 @dataclass(frozen=True)
-class Area:
-    """A named area in plan: what a cell may lie in.
+class PlanArea:
+    """A named area in plan that covers some cells.
 
     name  : 'H1', 'W1', 'C2' ...
     shape : shapely Polygon or MultiPolygon, mm
@@ -34,7 +34,7 @@ class Area:
 
 @dataclass(frozen=True, eq=False)
 class PlanMap:
-    """Cells of the plan view; all lengths mm in the frame the areas were given in.
+    """Cells of the plan view; all lengths mm in the frame of the areas.
 
     map   : TrapezoidMap of all borders and lines
     faces : its faces, which are the cells
@@ -48,11 +48,13 @@ class PlanMap:
     over: NDArray[np.bool_]
 
     @staticmethod
-    def of(areas: Sequence[Area], lines: Sequence[F64] = (), grid: float = 1e-3, seed: int = 0) -> PlanMap:
-        """Map of areas, and of polylines (k, 2) that cut cells in two without naming either side.
+    def of(areas: Sequence[PlanArea], lines: Sequence[F64] = (), grid: float = 1e-3, seed: int = 0) -> PlanMap:
+        """Map of areas, and of lines that cut cells in two without naming either side [DeBerg2008, chapter 6].
 
-        grid : mm, step the borders are rounded to; what is thinner than it may vanish
-        seed : of the random order of insertion; changes the time, never the cells
+        areas : PlanArea, mm
+        lines : polylines (k, 2) float64, mm
+        grid  : mm, grid step of the borders; thinner areas may vanish
+        seed  : of the random order of insertion; changes the time, never the cells
         """
         borders = [np.asarray(ring.coords) for a in areas for ring in _rings(a.shape)]
         pieces = [np.stack([line[:-1], line[1:]], axis=1) for line in (*borders, *lines) if len(line) > 1]
@@ -67,28 +69,31 @@ class PlanMap:
 
     @staticmethod
     def of_cover(name: str, border: F64, grid: float = 1e-3, seed: int = 0) -> PlanMap:
-        """Map of one area, told by directed borders (k, 2, 2), mm, that make closed lines: where they wind round a
-        place counter-clockwise (``zones.plan_view.plan_cover``). Its cells are as large as can be."""
+        """Map of one area with the largest possible cells.
+
+        border : (k, 2, 2) float64, mm, directed borders that form closed lines (``zones.plan_view.plan_cover``); the
+                 area is where they wind counter-clockwise
+        """
         made = TrapezoidMap.of(border, grid, seed)
         faces = made.faces()
-        inside = np.append(made.windings(faces) > 0, False)  # the last for what is outside of the box
+        inside = np.append(made.windings(faces) > 0, False)  # the last entry stands for places outside the box
         cells = faces.merged(inside[faces.above] == inside[faces.below])
         over = np.zeros((len(cells.doubled), 1), np.bool_)
         over[cells.of_trapezoid, 0] = inside[faces.of_trapezoid]
         return PlanMap(made, cells, (name,), over)
 
     def shape(self, name: str) -> shapely.Geometry:
-        """What an area covers, from its cells, mm."""
+        """Shape of an area, from its cells, mm."""
         cells = np.flatnonzero(self.over[:, self.names.index(name)])
         return shapely.union_all([self.map.outline(self.faces, k) for k in cells.tolist()])
 
     def cell_at(self, xy: ArrayLike) -> NDArray[np.int64]:
-        """(n,) cell of each place xy (n, 2), ``OUTSIDE`` beyond the box."""
+        """(n,) int64, index of the cell at each place, ``OUTSIDE`` beyond the box. xy : (n, 2) float64, mm."""
         at = self.map.locate(xy)
         return np.where(at >= 0, self.faces.of_trapezoid[at], OUTSIDE)
 
     def over_at(self, xy: ArrayLike) -> NDArray[np.bool_]:
-        """(n, areas) bool: which areas cover each place xy (n, 2)."""
+        """(n, areas) bool: areas that cover each place. xy : (n, 2) float64, mm."""
         cell = self.cell_at(xy)
         return np.where((cell >= 0)[:, None], self.over[cell], False)
 

@@ -1,10 +1,10 @@
-"""The ten profile types of Arivazhagan (2020), table 1, made computable: one type for every curve, with a margin.
+"""The ten profile types of [Arivazhagan2020, table 1], made computable: one type for every curve, with a margin.
 
     polyline -> B-spline -> bends, skew, roundness (zones.plan_view.curve_bends) -> decision table -> type, level
     the same table with each measure moved over its nearest limit -> margin and second type
 
-The curve is walked with the void on its left, so the part says which end it starts from, and the same side of a wall
-always gives the same curve. Definitions, pictures and ambiguities: docs/theory/profiles.md.
+The curve is walked with the void on its left. So the part decides its start, and the same side of a wall always gives
+the same curve. Definitions, pictures and ambiguities: docs/theory/profiles.md.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.array_checks import finite_points
-from zones.plan_view.curve_bends import Bend, BendMeasures, Way, measure_bends
+from zones.plan_view.curve_bends import BendMeasures, BendSide, CurveBend, measure_bends
 
-# Limits of the table; beyond the last relative distance there is no second type.
+# Limits of the table. Beyond the last relative distance there is no second type.
 SKEW = 0.10
 ROUND = 0.88
 NOTHING_NEAR = 0.99
 
 
 class ProfileType(StrEnum):
-    """Table 1 of the paper."""
+    """Profile types of [Arivazhagan2020, table 1]."""
 
     C1 = "C1"
     """Single up."""
@@ -50,7 +50,7 @@ class ProfileType(StrEnum):
 
 
 class Level(StrEnum):
-    """Complexity, which orders the machining."""
+    """Complexity, which decides the order of machining."""
 
     SIMPLE = "simple"
     MEDIUM = "medium"
@@ -66,26 +66,26 @@ LEVEL: dict[ProfileType, Level] = {
 """Level of each type; a straight curve is simple."""
 
 OPEN = {0: ProfileType.C4, 1: ProfileType.C1, 2: ProfileType.C2}
-"""Type by number of up bends, where that alone decides; more than three are C10."""
+"""Type by number of up bends, where the number alone decides; more than three give C10."""
 CLOSED = {0: ProfileType.C4, 1: ProfileType.C1, 2: ProfileType.C6, 5: ProfileType.C5}
-"""The same on a ring; other numbers are C10."""
+"""The same on a ring; other numbers give C10."""
 
 
 class VoidSide(StrEnum):
-    """Where the void lies for who walks along the points."""
+    """Side of the void in a walk along the points."""
 
     LEFT = "left"
     RIGHT = "right"
 
 
 @dataclass(frozen=True)
-class Profile:
-    """The type of a curve and what it was decided by.
+class CurveProfile:
+    """The type of a curve with the measures that decide it.
 
     type      : ProfileType, None for a curve without a bend
     level     : Level
-    margin    : 0..1, the least relative change of one measure (strength of a bend, skew, roundness) that would give
-                another type: |measure - limit| over the greater of the two
+    margin    : 0..1, the least relative change of one measure (strength of a bend, skew, roundness) that gives another
+                type: |measure - limit| over the greater of the two
     second    : the type on the other side of that limit; None for straight, and where nothing is near (margin 1)
     bends     : tuple of Bend, in walking order; on a ring from its least curvature on
     skew      : centroid of the area between curve and chord off the middle, in chords, negative to the left
@@ -97,25 +97,25 @@ class Profile:
     level: Level
     margin: float
     second: ProfileType | None
-    bends: tuple[Bend, ...]
+    bends: tuple[CurveBend, ...]
     skew: float
     roundness: float
     closed: bool
 
 
-def classify(points: ArrayLike, closed: bool = False, void: VoidSide = VoidSide.LEFT) -> Profile:
-    """The profile type of a curve.
+def classify(points: ArrayLike, closed: bool = False, void: VoidSide = VoidSide.LEFT) -> CurveProfile:
+    """The profile type of a curve [Arivazhagan2020, table 1].
 
-    points : (n, 2) float64, mm, in plan; four hundred or more where they carry noise
+    points : (n, 2) float64, mm, in plan of the access frame; four hundred or more where they carry noise
     closed : a ring; the last point is not repeated
-    void   : VoidSide seen along the points; curves of ``wall_sections`` have it on the left
+    void   : VoidSide along the points; curves of ``wall_sections`` have the void on the left
 
     Returns
     -------
-    Profile
+    CurveProfile
         The same for a curve that is moved, turned, scaled or sampled otherwise, and for the reversed points with the
-        void on the other side. Noise of 1 % of the chord left it in 399 or more of 400 curves a type, and in 364 for
-        C9 (docs/theory/profiles.md).
+        void on the other side. With noise of 1 % of the chord it does not change for 399 or more of 400 curves a type,
+        and for 364 of type C9 (docs/theory/profiles.md).
 
     Raises
     ------
@@ -128,21 +128,21 @@ def classify(points: ArrayLike, closed: bool = False, void: VoidSide = VoidSide.
     bends = measures.levels[place].bends
     kind = _decide(measures, bends, measures.skew, roundness_of(bends))
     margin, second = _nearest_other(measures, place, kind)
-    return Profile(kind, LEVEL[kind] if kind else Level.SIMPLE, margin, second, _ordered(measures, bends),
+    return CurveProfile(kind, LEVEL[kind] if kind else Level.SIMPLE, margin, second, _ordered(measures, bends),
                    measures.skew, roundness_of(bends), closed)
 
 
-def roundness_of(bends: tuple[Bend, ...]) -> float:
+def roundness_of(bends: tuple[CurveBend, ...]) -> float:
     """Mean roundness of the up bends, 0 without any."""
-    found = [b.roundness for b in bends if b.way == Way.UP]
+    found = [b.roundness for b in bends if b.way == BendSide.UP]
     return float(np.mean(found)) if found else 0.0
 
 
-def _decide(measures: BendMeasures, bends: tuple[Bend, ...], skew: float, roundness: float) -> ProfileType | None:
+def _decide(measures: BendMeasures, bends: tuple[CurveBend, ...], skew: float, roundness: float) -> ProfileType | None:
     """The decision table."""
     if not bends:
         return None
-    ups = sum(b.way == Way.UP for b in bends)
+    ups = sum(b.way == BendSide.UP for b in bends)
     if measures.closed:
         return CLOSED.get(ups, ProfileType.C10)
     return _decide_triple(skew, roundness) if ups == 3 else OPEN.get(ups, ProfileType.C10)
@@ -155,7 +155,7 @@ def _decide_triple(skew: float, roundness: float) -> ProfileType:
 
 
 def _nearest_other(measures: BendMeasures, place: int, kind: ProfileType | None) -> tuple[float, ProfileType | None]:
-    """Relative distance to the nearest limit behind which the type is another, and that type."""
+    """Relative distance to the nearest limit with another type behind it, and that type."""
     found: list[tuple[float, ProfileType | None]] = []
     for step in (-1, 1):
         i = place + step
@@ -163,7 +163,7 @@ def _nearest_other(measures: BendMeasures, place: int, kind: ProfileType | None)
             level = measures.levels[i]
             other = _decide(measures, level.bends, measures.skew, roundness_of(level.bends))
             if other != kind:
-                # The bend that would have to cross strength 1: the strongest that goes, the weakest that stays.
+                # The bend that has to cross strength 1: the strongest removed one, or the weakest that stays.
                 found.append((_relative(level.most if step < 0 else level.least, 1.0), other))
                 break
             i += step
@@ -181,8 +181,8 @@ def _relative(measure: float, limit: float) -> float:
     return 1.0 if not np.isfinite(measure) else abs(measure - limit) / max(measure, limit)
 
 
-def _ordered(measures: BendMeasures, bends: tuple[Bend, ...]) -> tuple[Bend, ...]:
-    """In walking order; on a ring from the bend that holds the least curvature, counted the way the ring turns."""
+def _ordered(measures: BendMeasures, bends: tuple[CurveBend, ...]) -> tuple[CurveBend, ...]:
+    """Bends in walking order; on a ring from the bend with the least curvature, in the direction the ring turns."""
     if not measures.closed or len(bends) < 2:
         return bends
     u = np.linspace(0.0, 1.0, 720, endpoint=False)

@@ -1,9 +1,9 @@
-"""Regions in several places: a zone is one connected place in plan.
+"""Splits regions by places: a zone is one connected place in plan.
 
-A region belongs to a *level*: a channel to the lower of the heights its two walls were cut at, where both stand; the
-outside of a wall to that of the wall; floor and free surface to the lowest of the channels. The places of that level
-(``zones.plan_view.free_places``) which the region has part in are its own. Wall tops and connections are never parted: over them a
-tool passes.
+A region belongs to a *level*. The level of a channel is the lower of the heights at which its two walls are cut, since
+both stand there. The level of the outside of a wall is that of the wall. Floor and free surface have the lowest level
+of the channels. A region owns the places of its level (``zones.plan_view.free_places``) that it overlaps. Wall tops and
+connections are never split, since a tool passes over them.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from geometry.mesh import F64
 from geometry.part import Part
 from zones.features.connection_faces import connection_faces
 from zones.model import Decomposition
-from zones.plan_view.free_places import MATERIAL, NARROW, OPEN, LevelPlaces, Places
+from zones.plan_view.free_places import MATERIAL, NARROW, OPEN, FreePlaces, LevelPlaces
 from zones.plan_view.wall_sections import SideCurve
 
-OFF = (0.02, 0.1, 0.3)  # mm off the surface where its place is looked up; then the nearest of its region
+OFF = (0.02, 0.1, 0.3)  # mm off the surface: distances of the look-up; after them the nearest place of the region
 LEANING = 0.3  # |n_xy| below: no side to slide along
 BASES = ("floor", "free")
 
@@ -31,8 +31,10 @@ BASES = ("floor", "free")
 class Parted:
     """The places of one region.
 
-    level  : mm; places : LevelPlaces of it; own : numbers of those the region has part in
-    slides : its points are those of a side of a wall, and are slid along it to the level
+    level  : mm, in the frame of the first access
+    places : LevelPlaces of the level
+    own    : numbers of the places that the region overlaps
+    slides : its points lie on a side of a wall and slide along it to the level
     """
 
     level: float
@@ -41,9 +43,9 @@ class Parted:
     slides: bool
 
     def of(self, points: F64, normals: F64) -> NDArray[np.int64]:
-        """(n,) the place of points (n, 3), mm, with unit normals (n, 3).
+        """(n,) int64, index of the place of points: 0 is the open place, or none; 1, 2 ... the others, left to right.
 
-        0 is the open place, or none; 1, 2 ... the others of ``own`` from left to right.
+        points, normals : (n, 3) float64, mm and dimensionless, in the frame of the first access
         """
         wide = np.linalg.norm(normals[:, :2], axis=1)
         side = normals[:, :2] / np.maximum(wide, 1e-12)[:, None]
@@ -56,7 +58,7 @@ class Parted:
             todo = np.flatnonzero(found == MATERIAL)
             there = self.places.at(foot[todo] + off * side[todo])
             found[todo] = np.where(np.isin(there, self.own), there, MATERIAL)
-        # what stands above the level itself lies in no place of it; what it overhangs does
+        # a point above the level lies in no place of the level; a point under an overhang does
         lost = np.flatnonzero((found == MATERIAL) & (self.slides | (points[:, 2] <= self.level)))
         if len(lost):
             found[lost] = self.places.nearest(foot[lost], self.own)
@@ -73,15 +75,15 @@ class Parting:
     @staticmethod
     def of(part: Part, decomposition: Decomposition, bases: Mapping[int, str], heights: Mapping[str, float],
            channels: Mapping[str, shapely.Geometry], curves: Sequence[SideCurve]) -> Parting:
-        """Of a part, in the frame of its first access.
+        """The places of a part, in the frame of its first access.
 
-        bases    : base region of every face; heights : mm, where each wall was cut, by id
-        channels : what each channel covers in plan, mm; curves : sides of the walls
+        bases    : base region of every face; heights : mm, height of the cut of each wall, by id
+        channels : area of each channel in plan, mm; curves : sides of the walls
         """
         d = decomposition
         if not d.channels:
             return Parting({})
-        places = Places.of(part, {f for own in connection_faces(part, d).values() for f in own})
+        places = FreePlaces.of(part, {f for own in connection_faces(part, d).values() for f in own})
         level = {c.id: min(heights[w] for w in c.walls) for c in d.channels}
         out: dict[str, Parted] = {}
 
@@ -104,10 +106,10 @@ class Parting:
         return Parting(out)
 
     def of_points(self, points: F64, normals: F64, base: NDArray[np.int64], bases: Sequence[str]) -> NDArray[np.int64]:
-        """(n,) place of each point in its region, 0 where that has one alone.
+        """(n,) int64, index of the place of each point in its region, 0 where the region has only one.
 
-        points, normals : (n, 3) float64, mm and unit, in the frame of the first access
-        base            : (n,) index in ``bases``
+        points, normals : (n, 3) float64, mm and dimensionless, in the frame of the first access
+        base            : (n,) int64, index in ``bases``
         """
         out = np.zeros(len(points), np.int64)
         for k, name in enumerate(bases):
@@ -117,7 +119,10 @@ class Parting:
         return out
 
     def beside(self, base: str, place: int, xy: F64) -> NDArray[np.int64]:
-        """(n,) 1 where points xy (n, 2), mm, off the sides of a region lie in that place, -1 in others, else 0."""
+        """(n,) int64, count: 1 where points off the sides of a region lie in the place, -1 in other places, else 0.
+
+        xy : (n, 2) float64, mm, in plan, in the frame of the first access
+        """
         if base not in self.regions:
             return np.ones(len(xy), np.int64)
         r = self.regions[base]
@@ -127,6 +132,6 @@ class Parting:
 
 
 def _covered(places: LevelPlaces, shape: shapely.Geometry) -> list[int]:
-    """Numbers of the places a shape has part in."""
+    """Numbers of the places that a shape overlaps."""
     return [k for k, outline in places.outlines.items()
             if not shapely.intersection(outline, shape).buffer(-NARROW).is_empty]

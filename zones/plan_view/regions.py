@@ -1,9 +1,9 @@
-"""Which region of the part a point of its surface belongs to: SCZ and SCZI of the paper.
+"""Region of each point of the surface: SCZ and SCZI of [Arivazhagan2020].
 
 A region is a channel, the outside of a wall, a connection, wall tops, floor or free surface. The cells of the plan
-view (``zones.plan_view.plan_map``) decide which channel a point of a wall side faces, and whether it lies under or over the
-footprint of a connection: then it is SCZI, else SCZ. A region in several places, between which walls stand, is a region
-for each (``zones.plan_view.region_splitting``).
+view (``zones.plan_view.plan_map``) decide which channel a point of a wall side faces. They also decide whether the
+point lies under or over the footprint of a connection: then it is SCZI, else SCZ. A region in several places with walls
+between them becomes one region for each place (``zones.plan_view.region_splitting``).
 """
 
 from __future__ import annotations
@@ -26,11 +26,12 @@ from zones.plan_view.plan_map import PlanMap
 
 @dataclass(frozen=True)
 class Region:
-    """A cell of the split: what a point faces, and the connections above and below it.
+    """A cell of the split: the base region of a point, and the connections above and below it.
 
     base  : 'H1' a channel, 'W1' the outside of a wall, 'C1' a connection, 'top', 'floor' or 'free'
-    over  : connections that lie below the point; under : those that lie above it; along the access
-    place : which of the places of the base, 1, 2 ...; 0 the open one, or the only one (``zones.plan_view.region_splitting``)
+    over  : connections below the point, along the access
+    under : connections above the point
+    place : number of the place of the base (``zones.plan_view.region_splitting``), 1, 2 ...; 0 is the open or only one
     """
 
     base: str
@@ -81,29 +82,29 @@ def connections_of(name: str) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """Regions of n points: ``regions[code[i]]`` is that of point i."""
+    """Regions of n points: ``regions[code[i]]`` is that of point i. code : (n,) int64, index."""
 
     regions: tuple[Region, ...]
     code: NDArray[np.int64]
 
     def subset(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> Labels:
-        """The labels of some of the points."""
+        """The labels of some points. rows : (k,) int64, index, or (n,) bool."""
         return Labels(self.regions, self.code[rows])
 
     @property
     def names(self) -> NDArray[np.object_]:
-        """(n,) names of the regions."""
+        """(n,) object array, name of the region of each point."""
         return np.array([r.name for r in self.regions], dtype=object)[self.code] if len(self.code) else \
             np.zeros(0, dtype=object)
 
 
-class Regioner:
-    """Labels points of a part as one access direction sees it.
+class RegionLocator:
+    """Labels points of a part along one access direction.
 
-    part, decomposition : in the access frame, +Z towards the spindle (ids of the decomposition are kept, its
-                          heights are not read)
+    part, decomposition : in the access frame, +Z towards the spindle (the ids of the decomposition count, its heights
+                          do not)
     channels            : ChannelPlan of the first access, which owns the split into channels
-    first               : whether this is the first access; else footprints are drawn anew along this one
+    first               : whether this is the first access; otherwise footprints are drawn along this access
     """
 
     def __init__(self, part: Part, decomposition: Decomposition, channels: ChannelPlan, first: bool = True) -> None:
@@ -120,10 +121,10 @@ class Regioner:
         self.trees = {c: TriangleTree(_only(part, own)) for c, own in connection_faces(part, decomposition).items()}
 
     def of(self, points: F64, normals: F64, face: NDArray[np.int32], first: tuple[F64, F64] | None = None) -> Labels:
-        """Labels of points of the surface.
+        """Labels of points of the surface [Arivazhagan2020].
 
-        points, normals : (n, 3) float64 in the access frame, mm and unit
-        face            : (n,) face numbers
+        points, normals : (n, 3) float64 in the access frame, mm and dimensionless
+        face            : (n,) int32, index, face numbers
         first           : the same points and normals in the frame of the first access; None where that is this one
         """
         there = (points, normals) if first is None else first
@@ -146,7 +147,7 @@ class Regioner:
         covered &= np.array(self.column, dtype=np.int64) >= 0
         under = np.zeros_like(covered)
         for k, c in enumerate(self.connections):
-            if c.id in bases:  # a connection is not over itself
+            if c.id in bases:  # a connection does not lie over itself
                 covered[base == bases.index(c.id), k] = False
             rows = np.flatnonzero(covered[:, k])
             if len(rows):
@@ -158,11 +159,11 @@ class Regioner:
 
 def _distinct(base: NDArray[np.int64], place: NDArray[np.int64], over: NDArray[np.bool_],
               under: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Number of each distinct combination (n,), in order of base, place and connections, and a row that has it."""
+    """Number of each distinct combination (n,), in order of base, place and connections, and a row with it."""
     key = base * (int(place.max(initial=0)) + 1) + place
     for k in range(over.shape[1]):
         key = 3 * key + over[:, k] + 2 * under[:, k]
-        if k % 16 == 15:  # before the numbers grow too long
+        if k % 16 == 15:  # before the numbers overflow
             key = np.unique(key, return_inverse=True)[1].reshape(-1)
     _, first, code = np.unique(key, return_index=True, return_inverse=True)
     return np.asarray(code, np.int64).reshape(-1), first

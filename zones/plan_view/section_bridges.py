@@ -1,7 +1,7 @@
-"""How a side goes on where something interrupts it: a cubic that leaves both ends in their own directions.
+"""Bridges of an interrupted side: a cubic that leaves both ends in their own directions.
 
-A straight chord would put the turn of the stretch it replaces into its two corners, and an arc with corners is not
-round any more (figures in docs/theory/profiles.md).
+A straight chord puts the turn of the stretch it replaces into its two corners, and an arc with corners is not round any
+more (figures in docs/theory/profiles.md).
 """
 
 from __future__ import annotations
@@ -10,31 +10,32 @@ import numpy as np
 
 from geometry.mesh import F64
 
-# A bridge that would turn by more than this (rad) between an end and the chord is the chord: such ends have no
-# direction that goes on. One point for each step of turn (rad).
-MOST_TURN, STEP = 1.0, 0.05
+# Where an end and the chord differ by more than this (rad), the bridge is the chord: such ends have no direction to
+# continue. One point for each step of turn (rad).
+MAX_TURN, STEP = 1.0, 0.05
 
 
 def bridge(before: F64, after: F64, reach: float) -> F64:
     """Points between the end of one polyline and the start of the next.
 
-    before, after : (n, 2) and (m, 2) float64, mm, in walking order, two points or more; the ends do not touch
-    reach         : mm, how far back from an end its direction is taken from
+    before, after : (n, 2) and (m, 2) float64, mm, in plan of the access frame, in walking order, two points or more;
+                    the ends do not touch
+    reach         : mm, length before an end over which its direction is taken
 
     Returns
     -------
     (k, 2) float64
-        mm, without both ends; none where the ends lie in line or where the chord is taken. Of a circle bridged over 90
-        degrees it is off by 0.03 % of the chord and 0.1 degrees, besides what the nodes are off.
+        mm, without both ends; no point where the ends lie in line or where the bridge is the chord. The error on a
+        circle bridged over 90 degrees is 0.03 % of the chord and 0.1 degrees, besides the error of the nodes.
     """
     p, q = before[-1], after[0]
     chord = q - p
     far = float(np.linalg.norm(chord))
     leave, enter = -direction(before[::-1], reach), direction(after, reach)
     off = np.array([_angle(leave, chord), _angle(chord, enter)])
-    if np.abs(off).max() > MOST_TURN:
+    if np.abs(off).max() > MAX_TURN:
         return np.zeros((0, 2))
-    # The speed at which the cubic follows an arc that turns by ``off`` at either end.
+    # With this speed the cubic follows an arc that turns by ``off`` at either end.
     speed = 2.0 * far / (1.0 + float(np.cos(off).mean()))
     steps = max(1, int(np.ceil(np.abs(off).sum() / STEP)))
     t = (np.arange(1, steps) / steps)[:, None]
@@ -45,8 +46,10 @@ def bridge(before: F64, after: F64, reach: float) -> F64:
 def direction(points: F64, reach: float) -> F64:
     """Unit direction at the first point of a polyline: that of the parabola nearest to its nodes within ``reach``.
 
-    points : (n, 2) float64, mm, two or more
-    reach  : mm; three nodes are taken at least, where there are three
+    points : (n, 2) float64, mm, in plan of the access frame, two or more
+    reach  : mm; at least three nodes count, where there are three
+
+    Returns (2,) float64, dimensionless.
     """
     length = np.linalg.norm(np.diff(points, axis=0), axis=1)
     s = np.cumsum(length)

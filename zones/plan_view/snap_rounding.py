@@ -1,14 +1,14 @@
-"""Segments in plan become pieces that meet only at their ends, on an integer grid: snap rounding.
+"""Snap rounding: segments in plan become pieces on an integer grid that meet only at their ends [Hobby1999].
 
 1. End points are rounded to the grid. A pixel is the square of one grid step round a grid point, its left and bottom
    side included, its right and top side not, so every place is in exactly one.
 2. Hot pixels are those with an end point or a crossing in them. The crossings come from shapely's union on a grid.
-3. Every segment is led through the centres of the hot pixels it runs through, in their order; the tests are exact in
-   int64. Each step is a piece. Pieces then meet only at their ends (Guibas and Marimont 1998), and each knows the
-   segments that were led over it.
+3. Every segment is routed through the centres of the hot pixels it runs through, in their order. The tests are exact in
+   int64. Each step is a piece. Pieces then meet only at their ends [Guibas1998], and each keeps the segments that run
+   over it.
 
-Floating point decides in step 2 only, and whether it missed a crossing is seen when the map is built, exactly
-(``zones.plan_view.trapezoidal_map``); the crossing is then made hot and step 3 repeated.
+Floating point decides in step 2 only. The exact construction of the map (``zones.plan_view.trapezoidal_map``) detects a
+missed crossing; the crossing then becomes hot and step 3 is repeated.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from geometry.mesh import F64
 from zones.kernels.trapezoid import LIMIT
 
 I64 = NDArray[np.int64]
-LEAST_PART = 4.0  # grid steps: shorter parts of a segment are not worth a box of their own
+MIN_PART = 4.0  # grid steps: shorter parts of a segment do not pay for a box of their own
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +48,9 @@ class Noding:
     sources: I64
 
     def with_crossing(self, first: int, second: int) -> Noding:
-        """The same segments with the crossings of two pieces' segments made hot.
+        """The same segments with hot pixels at the crossings of two pieces' segments.
 
-        first, second : pieces that were found to cross. Returns a new noding, unchanged if there is no crossing.
+        first, second : pieces that cross. Returns a new noding, unchanged if there is no crossing.
         """
         more = []
         for a in self.sources[self.starts[first] : self.starts[first + 1]].tolist():
@@ -63,12 +63,12 @@ class Noding:
 
 
 def node_segments(segments: ArrayLike, grid: float) -> Noding:
-    """Snap-round segments to a grid.
+    """Snap-round segments to a grid [Hobby1999; Guibas1998].
 
-    segments : (s, 2, 2) float64, mm; crossing, overlapping, repeated or of zero length as they like
+    segments : (s, 2, 2) float64, mm, in plan; they may cross, overlap, repeat or have zero length
     grid     : mm, > 0
     Returns a ``Noding``; every piece lies within half a grid step (in x and in y) of each of its segments. Segments
-    that round to one point have no piece and no say.
+    that round to one point have no piece and no effect.
     Raises InputError (bad_segments, not_finite, bad_grid, out_of_bounds).
     References: Hobby, Practical segment intersection with finite precision output, 1999; Guibas and Marimont,
     Rounding arrangements dynamically, 1998.
@@ -80,9 +80,9 @@ def node_segments(segments: ArrayLike, grid: float) -> Noding:
 
 
 def take_noded(segments: ArrayLike, grid: float) -> Noding:
-    """Segments that meet only at their ends already, as they are; the map checks it exactly.
+    """Segments that meet only at their ends already, without change; the map checks it exactly.
 
-    segments : (s, 2, 2) float64, mm, rounded to the grid; repeated ones become one piece with several sources
+    segments : (s, 2, 2) float64, mm, in plan, rounded to the grid; equal segments become one piece with several sources
     grid     : mm, > 0
     Returns a ``Noding``. Raises InputError like ``node_segments``.
     """
@@ -94,7 +94,10 @@ def take_noded(segments: ArrayLike, grid: float) -> Noding:
 
 
 def on_grid(segments: ArrayLike, grid: float) -> I64:
-    """End points in grid steps, halves rounded up: (s, 2, 2) float64 in mm to (s, 2, 2) int64.
+    """End points in grid steps, halves rounded up: (s, 2, 2) int64, index of the grid.
+
+    segments : (s, 2, 2) float64, mm, in plan
+    grid     : mm, > 0
 
     Raises InputError (bad_segments, not_finite, bad_grid, or out_of_bounds: not within 2^25 grid steps).
     """
@@ -104,15 +107,17 @@ def on_grid(segments: ArrayLike, grid: float) -> I64:
                          remedy="give a positive length, such as 0.001 mm")
     most, limit = float(np.abs(v).max(initial=0.0)), (LIMIT - 1) * grid
     if not most <= limit:
-        raise InputError(f"a coordinate of {most:.6g} mm is beyond {limit:.6g} mm, which is 2^25 steps of the grid",
+        raise InputError(f"a coordinate of {most:.6g} mm is beyond the limit of {limit:.6g} mm, 2^25 grid steps",
                          code="out_of_bounds", measured=most, limit=limit,
                          remedy="take a coarser grid, or move the segments to the origin")
     return np.floor(v / grid + 0.5).astype(np.int64)
 
 
 def finite_pairs(values: ArrayLike, shape: str) -> F64:
-    """Coordinates as float64 after a check; shape: "(n, 2)" for points or "(n, 2, 2)" for segments.
+    """Coordinates as float64 after a check, in the unit and frame of the input.
 
+    values : (n, 2) or (n, 2, 2) float64, mm or grid steps, in plan
+    shape  : "(n, 2)" for points or "(n, 2, 2)" for segments
     Raises InputError (bad_segments, not_finite; the subjects are the rows).
     """
     try:
@@ -129,7 +134,7 @@ def finite_pairs(values: ArrayLike, shape: str) -> F64:
     if len(bad):
         raise InputError(f"{len(bad)} of {len(v)} rows hold a coordinate that is not finite", code="not_finite",
                          subjects=tuple(str(int(k)) for k in bad[:10]), measured=len(bad), limit=0,
-                         remedy="leave out or repair the rows named")
+                         remedy="remove or repair these rows")
     return v
 
 
@@ -163,11 +168,11 @@ def runs_through(segments: I64, pixels: I64) -> NDArray[np.bool_]:
     side = [d[:, 0] * (y[:, 1] - p[:, 1]) - d[:, 1] * (x[:, 0] - p[:, 0]) for x in (low, high) for y in (low, high)]
     above = np.any([s > 0 for s in side], axis=0)
     below = np.any([s < 0 for s in side], axis=0)
-    return overlap & ((above & below) | (side[0] == 0))  # through the inside, or the one corner that is included
+    return overlap & ((above & below) | (side[0] == 0))  # through the inside, or the one corner that belongs to it
 
 
 def _distinct(segments: I64) -> I64:
-    """Segments of some length, each once."""
+    """Segments longer than zero, each once."""
     p, q = segments[:, 0], segments[:, 1]
     swap = (p[:, 0] > q[:, 0]) | ((p[:, 0] == q[:, 0]) & (p[:, 1] > q[:, 1]))
     flat = np.where(swap[:, None], np.hstack([q, p]), np.hstack([p, q]))
@@ -192,10 +197,10 @@ def _led(grid: float, segments: I64, hot: I64) -> Noding:
     return _sorted_pieces(grid, segments, hot, pairs, s[:-1][same])
 
 
-def _sorted_pieces(grid: float, segments: I64, hot: I64, pairs: I64, of: I64) -> Noding:
+def _sorted_pieces(grid: float, segments: I64, hot: I64, pairs: I64, source: I64) -> Noding:
     """A noding from pairs of hot pixels (k, 2), lesser first, and the segments (k,) they came from."""
     pieces, piece = np.unique(pairs, axis=0, return_inverse=True)
-    both = np.unique(np.column_stack([piece.ravel(), of]), axis=0)
+    both = np.unique(np.column_stack([piece.ravel(), source]), axis=0)
     starts = np.searchsorted(both[:, 0], np.arange(len(pieces) + 1)).astype(np.int64)
     return Noding(grid, segments, hot, pieces, starts, np.ascontiguousarray(both[:, 1]))
 
@@ -203,7 +208,7 @@ def _sorted_pieces(grid: float, segments: I64, hot: I64, pairs: I64, of: I64) ->
 def _near(segments: I64, hot: I64) -> tuple[I64, I64]:
     """Pairs (segment, hot pixel) that may touch: boxes of short parts of the segments against the pixels.
 
-    A part is as long as the pixels are apart on average, so that slanting segments do not ask for the whole plan.
+    A part is as long as the mean distance of the pixels, so that the box of a slanting segment does not cover the plan.
     """
     n = len(segments)
     if n == 0 or len(hot) == 0:
@@ -211,7 +216,7 @@ def _near(segments: I64, hot: I64) -> tuple[I64, I64]:
     p, d = segments[:, 0].astype(float), (segments[:, 1] - segments[:, 0]).astype(float)
     length = np.hypot(d[:, 0], d[:, 1])
     spread = float(np.prod(np.ptp(hot, axis=0) + 1.0))
-    part = max(LEAST_PART, float(np.sqrt(spread / len(hot))), float(length.sum()) / (4 * (n + len(hot))))
+    part = max(MIN_PART, float(np.sqrt(spread / len(hot))), float(length.sum()) / (4 * (n + len(hot))))
     parts = np.maximum(1, np.ceil(length / part)).astype(np.int64)
     of = np.repeat(np.arange(n), parts)
     k = np.arange(len(of)) - np.repeat(np.cumsum(parts) - parts, parts)

@@ -4,8 +4,9 @@
 2. The pieces are put into the map in random order (``zones.kernels.trapezoid``), inside a box.
 3. Trapezoids that are neighbours across a wall belong to one face.
 
-The map of a set of pieces is unique; trapezoids and faces are numbered by their left points, so the numbers hang
-neither on the seed nor on the order of the segments. docs/theory/subdivision.md has the argument.
+The map of a set of pieces is unique. Trapezoids and faces are numbered by their left points, so the numbers do not
+depend on the seed or on the order of the segments. docs/theory/subdivision.md has the argument. All places lie in
+the plan frame.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from geometry.mesh import F64
 from zones.kernels import trapezoid as kernel
 from zones.plan_view.snap_rounding import I64, Noding, finite_pairs, node_segments
 
-REPAIRS = 64  # crossings that floating point may miss before the noding counts as failed
-FIRST_ROUND = 256  # pieces put in without regard to place
+REPAIRS = 64  # largest number of crossings missed by floating point; above it the noding fails
+FIRST_ROUND = 256  # pieces inserted in random order, regardless of place
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +46,7 @@ class Faces:
     areas: F64
 
     def merged(self, across: NDArray[np.bool_]) -> Faces:
-        """Faces joined across pieces; across : (n + 2,) bool. They are numbered as before, by their first trapezoid."""
+        """Faces joined across some pieces, numbered by their first trapezoid. across : (n + 2,) bool."""
         both = across & (self.above >= 0) & (self.below >= 0)
         f = len(self.doubled)
         pairs = coo_matrix((np.ones(int(both.sum()), np.int8), (self.above[both], self.below[both])), shape=(f, f))
@@ -61,7 +62,7 @@ class Faces:
 class TrapezoidMap:
     """Trapezoids between n pieces inside a box; all indices int64.
 
-    noding      : the pieces and what they came from; its grid (mm) is the unit of ``points``
+    noding      : the pieces and their segments; its grid (mm) is the unit of ``points``
     points      : (m, 2) grid steps, ends of pieces and corners of the box (the first and last two), by x, then y
     pieces      : (n + 2, 2) indices into ``points``, lesser first, in the order of ``noding.pieces``; then the bottom
                   and the top of the box
@@ -69,8 +70,8 @@ class TrapezoidMap:
     left, right : (t,) points, whose walls bound the trapezoid
     neighbours  : (t, 4) trapezoids upper left, lower left, upper right, lower right; -1 where none. An upper one
                   has the same top, a lower one the same bottom.
-    flat        : (t,) bool, no width: left and right have one x. They carry the neighbourhood from point to point
-                  up a common wall and are never the answer to a look-up.
+    flat        : (t,) bool, no width: left and right have one x. They link neighbours from point to point up a common
+                  wall and are never the answer to a look-up.
     """
 
     noding: Noding
@@ -87,10 +88,10 @@ class TrapezoidMap:
 
     @staticmethod
     def of(segments: ArrayLike, grid: float = 1e-3, seed: int = 0, margin: float = 1.0) -> TrapezoidMap:
-        """Map of segments as they come.
+        """Map of any segments [DeBerg2008, chapter 6].
 
-        segments : (s, 2, 2) float64, mm
-        grid     : mm, step to which the arrangement is rounded
+        segments : (s, 2, 2) float64, mm, in plan
+        grid     : mm, step of the grid of the arrangement
         seed     : of the order of insertion; changes the time, never the map
         margin   : mm, > 0, of the box round the segments, rounded up to the grid
         Raises InputError (bad_segments, not_finite, bad_grid, bad_margin, out_of_bounds), GeometryError (not_noded).
@@ -108,7 +109,7 @@ class TrapezoidMap:
 
     @staticmethod
     def of_noding(noding: Noding, seed: int = 0, margin: float = 1.0) -> TrapezoidMap:
-        """Map of pieces that meet only at their ends, which is checked exactly on the way.
+        """Map of pieces that meet only at their ends, which the construction checks exactly [DeBerg2008, chapter 6].
 
         Raises GeometryError (not_noded, with the numbers of two pieces), InputError (bad_margin, out_of_bounds).
         """
@@ -120,13 +121,13 @@ class TrapezoidMap:
                             remedy="node the segments first, as TrapezoidMap.of does")
 
     def sources_of(self, piece: int) -> I64:
-        """Input segments a piece came from, ascending; none for the bottom and top of the box."""
+        """(k,) int64, index of the input segments of a piece, ascending; none for the bottom and top of the box."""
         if piece >= len(self.noding.pieces):
             return np.zeros(0, np.int64)
         return self.noding.sources[self.noding.starts[piece] : self.noding.starts[piece + 1]]
 
     def corners(self) -> F64:
-        """(t, 4, 2) float64, mm: left bottom, right bottom, right top, left top.
+        """(t, 4, 2) float64, mm, in plan: left bottom, right bottom, right top, left top.
 
         Heights are rounded to 2 ulp of the coordinate in grid steps. A triangle has two equal corners; a flat
         trapezoid is a stretch of wall.
@@ -138,15 +139,17 @@ class TrapezoidMap:
         return np.stack([np.stack(r, axis=-1) for r in rows], axis=1) * self.noding.grid
 
     def locate(self, points: ArrayLike) -> I64:
-        """(k,) trapezoid of each point (k, 2) float64, mm; see ``look_up``."""
+        """(k,) int64, index of the trapezoid of each point; see ``look_up``. points : (k, 2) float64, mm, in plan."""
         return self.look_up(points)[0]
 
     def look_up(self, points: ArrayLike) -> tuple[I64, I64]:
-        """Trapezoid and depth of the search, for points (k, 2) float64, mm.
+        """Trapezoid and depth of the search for points [DeBerg2008, chapter 6].
+
+        points : (k, 2) float64, mm, in plan
 
         Points are rounded to 1/256 of the grid step. A point on a piece belongs above it; on a vertical piece, or
-        under or over a point of the map, right of it. Returns two (k,) int64: the trapezoid, -1 out of the box
-        (and on its right and top side), and the number of inner nodes asked. Raises InputError (bad_segments,
+        under or over a point of the map, right of it. Returns two (k,) int64: the trapezoid, -1 outside the box
+        (and on its right and top side), and the count of visited inner nodes. Raises InputError (bad_segments,
         not_finite).
         """
         steps = finite_pairs(points, "(n, 2)") / self.noding.grid
@@ -166,7 +169,7 @@ class TrapezoidMap:
         below = above.copy()
         above[self.bottom], below[self.top] = face, face
         p, q = self.points[self.pieces[:, 0]], self.points[self.pieces[:, 1]]
-        # twice the area between piece and bottom of the box; sums may wrap round on the way, their result fits
+        # twice the area between piece and bottom of the box; partial sums may overflow, the result fits
         strip = (q[:, 0] - p[:, 0]) * (p[:, 1] + q[:, 1] - 2 * self.points[0, 1])
         doubled = np.zeros(int(face.max()) + 1, np.int64)
         np.add.at(doubled, below[below >= 0], strip[below >= 0])
@@ -174,13 +177,18 @@ class TrapezoidMap:
         return Faces(face, above, below, doubled, doubled.astype(np.float64) * (0.5 * self.noding.grid**2))
 
     def windings(self, faces: Faces) -> I64:
-        """(f,) how often the input segments wind round each face, counter-clockwise positive, 0 round the outer one.
+        """(f,) int64, count: winding number of the input segments around each face, counter-clockwise positive.
 
-        The segments are taken from their first end to their second and have to make closed lines.
+        The outer face has 0. The segments run from their first end to their second and must form closed lines.
+
+        Raises
+        ------
+        InternalError
+            Code 'broken_map': a face has no path to the outer one.
         """
         n, s = len(self.noding.pieces), self.noding.segments
         ahead = (s[:, 0, 0] < s[:, 1, 0]) | ((s[:, 0, 0] == s[:, 1, 0]) & (s[:, 0, 1] < s[:, 1, 1]))
-        passed = np.zeros(n, np.int64)  # along each piece, from its lesser end, less those that come back
+        passed = np.zeros(n, np.int64)  # passes along each piece from its lesser end, less those in the other direction
         np.add.at(passed, np.repeat(np.arange(n), np.diff(self.noding.starts)),
                   np.where(ahead, 1, -1)[self.noding.sources])
         left, right = faces.above[:n], faces.below[:n]
@@ -189,14 +197,14 @@ class TrapezoidMap:
         while not known.all():
             up, down = known[right] & ~known[left], known[left] & ~known[right]
             if not (up.any() or down.any()):
-                raise InternalError("a face of the trapezoidal map has no way to the outer one", code="broken_map")
+                raise InternalError("a face of the trapezoidal map has no path to the outer one", code="broken_map")
             out[left[up]] = out[right[up]] + passed[up]
             out[right[down]] = out[left[down]] - passed[down]
             known[left[up]] = known[right[down]] = True
         return out
 
     def outline(self, faces: Faces, face: int) -> shapely.Polygon | shapely.MultiPolygon:
-        """One face as a polygon with its holes, mm; pieces with the face on both sides are left out."""
+        """One face as a polygon with its holes, mm, without pieces that have the face on both sides."""
         edge = (faces.above == face) != (faces.below == face)
         lines = self.points[self.pieces[edge]]
         if face == 0:
@@ -204,26 +212,29 @@ class TrapezoidMap:
             lines = np.concatenate([lines, [[b, d], [a, c]]])
         return shapely.build_area(shapely.multilinestrings(lines * self.noding.grid))
 
-    def _height(self, line: I64, x: I64, here: I64) -> F64:
-        """y of pieces at x, grid steps; ``here`` on a vertical one."""
+    def _height(self, line: I64, x: I64, fallback: I64) -> F64:
+        """y of pieces at x, grid steps; ``fallback`` on a vertical one."""
         p, q = self.points[self.pieces[line, 0]], self.points[self.pieces[line, 1]]
         run = q[:, 0] - p[:, 0]
         rise = (q[:, 1] - p[:, 1]) * (x - p[:, 0])
-        return np.where(run == 0, here, p[:, 1] + rise / np.maximum(run, 1))
+        return np.where(run == 0, fallback, p[:, 1] + rise / np.maximum(run, 1))
 
 
 def _by_first(label: NDArray[np.int32]) -> I64:
-    """Labels (k,) numbered in the order in which they first stand."""
+    """Labels (k,) numbered in the order of their first occurrence."""
     _, first, at = np.unique(label, return_index=True, return_inverse=True)
     return np.argsort(np.argsort(first))[at.ravel()].astype(np.int64)
 
 
 def insertion_order(points: I64, pieces: I64, seed: int) -> I64:
-    """Random order in which neighbours in the plan often follow each other, so that the cache is hit.
+    """Random order of insertion in which neighbours in plan often follow each other, for the cache [Amenta2003].
 
-    points (m, 2) int64, unit one grid step; pieces (n, 2) int64 indices. Returns (n,) int64.
-    A random permutation is cut into rounds, each as large as all before it; every round is sorted along a Hilbert
-    curve. Rounds stay random samples, which keeps the expected cost; the depth of the look-up is measured, not proved.
+    points : (m, 2) int64, index of the grid, in plan
+    pieces : (n, 2) int64, index of the points
+    Returns (n,) int64, index of the pieces.
+    A random permutation is cut into rounds, each as large as all before it. Every round is sorted along a Hilbert
+    curve. Rounds remain random samples, which keeps the expected cost. The depth of the look-up is measured, not
+    proved.
     References: Amenta, Choi and Rote, Incremental constructions con BRIO, 2003.
     """
     n = len(pieces)
@@ -246,14 +257,14 @@ def _hilbert(xy: I64) -> I64:
     for bit in range(15, -1, -1):
         east, north = (x >> bit) & 1, (y >> bit) & 1
         place = (place << 2) | ((3 * east) ^ north)
-        flip = (north == 0) & (east == 1)  # the lower quarters are turned: mirror the right one, swap axes in both
+        flip = (north == 0) & (east == 1)  # the lower quarters are rotated: mirror the right one, swap axes in both
         x, y = np.where(flip, 0xFFFF - x, x), np.where(flip, 0xFFFF - y, y)
         x, y = np.where(north == 0, y, x), np.where(north == 0, x, y)
     return place
 
 
 def _built(noding: Noding, seed: int, margin: float) -> TrapezoidMap | tuple[int, int]:
-    """The map, or two pieces that meet elsewhere than at their ends."""
+    """The map, or two pieces that meet away from their ends."""
     points, pieces = _boxed(noding, margin)
     n = len(pieces) - 2
     order = np.append(insertion_order(points, pieces[:n], seed), [n, n + 1])
@@ -262,12 +273,12 @@ def _built(noding: Noding, seed: int, margin: float) -> TrapezoidMap | tuple[int
     if state == kernel.MEET:
         return int(order[s]), int(order[t])
     if state == kernel.LOST:
-        raise InternalError(f"the trapezoidal map lost its way along piece {int(order[s])}", code="broken_map")
+        raise InternalError(f"the trapezoidal map has a broken link along piece {int(order[s])}", code="broken_map")
     live = np.flatnonzero(trap[:, kernel.TOP] >= 0)
     table = trap[live].astype(np.int64)
     top, bottom = order[table[:, kernel.TOP]], order[table[:, kernel.BOTTOM]]
     rank = np.lexsort((top, bottom, table[:, kernel.RIGHT], table[:, kernel.LEFT]))
-    number = np.full(len(trap) + 1, -1, np.int64)  # its last entry answers for -1
+    number = np.full(len(trap) + 1, -1, np.int64)  # its last entry is the answer for -1
     number[live[rank]] = np.arange(len(live))
     table, leaf = table[rank], nodes[:, 0] == kernel.IS_LEAF
     nodes[leaf, 1] = number[nodes[leaf, 1]]
@@ -288,7 +299,7 @@ def _boxed(noding: Noding, margin: float) -> tuple[I64, I64]:
     (x0, y0), (x1, y1) = around.min(axis=0) - int(steps), around.max(axis=0) + int(steps)
     most = int(max(-x0, -y0, x1, y1))
     if most >= kernel.LIMIT:
-        raise InputError(f"the box goes to {most * noding.grid:.6g} mm, beyond {kernel.LIMIT - 1} grid steps",
+        raise InputError(f"the box extends to {most * noding.grid:.6g} mm, beyond {kernel.LIMIT - 1} grid steps",
                          code="out_of_bounds", measured=most * noding.grid, limit=(kernel.LIMIT - 1) * noding.grid,
                          remedy="take a coarser grid or a smaller margin, or move the segments to the origin")
     boxed = np.concatenate([[[x0, y0], [x0, y1]], points, [[x1, y0], [x1, y1]]]).astype(np.int64)

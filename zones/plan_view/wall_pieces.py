@@ -1,4 +1,4 @@
-"""The section of one wall cut into short pieces, and which of them have the other side of the wall behind them."""
+"""The section of one wall in short pieces, and the pieces with the other side of the wall behind them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ BACKED_REACH = 3.0
 BACKED_DOT = -0.8
 PIECE = 0.5
 PIECES = 400
-LEAST_STRETCH = 1.0
+MIN_STRETCH = 1.0
 CORNER = np.radians(45.0)
 
 FREE, MINE, OTHER = 0, 1, 2
@@ -31,7 +31,7 @@ class Pieces:
     kind   : (p,) int, MINE on the wall, OTHER on a connection or another wall, else FREE
     face   : (p,) int, B-rep face numbers
     loop   : (p,) int, label of the loop
-    inner  : (p,) bool, the piece goes on where the one before it was cut for the sake of its length
+    inner  : (p,) bool, the piece continues the one before it, which was cut for its length
     """
 
     def __init__(self, slicer: Slicer, owner: np.ndarray, index: int, wall: Wall, z: float) -> None:
@@ -68,7 +68,7 @@ class Pieces:
 
     @cached_property
     def hit(self) -> np.ndarray:
-        """(p,) int: the piece on the other side of the material, -2 when that is not a piece here, -1 when unbacked."""
+        """(p,) int64, index of the piece behind the material; -2 when that is no piece, -1 when unbacked."""
         out = np.full(len(self.a), -1)
         mine = np.flatnonzero(self.kind == MINE)
         inward = np.column_stack([self.way[mine, 1], -self.way[mine, 0], np.zeros(len(mine))])
@@ -80,7 +80,7 @@ class Pieces:
         outward = np.column_stack([-across[:, 1], across[:, 0]]) / size[:, None]
         own = np.column_stack([-self.way[mine, 1], self.way[mine, 0]])
         dot = np.einsum("ij,ij->i", outward, own)
-        # Flanks of a connection may lie on a face of the wall; behind them is the connection.
+        # Flanks of a connection may lie on a face of the wall; behind them lies the connection.
         backed = (seg >= 0) & (t <= BACKED_REACH * self.thick) & (dot < BACKED_DOT) & (self.seg_kind[seg] != OTHER)
         at = middle[:, :2] + np.where(np.isfinite(t), t, 0.0)[:, None] * inward[:, :2]
         share = np.einsum("ij,ij->i", at - self.cut.start[seg], across) / size**2
@@ -105,7 +105,7 @@ class Pieces:
             opens = np.roll(opens, -int(np.argmax(opens)))
             for run in np.split(rows, np.flatnonzero(opens)[1:]):
                 held = run[:int(np.argmin(backed[run]))] if not backed[run].all() else run
-                if self.length[held].sum() >= LEAST_STRETCH * self.thick:
+                if self.length[held].sum() >= MIN_STRETCH * self.thick:
                     out.append(held.tolist())
         return out
 
@@ -113,7 +113,7 @@ class Pieces:
 def turn_between(a: F64, b: F64) -> F64:
     """Signed angle between unit directions, positive to the left.
 
-    a, b : (n, 2) float64, unit vectors
+    a, b : (n, 2) float64, dimensionless, unit vectors in plan of the access frame
     Returns (n,) float64, rad.
     """
     return np.asarray(np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)))

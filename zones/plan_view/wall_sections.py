@@ -1,13 +1,13 @@
 """Sections of walls: each side of a wall as one curve in plan, walked with the void on the left.
 
     the whole part cut at mid height -> loops -> pieces of this wall that have its other side behind them
-    -> stretches -> joined round corners and behind junctions, bridged over what interrupts them -> sides
+    -> stretches -> joined around corners and behind junctions, bridged over interruptions -> sides
 
 A piece is *backed* where the material across it ends on an opposed surface within three thicknesses. Runs of
-backed pieces are stretches. Two stretches that follow each other on a loop and look at each other through the
-material have an end cap between them; if they do not, they are one side that goes on (round a corner of a tray,
-behind a rib). Where another wall, a connection or an opening interrupts a side, the stretches before and after are
-bridged when they lie in line and the chord between them runs through material or past an opening.
+backed pieces are stretches. Two stretches that follow each other on a loop and face each other through the material
+have an end cap between them. Otherwise they are one side that continues (around a corner of a tray, behind a rib).
+Where another wall, a connection or an opening interrupts a side, the stretches before and after are bridged when they
+lie in line and the chord between them runs through material or past an opening.
 """
 
 from __future__ import annotations
@@ -24,28 +24,28 @@ from zones.plan_view.section_bridges import bridge
 from zones.plan_view.wall_pieces import FREE, MINE, OTHER, Pieces, turn_between
 
 # Lengths are multiples of the thickness of the wall.
-# What of the last two thicknesses before its end a stretch that ends there has behind it.
+# Least backed share of the last two thicknesses before an end of a stretch.
 TAIL, TAIL_SHARE = 2.0, 0.25
-# Faces that belong to no wall, such as fillets, are walked round up to this length.
+# Faces that belong to no wall, such as fillets, are passed up to this length.
 AROUND = 6.0
-# The path round a fillet is at most this many times its chord.
+# The path around a fillet is at most this many times its chord.
 DETOUR = 1.25
-# The end of a side is rounded where it turns to the right by this much (rad) within the window, on this length of it.
-# A bend of the wall itself does not: its outer side has a radius of a thickness or more, over which the window turns by
-# no more than its own number, and its inner side turns to the left, however sharply.
+# The end of a side is rounded where it turns to the right by this angle (rad) within the window, over this length.
+# A bend of the wall itself does not: its outer side has a radius of a thickness or more, so the window turns by no more
+# than its own number. Its inner side turns to the left, however sharply.
 CURL_LENGTH, CURL_WINDOW, CURL_TURN = 1.5, 0.25, 0.25
-# Behind the end of a slanting cap a side goes on unbacked, in line within this angle (rad), up to this length.
+# Behind the end of a slanting cap a side continues unbacked, in line within this angle (rad), up to this length.
 GROW_TURN, GROW_LENGTH = 0.1, 3.0
 # Least cosine between a chord and the sides it joins.
 IN_LINE = 0.8
-# Heights tried, as shares of the height of the wall; another than the middle one where more than this is bridged, or
-# where a side stays in parts or a ring torn open.
+# Heights to try, as shares of the height of the wall. Another height than the middle counts where more than this share
+# is bridged, a side stays in parts, or a ring stays open.
 HEIGHTS = (0.5, 0.6, 0.4, 0.7, 0.3)
-NODE_ROOM = 0.01  # of its height: how far from such a height a wall may be cut to keep clear of the nodes of the mesh
+NODE_ROOM = 0.01  # of the height of a wall: largest shift of a cut to keep clear of the nodes of the mesh
 BRIDGED_SHARE = 0.25
-# Another height is worth it where it leaves this much less, as a share of the length.
+# Another height wins where its bridged share of the length is less by this.
 GAIN = 0.02
-# Curves shorter than this share of the longest, or than two thicknesses, are no sides.
+# Curves shorter than this share of the longest, or than two thicknesses, do not count as sides.
 SIDE_SHARE, SIDE_LENGTH = 0.25, 2.0
 
 BRIDGE = 0
@@ -74,17 +74,17 @@ def wall_sections(part: Part, decomposition: Decomposition, height: float | None
     """The sides of every wall at its mid height.
 
     part          : Part in the setup frame, mm
-    decomposition : what ``decompose`` found on it
-    height        : mm, where to cut all walls; None for the middle of each
+    decomposition : Decomposition of the part
+    height        : mm, height of the cut of all walls; None for the middle of each
 
     Returns
     -------
     tuple of SideCurve
-        By wall, then by centroid. Open walls have two; closed ones two rings. End caps and the roundings of ends are
-        left out. Without a given height a wall is cut at 0.6, 0.4, 0.7 or 0.3 of its height instead of the middle
-        where the middle section would leave a side in parts or a ring torn open, or be bridges for over a quarter, and
-        another does not.
-        Points are off the exact surface by at most the deviation of the mesh, bridges over interruptions aside.
+        By wall, then by centroid. Open walls have two sides, closed ones two rings. End caps and the roundings of ends
+        are left out. Without a given height a wall is cut at the middle. It is cut at 0.6, 0.4, 0.7 or 0.3 of its
+        height where the middle section leaves a side in parts or a ring open, or bridges over a quarter of the length,
+        and another section does not.
+        Points are at most the deviation of the mesh off the exact surface, except on bridges over interruptions.
     """
     count = max((f.number for f in part.faces), default=0) + 1
     owner = np.full(count, -1)
@@ -127,14 +127,14 @@ class _Section(Pieces):
     """One wall cut at one height, and its stretches put together."""
 
     def sides(self) -> tuple[list[SideCurve], float]:
-        """Curves, and how poor they are: see ``_poor``."""
+        """Curves and their penalty, see ``_poor``."""
         if not (self.kind == MINE).any():
             return [], 3.0
         chains = self._joined(self.stretches())
         used = {r for c in chains for r in c.rows}
         chains = self._bridge([self._trimmed(self._grown(c, used)) for c in chains])
         curves, bridged, torn = [], [], []
-        # Rings within an open wall are bores, upright holes in its material, and no side.
+        # Rings within an open wall are bores, upright holes in its material, not sides.
         bored = any(not c.closed for c in chains)
         for chain in chains:
             curve = None if bored and chain.closed else self._curve(chain)
@@ -151,10 +151,10 @@ class _Section(Pieces):
         return [curves[i] for i in kept], self._poor(total, len(kept), share, open_rings)
 
     def _poor(self, total: list[float], kept: int, bridged: float, torn: float) -> float:
-        """2 or more where a side lacks, 1 to 2 where one is in parts, else the share that bridges.
+        """Penalty of a section: 2 or more for a missing side, 1 to 2 for one in parts, else the bridged share.
 
-        total : mm, length of every curve; kept : those that count as sides; bridged : share of their length
-        torn  : mm, length of the sides that are rings torn open
+        total : mm, length of every curve; kept : number of sides; bridged : share of their length
+        torn  : mm, length of the sides that are open rings
         """
         if kept < 2:
             return 3.0 - 0.5 * kept
@@ -162,7 +162,7 @@ class _Section(Pieces):
         return 1.0 + parts / sum(total) if parts else float(bridged)
 
     def _joined(self, stretches: list[list[int]]) -> list[_Chain]:
-        """Stretches that go on round a corner or behind a junction, joined along the loop."""
+        """Stretches that continue around a corner or behind a junction, joined along the loop."""
         after: dict[int, tuple[int, list[int]]] = {}
         for loop in {int(self.loop[s[0]]) for s in stretches}:
             here = [i for i, s in enumerate(stretches) if self.loop[s[0]] == loop]
@@ -198,18 +198,18 @@ class _Section(Pieces):
             return False
         if (self.kind[gap] == FREE).any():
             path, chord = float(self.length[gap].sum()), float(np.linalg.norm(self.a[two[0]] - self.b[one[-1]]))
-            # Round a fillet, but straight over the stub of a bar that comes out behind the wall.
+            # Around a fillet, but straight over the stub of a bar that comes out behind the wall.
             if path > AROUND * self.thick or path > DETOUR * chord:
                 return False
         tail, head = self._tail(one[::-1]), self._tail(two)
         if one is two and not gap:
             return True
-        # What follows may stand in the gap too: the back of a thin lip at the end of the wall.
+        # The next stretch may lie in the gap too: the back of a thin lip at the end of the wall.
         behind = max(self._share(tail, gap + two), self._share(head, gap + one))
         return behind < TAIL_SHARE
 
     def _share(self, rows: np.ndarray, others: list[int]) -> float:
-        """How much of some pieces has others behind it; by length, since facets crowd where a side bends."""
+        """Share of some pieces with others behind it, by length, since facets crowd where a side bends."""
         return float(self.length[rows] @ np.isin(self.hit[rows], others) / max(self.length[rows].sum(), 1e-30))
 
     def _tail(self, rows: list[int]) -> np.ndarray:
@@ -217,7 +217,7 @@ class _Section(Pieces):
         return np.asarray(rows)[reach <= TAIL * self.thick]
 
     def _grown(self, chain: _Chain, used: set[int]) -> _Chain:
-        """With the straight ends that look at a slanting cap instead of the other side; ``used`` is added to."""
+        """The chain with the straight ends that face a slanting cap instead of the other side; extends ``used``."""
         if not chain.closed:
             chain.rows = self._more(chain.rows[0], -1, used)[::-1] + chain.rows + self._more(chain.rows[-1], 1, used)
         return chain
@@ -236,16 +236,16 @@ class _Section(Pieces):
         return out
 
     def _trimmed(self, chain: _Chain) -> _Chain:
-        """Without the roundings of its ends."""
+        """The chain without the roundings of its ends."""
         if chain.closed:
             return chain
         lead, trail = self._curl(chain.rows, -1), self._curl(chain.rows[::-1], 1)
         return _Chain(chain.rows[lead:len(chain.rows) - trail])
 
     def _curl(self, rows: list[int], right: int) -> int:
-        """How many pieces from the end on belong to its rounding, the end first.
+        """Count of the pieces that belong to the rounding of an end, the end first.
 
-        right : sign that a turn to the right of the walk has between pieces in the order of ``rows``
+        right : sign of a turn to the right of the walk between pieces in the order of ``rows``
         """
         reach = np.cumsum(self.length[rows])
         near = int(np.searchsorted(reach, CURL_LENGTH * self.thick)) + 2
@@ -262,7 +262,7 @@ class _Section(Pieces):
         return last
 
     def _bridge(self, chains: list[_Chain]) -> list[_Chain]:
-        """Stretches of one side, joined by bridges over what interrupts them, nearest first."""
+        """Stretches of one side, joined by bridges over interruptions, nearest first."""
         pairs = []
         for i, one in enumerate(chains):
             for j, two in enumerate(chains):
@@ -291,14 +291,14 @@ class _Section(Pieces):
         return out
 
     def _torn(self, chain: _Chain) -> bool:
-        """Whether a chain is a ring that something interrupts in a bend: its ends face each other, yet not in line."""
+        """Whether a chain is a ring interrupted in a bend: its ends face each other, but not in line."""
         rows = _Chain([r for r in chain.rows if r >= 0], chain.closed)
         return self._in_line(rows, rows, 0.0) is not None
 
-    def _in_line(self, one: _Chain, two: _Chain, least: float = IN_LINE) -> float | None:
+    def _in_line(self, one: _Chain, two: _Chain, min_cosine: float = IN_LINE) -> float | None:
         """Length of the chord from the end of one chain to the start of another, None where they are not one side.
 
-        least : cosine of the angle between the chord and either side that is allowed
+        min_cosine : cosine of the angle between the chord and either side that is allowed
         """
         if one.closed or two.closed or not one.rows or not two.rows:
             return None
@@ -308,7 +308,7 @@ class _Section(Pieces):
             return None
         u = (q - p) / far
         leave, enter = self._heading(one.rows[::-1]), self._heading(two.rows)
-        if min(float(leave @ u), float(enter @ u)) < least:
+        if min(float(leave @ u), float(enter @ u)) < min_cosine:
             return None
         return far if self._filled(p, q) else None
 
@@ -331,7 +331,7 @@ class _Section(Pieces):
         return np.asarray(total / max(float(np.linalg.norm(total)), 1e-30))
 
     def _filled(self, p: F64, q: F64) -> bool:
-        """Whether the chord runs through material, or the wall goes on above or below it (an opening)."""
+        """Whether the chord runs through material, or the wall continues above or below it (an opening)."""
         u = (q - p) / np.linalg.norm(q - p)
         inward = np.array([u[1], -u[0]])
         for share in (0.25, 0.5, 0.75):

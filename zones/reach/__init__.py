@@ -1,4 +1,4 @@
-"""What an assembly of tool and holder can touch along an access.
+"""Area that an assembly of tool and holder can touch along an access.
 
-It rests on one kernel, the lowest tip height over a mesh.
+All of it uses one kernel, the lowest tip height over a mesh. The choice of tools belongs to ``zoning``.
 """

@@ -1,4 +1,4 @@
-"""What every tool reaches along one access direction, and which tool is asked first."""
+"""Samples that every tool reaches along one access direction, and the order of the tools."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from zones.features.connection_faces import connection_faces
-from zones.machinable_area import LEVEL, Form, forms_of
+from zones.machinable_area import LEVEL, AreaForm, forms_of
 from zones.model import Decomposition
 from zones.reach.access_view import View
 from zones.reach.tip_field import touchable
@@ -19,7 +19,7 @@ from zones.reach.tip_field import touchable
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """Of one tool in one view: samples its cutting part touches, the whole tool touches, and the tips."""
+    """Reach of one tool in one view: samples that its cutting part or the whole tool touches, and the tips."""
 
     by_cutter: NDArray[np.bool_]
     by_tool: NDArray[np.bool_]
@@ -27,9 +27,11 @@ class Reach:
 
 
 def able(tool: ToolBody, normals: F64, scallop: float) -> NDArray[np.bool_]:
-    """(n,) bool: a strategy exists for this tool on samples with these normals (n, 3).
+    """(n,) bool: a strategy exists for this tool on samples with these normals.
 
-    A corner of radius r cuts everything; a sharp-cornered flat end cuts level planes and walls so upright that
+    normals : (n, 3) float64, dimensionless, access frame
+
+    A tool with a corner radius cuts everything. A sharp-cornered flat end cuts level planes, and walls so upright that
     steps of at least 0.1 mm keep the scallop.
     """
     if tool.corner_radius > 0:
@@ -38,14 +40,14 @@ def able(tool: ToolBody, normals: F64, scallop: float) -> NDArray[np.bool_]:
     return np.asarray((nz > LEVEL) | (np.abs(nz) <= 0.5 * scallop / 0.1))
 
 
-def preference(tool: ToolBody, form: Form) -> tuple[float, float, float]:
+def preference(tool: ToolBody, form: AreaForm) -> tuple[float, float, float]:
     """Sort key of the tools for a form, best first: flat ends on level planes, then stout and short ones."""
-    kind = {"flat": 0.0, "bull": 1.0, "ball": 2.0}[tool.kind] if form is Form.LEVEL else 0.0
+    kind = {"flat": 0.0, "bull": 1.0, "ball": 2.0}[tool.kind] if form is AreaForm.LEVEL else 0.0
     return (kind, -tool.diameter, tool.stickout)
 
 
 def connection_bands(view: View, decomposition: Decomposition) -> dict[str, list[tuple[float, float]]]:
-    """Heights, mm, between which each connection stands in a view, by the channels and walls it bridges."""
+    """Least and greatest height of each connection in a view, mm, by the channels and walls it bridges."""
     out: dict[str, list[tuple[float, float]]] = {}
     mesh, spans = view.part.mesh, connection_faces(view.part, decomposition)
     for c in decomposition.connections:
@@ -59,9 +61,9 @@ def connection_bands(view: View, decomposition: Decomposition) -> dict[str, list
 
 
 class Sight:
-    """One view with what its tools reach.
+    """One view with the reach of its tools.
 
-    known : Reach by tool id where it was found before, of the same samples
+    known : Reach by tool id from an earlier computation with the same samples
     """
 
     def __init__(self, view: View, decomposition: Decomposition, scallop: float, lift: float,
@@ -76,23 +78,26 @@ class Sight:
         self.bands = connection_bands(view, decomposition)
 
     def gets(self, tool: str) -> NDArray[np.bool_]:
-        """(n,) bool: samples this tool can finish along this view."""
+        """(n,) bool: samples that this tool can finish along this view."""
         return np.asarray(self.can[tool] & self.reach[tool].by_tool)
 
-    def order(self, form: Form) -> list[str]:
+    def order(self, form: AreaForm) -> list[str]:
         """Ids of the tools, best first."""
         return sorted(self.view.fields, key=lambda t: (*preference(self.view.fields[t].tool, form), t))
 
-    def groups(self, rows: NDArray[np.bool_]) -> list[tuple[str, Form, NDArray[np.int64]]]:
-        """Base region with its place, form and samples of what is to be shared out, in a fixed order."""
+    def groups(self, rows: NDArray[np.bool_]) -> list[tuple[str, AreaForm, NDArray[np.int64]]]:
+        """Groups of samples to share out, in a fixed order: base region with its place, form, (k,) int64 index.
+
+        rows : (n,) bool, samples to share out
+        """
         labels = self.view.labels
         names, ground = np.unique([r.ground for r in labels.regions], return_inverse=True)
-        asked = np.flatnonzero(rows)
-        base = ground[labels.code[asked]]
+        selected = np.flatnonzero(rows)
+        base = ground[labels.code[selected]]
         out = []
         for k in np.unique(base):
-            mine = asked[base == k]
-            for form in Form:
+            mine = selected[base == k]
+            for form in AreaForm:
                 members = mine[self.form[mine] == form]
                 if len(members):
                     out.append((str(names[k]), form, members))

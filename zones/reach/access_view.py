@@ -1,4 +1,4 @@
-"""The part as one access direction sees it."""
+"""The part seen along one access direction."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples
-from zones.plan_view.regions import Labels, Regioner
+from zones.plan_view.regions import Labels, RegionLocator
 from zones.reach.tip_field import TipField
 
-ALONG_X = 0.999999  # |d·x| above: the access looks along X, so its own x axis is taken from Y
+ALONG_X = 0.999999  # |d·x| above: the access looks along X, so its x axis comes from Y
 
 
 def access_rotation(direction: ArrayLike) -> F64:
     """Rotation into the frame of an access direction.
 
-    direction : (3,) float64, tool tip to spindle, in the setup frame; any length but zero
-    Returns (3, 3) float64 whose rows are the axes of the access frame in the setup frame: z the direction, x the
-    part of the setup's X square to it (of its Y where the direction runs along X). The origin stays.
+    direction : (3,) float64, dimensionless, tool tip to spindle, in the setup frame; any length but zero
+    Returns (3, 3) float64. Its rows are the axes of the access frame in the setup frame: z is the direction, x the
+    component of the setup's X square to it (of its Y where the direction runs along X). The origin does not move.
 
     >>> access_rotation([0, 0, -1]).tolist()
     [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]
@@ -37,7 +37,10 @@ def access_rotation(direction: ArrayLike) -> F64:
 
 
 def turned(part: Part, rotation: F64) -> Part:
-    """The part in another frame with the same origin: points p (mm) become ``rotation @ p``; rotation (3, 3)."""
+    """The part in another frame with the same origin: points p (mm) become ``rotation @ p``.
+
+    rotation : (3, 3) float64, dimensionless
+    """
     if np.array_equal(rotation, np.eye(3)):
         return part
     matrix = np.eye(4)
@@ -48,7 +51,7 @@ def turned(part: Part, rotation: F64) -> Part:
 
 
 def turned_samples(samples: SurfaceSamples, rotation: F64) -> SurfaceSamples:
-    """The samples (mm) in another frame with the same origin; rotation (3, 3)."""
+    """The samples (mm) in another frame with the same origin. rotation : (3, 3) float64, dimensionless."""
     if np.array_equal(rotation, np.eye(3)):
         return samples
     return replace(samples, points=np.ascontiguousarray(samples.points @ rotation.T),
@@ -57,7 +60,7 @@ def turned_samples(samples: SurfaceSamples, rotation: F64) -> SurfaceSamples:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """One access direction with all that is known along it; lengths mm, in the access frame (+Z to the spindle).
+    """One access direction with its part, samples, regions and tip fields; mm, access frame (+Z to the spindle).
 
     id       : 'A1'
     rotation : (3, 3) float64, setup frame -> access frame
@@ -65,7 +68,8 @@ class View:
     samples  : SurfaceSamples of the machinable area, the same rows in every view
     labels   : their regions
     fields   : TipField by tool id
-    regioner : labels other points; first : (3, 3) rotation of the first view, whose channels it uses
+    locator  : RegionLocator for other points
+    first    : (3, 3) float64, rotation of the first view, whose channels the locator uses
     """
 
     id: str
@@ -76,29 +80,29 @@ class View:
     samples: SurfaceSamples
     labels: Labels
     fields: Mapping[str, TipField]
-    regioner: Regioner
+    locator: RegionLocator
     first: F64
 
     def label(self, samples: SurfaceSamples) -> Labels:
         """Regions of other samples, given in this frame."""
-        turn = self.rotation @ self.first.T  # of rows of points: into the setup frame and on into the first
+        turn = self.rotation @ self.first.T  # turns rows of points into the setup frame and then into the first
         there = None if self.is_first else (np.asarray(samples.points @ turn), np.asarray(samples.normals @ turn))
-        return self.regioner.of(samples.points, samples.normals, samples.face, there)
+        return self.locator.of(samples.points, samples.normals, samples.face, there)
 
     @property
     def direction(self) -> F64:
-        """(3,) float64, unit, the tool axis in the setup frame."""
+        """(3,) float64, dimensionless, the tool axis in the setup frame."""
         return np.asarray(self.rotation[2])
 
     @property
     def is_first(self) -> bool:
-        """Whether this is the first access, in whose frame walls are found."""
+        """Whether this is the first access, whose frame is that of the decomposition."""
         return bool(np.array_equal(self.rotation, self.first))
 
     def into(self, vectors: F64) -> F64:
-        """Points (mm) or directions, (n, 3), of the setup frame in the access frame."""
+        """Points (mm) or directions, (n, 3), of the setup frame in the access frame. vectors : (n, 3) float64."""
         return np.asarray(vectors @ self.rotation.T)
 
     def back(self, vectors: F64) -> F64:
-        """Points (mm) or directions, (n, 3), of the access frame in the setup frame."""
+        """Points (mm) or directions, (n, 3), of the access frame in the setup frame. vectors : (n, 3) float64."""
         return np.asarray(vectors @ self.rotation)

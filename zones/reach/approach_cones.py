@@ -1,8 +1,8 @@
-"""From which directions a tool gets at a place: the approach of samples, and the cone of a zone.
+"""Tool axes that reach a place: the approach of samples, and the cone of a zone.
 
-An axis may be used for a sample if the tool, stood on it along that axis by the contact of ``zones.reach.tip_field``, enters
-nothing. Cutting part, shank and holder go on without end along the axis: the tool comes in along it, and the machine
-stands behind. Theory: docs/theory/approach.md.
+A sample may use an axis if the tool, placed on it along that axis by the contact of ``zones.reach.tip_field``, enters
+nothing. Cutting part, shank and holder extend without end along the axis, since the tool comes in along it and the
+machine stands behind. Theory: docs/theory/approach.md.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from zones.reach.assembly import Clearances, discs_of
 from zones.reach.tip_field import EDGE_SLACK, FLAT_RING, LEVEL_TOLERANCE, contact_tips
 
 GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
-AT_ONCE = 400_000  # pairs of sample and direction asked in one go
-CANDIDATES = 4000  # axes tried for a cone before the best is refined
+CHUNK_PAIRS = 400_000  # pairs of sample and direction in one batch
+CANDIDATES = 4000  # axes to try for a cone before the best is refined
 ROUNDING = 1e-9  # rad
 
 
@@ -34,9 +34,9 @@ class Cone:
     """A circular cone of tool axes.
 
     axis       : (3,) float64, unit, from the tip to the spindle
-    half_angle : rad; wrong by ``resolution`` at most, up or down
-    share      : of the area, the least that any tried direction inside the cone reaches
-    resolution : rad, no direction of the set is farther than this from a tried one
+    half_angle : rad; its error is at most ``resolution``
+    share      : least share of the area that any tried direction inside the cone reaches
+    resolution : rad, largest distance of a direction from the nearest tried one
     """
 
     axis: F64
@@ -46,15 +46,15 @@ class Cone:
 
 
 def directions_over_hemisphere(count: int, *, whole: bool = False) -> F64:
-    """Unit vectors spread evenly over the upper half of the sphere, or over all of it.
+    """Unit vectors spread evenly over the upper half of the sphere, or over the whole sphere.
 
-    count : int, > 0, how many; the first is +Z
-    whole : the other half as well; the last is then near -Z
+    count : int, > 0, number of vectors; the first is +Z
+    whole : the lower half as well; the last vector is then near -Z
 
     Returns
     -------
-    (count, 3) float64
-        A spiral by the golden angle in rings of equal area, the same every time.
+    (count, 3) float64, dimensionless
+        A spiral by the golden angle in rings of equal area, in any frame with +Z up; the same for every call.
     """
     k = np.arange(1, count)
     z = 1.0 - (k + 0.5) * (2.0 if whole else 1.0) / count
@@ -64,10 +64,10 @@ def directions_over_hemisphere(count: int, *, whole: bool = False) -> F64:
 
 
 def assembly(tool: ToolBody, clear: Clearances, allowance: float) -> F64:
-    """Cutting part, shank and holder as ``geometry.mesh_queries.tilted_collision`` wants them.
+    """Cutting part, shank and holder in the form of ``geometry.mesh_queries.tilted_collision``, tool frame.
 
-    Returns (k, 3) float64, mm: radius, corner radius, height above the tip, all grown by the allowance. Bodies that
-    stand in the shadow of one as wide below them are left out.
+    Returns (k, 3) float64, mm: radius, corner radius, height above the tip, all grown by the allowance. Bodies above
+    one that is as wide are left out.
     """
     rows = [(tool.radius + allowance, max(tool.corner_radius + allowance, 0.0), -allowance)]
     for d in sorted(discs_of(tool, clear), key=lambda d: (d.height, -d.radius)):
@@ -79,35 +79,35 @@ def assembly(tool: ToolBody, clear: Clearances, allowance: float) -> F64:
 def approach(tree: TriangleTree, tool: ToolBody, clear: Clearances, points: ArrayLike, normals: ArrayLike,
              directions: ArrayLike, lift: float, allowance: float = 0.0,
              tips: ArrayLike | None = None) -> NDArray[np.bool_]:
-    """Which tool axes bring the cutting part to which samples without entering anything.
+    """Tool axes along which the cutting part reaches samples without entering anything.
 
     tree       : TriangleTree of part and fixtures
     tool       : ToolBody
     clear      : Clearances
-    points     : (n, 3) float64, mm, on the surface
-    normals    : (n, 3) float64, unit, out of the material
+    points     : (n, 3) float64, mm, on the surface, frame of the tree
+    normals    : (n, 3) float64, dimensionless, out of the material
     directions : (d, 3) float64, tool axes from the tip to the spindle
     lift       : mm, distance along the normal within which a touch counts
-    allowance  : mm, material to leave on the part: the assembly is grown by it all round
-    tips       : (n, 3) float64, mm, of ``zones.reach.tip_field.touchable``: where the tool touches each sample along the first
-                 direction; they are tried as well
+    allowance  : mm, material to leave on the part: the assembly is grown by it on all sides
+    tips       : (n, 3) float64, mm, from ``zones.reach.tip_field.touchable``: tips that touch the samples along the
+                 first direction, tried as well
 
     Returns
     -------
     (n, d) bool
-        Exact for mesh and assembly (holder frusta as the slices that enclose them) but for 1e-5 mm along the axis.
+        Exact for mesh and assembly (holder frusta as enclosing slices), except for 1e-5 mm along the axis.
 
     Notes
     -----
-    Contact as in ``zones.reach.tip_field.contact_tips``, in the frame of the axis: the highest tip that touches. Lower ones touch
-    with the flank, but what blocks the highest blocks them too. No sideways play is asked for. Under a flat end a
-    sample whose normal is the axis is tried from 17 positions. Reach also aims it at free places near by, on the
-    lattice of the upright tool; that is why its tips are taken over.
+    The contact is that of ``zones.reach.tip_field.contact_tips`` in the frame of the axis: the highest tip that
+    touches. Lower tips touch with the flank, but an obstacle of the highest tip blocks them too. No sideways play is
+    required. Under a flat end a sample whose normal is the axis is tried from 17 positions. Reach also aims the flat
+    end at free places nearby, on the lattice of the upright tool. Its tips therefore count as well.
     """
     p, n = finite_points(points, 3, "points"), finite_points(normals, 3, "normals")
     frames, bodies = axis_frames(directions), assembly(tool, clear, allowance)
     out = np.zeros((len(p), len(frames)), np.bool_)
-    step = max(AT_ONCE // max(len(frames), 1), 1)
+    step = max(CHUNK_PAIRS // max(len(frames), 1), 1)
     for lo in range(0, len(p), step):
         rows = slice(lo, lo + step)
         out[rows] = _reached(tree, tool, frames, bodies, p[rows], n[rows], lift + allowance)
@@ -120,7 +120,7 @@ def approach(tree: TriangleTree, tool: ToolBody, clear: Clearances, points: Arra
 
 def _reached(tree: TriangleTree, tool: ToolBody, frames: F64, bodies: F64, p: F64, n: F64,
              lift: float) -> NDArray[np.bool_]:
-    """(n, d) bool of ``approach`` for as many pairs as are worked on at once."""
+    """(n, d) bool of ``approach`` for one batch of pairs."""
     sample, frame = np.nonzero(n @ frames[:, 2].T > SEEN)
     turn = frames[frame]
     points, normals = np.einsum("qij,qj->qi", turn, p[sample]), np.einsum("qij,qj->qi", turn, n[sample])
@@ -141,14 +141,16 @@ def _reached(tree: TriangleTree, tool: ToolBody, frames: F64, bodies: F64, p: F6
 
 
 def resolution_of(directions: ArrayLike) -> float:
-    """How far a direction can be from the nearest of a set, rad.
+    """Largest distance of a direction from the nearest of a set, rad.
 
-    directions : (d, 3) float64, any length; all with z >= 0: the upper half of the sphere counts, else all of it
+    directions : (d, 3) float64, dimensionless, any length and frame; where all have z >= 0, only the upper half of the
+                 sphere counts
 
     Notes
     -----
-    The widest empty cap: its rim runs through the corners of a facet of the convex hull, whose distance from the centre
-    is its cosine. The upper half is closed by its mirror image. Too few directions for a hull: half or all of the turn.
+    It is the radius of the widest empty cap. The rim of the cap runs through the corners of a facet of the convex hull,
+    whose distance from the centre is the cosine. The mirror image closes the upper half. Too few directions for a hull
+    give half a turn, or a whole one.
     """
     unit = _units(directions)
     upper = _upper(unit)
@@ -161,24 +163,23 @@ def resolution_of(directions: ArrayLike) -> float:
 
 def zone_cone(reachable: NDArray[np.bool_], area: F64, directions: ArrayLike, share: float = 0.98,
               holds_first: bool = False) -> Cone | None:
-    """Largest circular cone of axes by each of which nearly all of a zone is reached.
+    """Largest circular cone of axes, each of which reaches nearly all of a zone.
 
-    reachable  : (n, d) bool, as of ``approach``
+    reachable  : (n, d) bool, from ``approach``
     area       : (n,) float64, mm², of each sample
-    directions : (d, 3) float64; where none points down, what points down counts as not reaching
-    share      : of the area, what an axis has to reach to count
-    holds_first : the largest of the cones that hold the first direction; that one alone where it has no room round it
+    directions : (d, 3) float64, frame of the samples; where none points down, axes that point down do not reach
+    share      : least share of the area that an axis must reach
+    holds_first : take the largest cone that contains the first direction, or that direction alone where it has no room
 
     Returns
     -------
-    Cone, or None where no direction reaches as much, with ``holds_first`` where the first does not.
+    Cone, or None where no direction reaches the share; with ``holds_first``, where the first direction does not.
 
     Notes
     -----
-    The nearest direction that was tried and fails is at an angle b from the axis. A true obstacle at least two
-    resolutions wide is then between b and b - 2 resolutions away; the middle is given. One that is thinner can lie
-    between the directions and be missed, so a path inside the cone is still checked. Of equal cones the one nearest
-    to +Z is taken.
+    The nearest tried direction that fails is at an angle b from the axis. A true obstacle at least two resolutions wide
+    is then between b and b - 2 resolutions away; the result is the middle. A thinner obstacle can lie between the
+    directions, so a path inside the cone is still checked. Of equal cones the one nearest to +Z wins.
     """
     unit, weight = _units(directions), np.asarray(area, dtype=np.float64)
     got = weight @ np.asarray(reachable, dtype=np.float64) / max(float(weight.sum()), 1e-300)
@@ -200,10 +201,10 @@ def _upper(unit: F64) -> bool:
     return bool((unit[:, 2] > -ROUNDING).all())
 
 
-def _widest(unit: F64, good: NDArray[np.bool_], spacing: float, held: F64 | None) -> tuple[F64, float]:
-    """Axis and half angle of the widest cone: the best of evenly spread axes, then steps that halve.
+def _widest(unit: F64, good: NDArray[np.bool_], spacing: float, contained: F64 | None) -> tuple[F64, float]:
+    """Axis and half angle of the widest cone: the best of evenly spread axes, refined by halving steps.
 
-    held : (3,) an axis it has to hold, or None
+    contained : (3,) an axis that the cone must contain, or None
     """
     bad, upper = unit[~good], _upper(unit)
     if not len(bad) and not upper:
@@ -211,7 +212,9 @@ def _widest(unit: F64, good: NDArray[np.bool_], spacing: float, held: F64 | None
 
     def room(axes: F64) -> F64:
         out = free(axes)
-        return out if held is None else np.where(np.arccos(np.clip(axes @ held, -1.0, 1.0)) <= out, out, -math.inf)
+        if contained is None:
+            return out
+        return np.where(np.arccos(np.clip(axes @ contained, -1.0, 1.0)) <= out, out, -math.inf)
 
     def free(axes: F64) -> F64:
         out = np.full(len(axes), math.inf)
@@ -233,13 +236,13 @@ def _widest(unit: F64, good: NDArray[np.bool_], spacing: float, held: F64 | None
             best, width = candidate, wider
         else:
             step *= 0.5
-    if width <= 0.0:  # no room round any: the axis to hold, or the direction that is farthest from failing ones
-        best, width = (held, 0.0) if held is not None else _first(unit[good], free(unit[good]))
+    if width <= 0.0:  # no axis has room: take the axis to contain, or the direction farthest from failing ones
+        best, width = (contained, 0.0) if contained is not None else _first(unit[good], free(unit[good]))
     return best, max(width, 0.0)
 
 
 def _first(axes: F64, width: F64) -> tuple[F64, float]:
-    """The widest; of equals the one nearest to +Z."""
+    """The widest cone; of equal cones the one nearest to +Z."""
     most = np.flatnonzero(width >= width.max() - ROUNDING)
     k = int(most[np.argmax(axes[most, 2])])
     return axes[k], float(width[k])

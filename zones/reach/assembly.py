@@ -11,7 +11,7 @@ FRUSTUM_SLICES = 6
 
 @dataclass(frozen=True)
 class Clearances:
-    """Radial distances kept around the assembly, mm."""
+    """Radial clearances around the assembly, mm."""
 
     neck: float = 0.05
     shank: float = 0.2

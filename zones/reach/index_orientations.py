@@ -1,9 +1,9 @@
-"""The fewest further tool axes that get at what is left: 3+2 on a machine that can lean its tool or its table.
+"""The fewest further tool axes that reach the remaining samples: 3+2 on a machine that can tilt its tool or its table.
 
-Every axis of an even set over the half of the sphere the machine can turn to is asked, by the exact approach of
-``zones.reach.approach_cones``, which of the samples left some tool reaches along it. Choosing the axes is a set cover with a
-price: area won less ``worth`` for each axis, solved exactly. Each axis chosen is then turned by smaller and smaller
-angles, for as long as the area of what it was chosen for grows.
+An even set of axes covers the half of the sphere that the machine can turn to. For every axis the exact approach of
+``zones.reach.approach_cones`` gives the remaining samples that some tool reaches along it. The choice of axes is a set
+cover with a price, solved exactly: area won less ``worth`` for each axis. Each chosen axis is then turned by smaller
+and smaller angles, as long as the area it wins grows.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from zones.reach.access_reach import able
 from zones.reach.approach_cones import approach, directions_over_hemisphere, resolution_of
 from zones.reach.assembly import Clearances
 
-DIRECTIONS = 241  # over the half sphere: 5 degrees to the nearest at most
-ASKED_AT_MOST = 1500
+DIRECTIONS = 241  # over the half sphere: at most 5 degrees to the nearest
+MAX_SAMPLES = 1500
 SEED = 17
-MOST_AXES = 6
-SAME = np.radians(1.0)  # axes nearer than that to a known one are not asked
+MAX_AXES = 6
+SAME = np.radians(1.0)  # axes nearer than this to a known one are skipped
 ROUND_ANGLES = (15.0, 5.0, 1.0)  # deg, tried in turn
-AS_GOOD = 0.98  # of the area an axis wins
-STEPS = 3  # halvings of the angle by which a chosen axis is turned
+AS_GOOD = 0.98  # of the area that an axis wins: least share won by its replacement
+STEPS = 3  # halvings of the angle that turns a chosen axis
 
 
-class Gatherer:
-    """Which samples some tool reaches along which axes, exactly, without the blank.
+class AxisCoverage:
+    """Samples that some tool reaches along axes, exactly, without the blank.
 
     tree      : TriangleTree of part and fixtures, setup frame
     tools     : those of the setup
-    clear     : Clearances; scallop, lift, allowance : mm, as zones have them
+    clear     : Clearances; scallop, lift, allowance : mm, as in ``zones.zoning.zones``
     """
 
     def __init__(self, tree: TriangleTree, tools: Sequence[ToolBody], clear: Clearances, scallop: float, lift: float,
@@ -49,7 +49,10 @@ class Gatherer:
         self.scallop, self.lift, self.allowance = scallop, lift, allowance
 
     def reached(self, samples: SurfaceSamples, axes: F64) -> NDArray[np.bool_]:
-        """(n, d) bool: samples, setup frame, that a tool with a strategy for them reaches along axes (d, 3)."""
+        """(n, d) bool: samples that a tool with a strategy for them reaches along axes.
+
+        axes : (d, 3) float64, dimensionless, setup frame, tip to spindle
+        """
         out = np.zeros((len(samples), len(axes)), np.bool_)
         frames = axis_frames(axes)
         for tool in self.tools:
@@ -61,33 +64,34 @@ class Gatherer:
         return out
 
 
-def orientations(samples: SurfaceSamples, gatherer: Gatherer, allowed: Callable[[F64], NDArray[np.bool_]],
+def orientations(samples: SurfaceSamples, coverage: AxisCoverage, allowed: Callable[[F64], NDArray[np.bool_]],
                  even: Callable[[F64, float], F64], known: F64, worth: float) -> F64:
     """Tool axes that are worth turning to.
 
-    samples : SurfaceSamples that are left, setup frame
-    allowed : says of axes (d, 3) which the machine can turn to, (d,) bool
+    samples : SurfaceSamples that remain, setup frame
+    coverage : AxisCoverage of the tools
+    allowed : (d, 3) axes -> (d,) bool, axes that the machine can turn to
     even    : axes (d, 3) near one (3,) at which the rotary axes stand at whole multiples of some degrees
-    known   : (k, 3) float64, unit, axes the samples were left by
-    worth   : mm², the least an axis has to win
+    known   : (k, 3) float64, dimensionless, axes in use, from which these samples remain
+    worth   : mm², least area that an axis must win
 
     Returns
     -------
     (k, 3) float64
-        Unit, tip to spindle, setup frame, k at most 6; what wins most first.
+        Dimensionless, tip to spindle, setup frame, k at most 6; the axis that wins most first.
 
     Notes
     -----
-    Of more than 1500 samples 1500 are asked, drawn with a fixed seed by area, and stand for the rest. Axes that point
-    down are not asked: a tool does not come from under the table.
+    Of more than 1500 samples, 1500 are drawn by area with a fixed seed and represent the rest. Axes that point down are
+    skipped: a tool does not come from under the table.
     """
     inner = np.flatnonzero(samples.area > 0)
     total = float(samples.area.sum())
     if total < worth or not len(inner):
         return np.zeros((0, 3))
-    if len(inner) > ASKED_AT_MOST:
+    if len(inner) > MAX_SAMPLES:
         share = samples.area[inner] / total
-        inner = np.sort(np.random.default_rng(SEED).choice(inner, ASKED_AT_MOST, replace=False, p=share / share.sum()))
+        inner = np.sort(np.random.default_rng(SEED).choice(inner, MAX_SAMPLES, replace=False, p=share / share.sum()))
         each = np.full(len(inner), total / len(inner))
     else:
         each = samples.area[inner]
@@ -96,7 +100,7 @@ def orientations(samples: SurfaceSamples, gatherer: Gatherer, allowed: Callable[
     axes = axes[allowed(axes) & (axes @ known.T < np.cos(SAME)).all(axis=1)]
     if not len(axes):
         return np.zeros((0, 3))
-    got = gatherer.reached(few, axes)
+    got = coverage.reached(few, axes)
     chosen = _chosen(got, each, worth)
     spacing = resolution_of(directions_over_hemisphere(DIRECTIONS))
     found: list[F64] = []
@@ -107,36 +111,36 @@ def orientations(samples: SurfaceSamples, gatherer: Gatherer, allowed: Callable[
         if float(each[mine].sum()) < worth:
             continue
         left = few.subset(np.flatnonzero(rest))
-        axis = _turned(axes[k], left, each[rest], gatherer, allowed, spacing)
-        axis = _evened(axis, left, each[rest], gatherer, allowed, even)
-        rest &= ~gatherer.reached(few, axis[None])[:, 0]
+        axis = _turned(axes[k], left, each[rest], coverage, allowed, spacing)
+        axis = _evened(axis, left, each[rest], coverage, allowed, even)
+        rest &= ~coverage.reached(few, axis[None])[:, 0]
         found.append(axis)
     return np.array(found).reshape(-1, 3)
 
 
 def _chosen(got: NDArray[np.bool_], area: F64, worth: float) -> list[int]:
-    """Columns of (n, d) that win the most area less ``worth`` each, exactly; of equals those that come first."""
+    """Columns of (n, d) that win the most area less ``worth`` each, exactly; of equal columns the first."""
     n, d = got.shape
     gain = got.T.astype(np.float64) @ area
     if float(gain.max(initial=0.0)) < worth:
         return []
-    # x: axes taken; y: samples won, each no more than the axes that reach it
+    # x: axes taken; y: samples won, each bounded by the axes that reach it
     price = worth * (1.0 + 1e-6 * np.arange(d) / d)
     cost = np.concatenate([price, -area])
     cover = hstack([csr_matrix(-got.astype(np.float64)), identity(n)])
     limits = [LinearConstraint(cover, -np.inf, 0.0),
-              LinearConstraint(csr_matrix(np.concatenate([np.ones(d), np.zeros(n)])[None]), 0, MOST_AXES)]
+              LinearConstraint(csr_matrix(np.concatenate([np.ones(d), np.zeros(n)])[None]), 0, MAX_AXES)]
     answer = milp(cost, integrality=np.concatenate([np.ones(d), np.zeros(n)]), bounds=Bounds(0, 1), constraints=limits,
                   options={"mip_rel_gap": 0.0})
     if answer.x is None:
-        raise InternalError(f"the choice of tool axes ended without an answer: {answer.message}")
+        raise InternalError(f"the choice of tool axes has no solution: {answer.message}")
     return [int(k) for k in np.flatnonzero(answer.x[:d] > 0.5)]
 
 
-def _turned(axis: F64, samples: SurfaceSamples, area: F64, gatherer: Gatherer,
+def _turned(axis: F64, samples: SurfaceSamples, area: F64, coverage: AxisCoverage,
             allowed: Callable[[F64], NDArray[np.bool_]], spacing: float) -> F64:
-    """The axis, turned to where it wins most of the samples near by."""
-    best, most = axis, float(area @ gatherer.reached(samples, axis[None])[:, 0])
+    """The axis, turned to the direction that wins most of the samples nearby."""
+    best, most = axis, float(area @ coverage.reached(samples, axis[None])[:, 0])
     step = 0.5 * spacing
     ring = np.arange(8) * np.pi / 4
     for _ in range(STEPS):
@@ -145,7 +149,7 @@ def _turned(axis: F64, samples: SurfaceSamples, area: F64, gatherer: Gatherer,
                           axis=1) @ frame
         around = around[(around[:, 2] >= 0.0) & allowed(around)]
         if len(around):
-            won = area @ gatherer.reached(samples, around)
+            won = area @ coverage.reached(samples, around)
             k = int(np.argmax(won))
             if won[k] > most * (1.0 + 1e-9):
                 best, most = around[k], float(won[k])
@@ -153,18 +157,18 @@ def _turned(axis: F64, samples: SurfaceSamples, area: F64, gatherer: Gatherer,
     return np.asarray(best)
 
 
-def _evened(axis: F64, samples: SurfaceSamples, area: F64, gatherer: Gatherer,
+def _evened(axis: F64, samples: SurfaceSamples, area: F64, coverage: AxisCoverage,
             allowed: Callable[[F64], NDArray[np.bool_]], even: Callable[[F64, float], F64]) -> F64:
-    """An axis near by at which the rotary axes stand at round angles, where that wins about as much."""
-    most = float(area @ gatherer.reached(samples, axis[None])[:, 0])
+    """A nearby axis at which the rotary axes stand at round angles, where it wins about as much."""
+    most = float(area @ coverage.reached(samples, axis[None])[:, 0])
     for degrees in ROUND_ANGLES:
         near = even(axis, degrees)
         near = near[(near[:, 2] >= -1e-12) & allowed(near)]
         if len(near):
-            won = area @ gatherer.reached(samples, near)
+            won = area @ coverage.reached(samples, near)
             if won.max() >= AS_GOOD * most:
                 return np.asarray(near[int(np.argmax(won))])
     return axis
 
 
-__all__ = ["Gatherer", "orientations"]
+__all__ = ["AxisCoverage", "orientations"]

@@ -1,16 +1,13 @@
-"""Where a tool assembly can stand, and which surface samples it can touch.
+"""Admissible positions of a tool assembly, and the surface samples it can touch.
 
-One quantity carries everything in three axes: the *tip limit* H(x, y), the lowest
-height of the tool tip over (x, y) at which nothing of the assembly enters the part
-or a fixture. A tip at or above H is safe; the free region of a height z is
-F(z) = {H <= z}, and F grows with z.
+One quantity describes reach in three axes: the *tip limit* H(x, y), the lowest height of the tool tip over (x, y) at
+which nothing of the assembly enters the part or a fixture. A tip at or above H is safe. The free region of a height z
+is F(z) = {H <= z}, and F grows with z.
 
-The cutting part is exact (``geometry.kernels.drop`` on the mesh). Shank and holder
-need no such care: they are looked up on a coarse grid, grown by their clearance and
-by half a cell diagonal, so the look-up is never lower than the truth.
-
-A neck thinner than the cutter never decides: the cutter has passed everywhere the
-neck goes. Source: ALGORITHMS 1, "reach is computed, not guessed".
+The cutting part is exact (``geometry.kernels.drop`` on the mesh). Shank and holder need less precision. A look-up on a
+coarse grid, grown by their clearance and by half a cell diagonal, is never below the true limit. A neck thinner than
+the cutter never decides, since the cutter has passed everywhere the neck goes. Coordinates are those of the access
+frame.
 """
 
 from __future__ import annotations
@@ -32,18 +29,18 @@ from zones.lattice import Lattice
 from zones.machinable_area import LEVEL, SEEN
 from zones.reach.assembly import Clearances, Disc, discs_of
 
-LEVEL_TOLERANCE = 1e-5  # mm: a tip this little below H still counts as standing on it
+LEVEL_TOLERANCE = 1e-5  # mm: a tip within this below H still counts as standing on it
 LOOKUP_STEP = 0.4  # mm, grid of the shank and holder limits
-EDGE_SLACK = 0.01  # mm: a flat bottom is not asked to reach nearer than this to a wall beside the plane
-BELOW = 1.0  # mm: a tip is never asked about farther under the obstacles than this and its own radius
-AIMED = 12  # free nodes a flat bottom is tried towards over a level place
-BEYOND = 3.0  # lattice steps outside the flat: how far these may be
-INSIDE = 1.5e-3  # mm: a flat bottom is not asked to reach nearer than this to its own rim: lines are off by so much
-PLAY_STEPS = 1.42  # lattice steps of sideways play a tool must have beside a wall to be planned there
+EDGE_SLACK = 0.01  # mm: a flat bottom need not reach nearer than this to a wall beside the plane
+BELOW = 1.0  # mm: no query has a tip farther under the obstacles than this plus its own radius
+AIMED = 12  # free nodes towards which a flat bottom is tried over a level place
+BEYOND = 3.0  # lattice steps: largest distance of these nodes outside the flat
+INSIDE = 1.5e-3  # mm: a flat bottom need not reach nearer than this to its own rim, because of the error of lines
+PLAY_STEPS = 1.42  # lattice steps: least sideways play of a tool beside a wall, for it to be planned there
 
 
 class DiscHeights:
-    """How low the underside of a disc gets over one set of obstacles, kept by radius: tools in one holder ask the same.
+    """Lowest height of the underside of a disc over one set of obstacles, cached by radius for tools in one holder.
 
     tree : TriangleTree of the obstacles in the access frame
     """
@@ -53,7 +50,7 @@ class DiscHeights:
         self._kept: dict[float, tuple[Lattice, F64]] = {}
 
     def over(self, lattice: Lattice, radius: float) -> F64:
-        """(ny, nx) float64, mm, over the nodes of a lattice of ``Lattice.on_multiples``; not to be written to."""
+        """(ny, nx) float64, mm, over the nodes of a lattice of ``Lattice.on_multiples``; do not write to it."""
         kept = self._kept.get(radius)
         if kept is not None and (part := lattice.within(kept[0])) is not None:
             return kept[1][part]
@@ -71,9 +68,9 @@ class TipField:
     clear  : Clearances
     bounds : (2, 3) float64, mm, region of interest in plan
     step   : mm, spacing of the planning lattice
-    allowance : mm, material to leave on the part: the cutting part is grown by it all round
-    cusp   : mm, what passes may leave standing above that: shank and holder stay as much higher
-    standing : DiscHeights of the same obstacles that other tools have asked
+    allowance : mm, material to leave on the part: the cutting part is grown by it on all sides
+    cusp   : mm, height that passes may leave above the allowance: shank and holder stay higher by it
+    standing : DiscHeights of the same obstacles, shared with other tools
     """
 
     def __init__(self, tree: TriangleTree, tool: ToolBody, clear: Clearances, bounds: F64, margin: float,
@@ -93,13 +90,13 @@ class TipField:
         for d in (d for d in discs if self._can_meet(d)):
             limit = self.disc_limit(d, self.standing.over(self.coarse, self.disc_radius(d, 0.5)))
             grid = np.maximum(grid, limit)
-        if discs:  # what stands beyond the grid is not known here, so the tool does not go there
+        if discs:  # obstacles beyond the grid are unknown, so the tool does not go there
             for edge in (grid[:1], grid[-1:], grid[:, :1], grid[:, -1:]):
                 edge[:] = np.inf
         return grid
 
     def _can_meet(self, disc: Disc) -> bool:
-        """Whether a disc can get as low as anything stands, with the tip where it is ever asked about.
+        """Whether a disc can come down to the top of the obstacles, at any tip of a query.
 
         A ball that touches the lowest edge from the side has its tip a radius under the obstacles.
         """
@@ -113,11 +110,14 @@ class TipField:
         return disc.radius + self.allowance + diagonals * LOOKUP_STEP * math.sqrt(2.0)
 
     def disc_limit(self, disc: Disc, height: F64) -> F64:
-        """Tip limit for a disc whose underside stands at ``height``, mm."""
+        """Tip limit for a disc, (n,) or (ny, nx) float64, mm. height : the same shape, mm, of the disc's underside."""
         return np.asarray(height + self.allowance + self.cusp - disc.height)
 
     def window(self, lower: F64, upper: F64, step: float) -> TipField:
-        """The same tool over the same obstacles on a lattice of another ``step``, mm, from lower to upper (2,), mm."""
+        """The same tool and obstacles on a lattice of another step.
+
+        lower, upper : (2,) float64, mm, corners in plan; step : mm
+        """
         out = copy.copy(self)
         out.lattice = Lattice.over(np.array([lower, upper]), 0.0, step)
         out._cut = out._height = None
@@ -156,9 +156,10 @@ class TipField:
         return self._height
 
     def rim(self, xy: F64, z: float, reach: float) -> F64:
-        """(k, 2) mm: nodes where the cutting part is free at tip height z, beside one where it is not, near some of xy.
+        """(k, 2) mm: nodes near xy where the cutting part is free at tip height z, next to a node where it is not.
 
-        xy is (n, 2) mm; near is within ``reach`` mm along x and along y. Only the lattice round xy is looked at.
+        xy : (n, 2) float64, mm; near is within ``reach`` mm along x and along y. Only the lattice around xy is
+             searched.
         """
         lat, half = self.lattice, int(math.ceil(reach / self.lattice.step))
         i, j = lat.cells(xy)
@@ -184,7 +185,7 @@ class TipField:
     def off_blocked(self, z: float) -> F64 | None:
         """(ny, nx) float64, mm: distance of each node from the nearest one that is blocked at tip height z, mm.
 
-        None where none is. The last answer is kept, for a layer asks three times.
+        None where no node is blocked. The last result is cached, since each layer uses it three times.
         """
         if self._off[0] != z:
             free = self.height <= z + LEVEL_TOLERANCE
@@ -192,7 +193,7 @@ class TipField:
         return self._off[1]
 
     def tips(self, xy: F64) -> F64:
-        """Tip limit (n,) mm of the whole assembly at xy (n, 2) mm; exact for the cutting part."""
+        """Tip limit of the whole assembly, (n,) float64, mm; exact for the cutting part. xy : (n, 2) float64, mm."""
         xy = np.ascontiguousarray(xy, dtype=np.float64)
         out = drop_tips(self.tree, xy, self.grown_radius, self.grown_corner) + self.allowance
         return np.asarray(np.maximum(out, noncut_lookup(self.noncut, self.coarse_row, xy)))
@@ -203,13 +204,13 @@ class TipField:
         return (self.coarse.x0, self.coarse.y0, self.coarse.step)
 
     def blocked_by_cutter(self, tips: F64) -> NDArray[np.bool_]:
-        """(n,) bool: the cutting part would enter the obstacles at tips (n, 3) mm."""
+        """(n,) bool: the cutting part enters the obstacles at tips. tips : (n, 3) float64, mm."""
         lowered = np.array(tips, dtype=np.float64)
         lowered[:, 2] -= self.allowance
         return blocked_many(self.tree, lowered, self.grown_radius, self.grown_corner)
 
     def blocked_by_body(self, tips: F64) -> NDArray[np.bool_]:
-        """(n,) bool: shank or holder would come nearer than their clearance at tips (n, 3) mm."""
+        """(n,) bool: shank or holder come nearer than their clearance at tips. tips : (n, 3) float64, mm."""
         return np.asarray(noncut_blocked(self.noncut, self.coarse_row, np.ascontiguousarray(tips)))
 
 
@@ -217,13 +218,13 @@ FLAT_RING = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi
 
 
 def contact_tips(tool: ToolBody, points: F64, normals: F64, lift: float) -> F64:
-    """Highest tip at which the cutting profile touches each point moved out along its normal.
+    """Highest tip at which the cutting profile touches each point, offset along its normal.
 
-    points, normals : (n, 3) float64, mm and unit, out of the material
-    lift            : mm, distance along the normal at which contact is asked for
+    points, normals : (n, 3) float64, mm and dimensionless, out of the material, access frame
+    lift            : mm, offset of the contact along the normal
     Returns (n, 3) float64 tips, mm. The contact lies on the torus of the corner: axis at
-    p + r n + (R - r) n_xy/|n_xy|, tip at its height r (n_z - 1) + p_z. Under a flat or bull end a level
-    facet is touched by the whole bottom; there the axis is put over the point.
+    p + r n + (R - r) n_xy/|n_xy|, tip at its height r (n_z - 1) + p_z. The whole bottom of a flat or bull end touches a
+    level facet; there the axis is over the point.
     """
     r, flat = tool.corner_radius, tool.radius - tool.corner_radius
     out = points + normals * (lift + r)
@@ -235,14 +236,14 @@ def contact_tips(tool: ToolBody, points: F64, normals: F64, lift: float) -> F64:
 
 
 def _aimed(field: TipField, points: F64, tip_z: F64, flat: float) -> F64:
-    """Tips (n, k, 3) mm whose flat bottom of radius ``flat`` covers level points (n, 3): towards free nodes near by.
+    """Tips (n, k, 3) mm towards free nodes nearby, whose flat bottom of radius ``flat`` covers level points (n, 3).
 
-    A node that lies under the flat is free as it stands; towards farther ones the tip goes as far as the flat allows.
-    So about one step of the lattice is what can be missed, at the end of a corner of the free region. The last of the k
-    goes towards the middle of those nodes, which is straight away from a straight wall: there nothing is missed.
+    A node under the flat is free without a shift. Towards farther nodes the tip moves as far as the flat allows. So the
+    search can miss about one step of the lattice, at the end of a corner of the free region. The last of the k tips
+    moves towards the middle of those nodes, straight away from a straight wall; there the search misses nothing.
     """
     out = np.repeat(np.column_stack([points[:, :2], tip_z])[:, None], AIMED + 1, axis=1)
-    level = np.round(tip_z, 6)  # a plane that was turned is level but for rounding
+    level = np.round(tip_z, 6)  # a rotated plane is level except for rounding
     for z in np.unique(level):
         mine = np.flatnonzero(level == z)
         rim = field.rim(points[mine, :2], float(z), flat + BEYOND * field.lattice.step)
@@ -258,7 +259,7 @@ def _aimed(field: TipField, points: F64, tip_z: F64, flat: float) -> F64:
 
 def _take(field: TipField, trial: F64, todo: NDArray[np.int64], cutter: NDArray[np.bool_], whole: NDArray[np.bool_],
           tips: F64) -> None:
-    """Keep of trial tips (k, 3) for the samples ``todo`` what is free, in place; those of the whole tool come first."""
+    """Keep the free trial tips (k, 3) for the samples ``todo``, in place; tips free for the whole tool come first."""
     if not len(todo):
         return
     free = ~field.blocked_by_cutter(trial)
@@ -271,30 +272,32 @@ def _take(field: TipField, trial: F64, todo: NDArray[np.int64], cutter: NDArray[
 
 def touchable(field: TipField, points: F64, normals: F64, lift: float,
               play: float = PLAY_STEPS) -> tuple[NDArray[np.bool_], NDArray[np.bool_], F64]:
-    """Which samples the tool can touch within ``lift``, by its cutting part and as a whole assembly.
+    """Samples that the tool can touch within ``lift``, by its cutting part and as a whole assembly.
 
-    play : lattice steps of room to move away from a wall beside it: a channel that fits the tool like a gauge is for
-           the next thinner one
+    points, normals : (n, 3) float64, mm and dimensionless, access frame
+    lift            : mm, distance along the normal within which a touch counts
+    play            : lattice steps of sideways play beside a wall; a channel that just fits the tool is left to the
+                      next thinner one
 
-    A flat bottom is tried over a level place straight, off its middle, and towards free nodes of the lattice near by.
+    Over a level place a flat bottom is tried straight, off its middle, and towards free nodes of the lattice nearby.
 
     Returns
     -------
-    by_cutter  : (n,) bool, the cutting part alone gets there
+    by_cutter  : (n,) bool, the cutting part alone touches the sample
     by_tool    : (n,) bool, shank and holder stay clear as well
-    tips       : (n, 3) float64, mm, the admissible tip; else one at which the cutting part alone gets there; else
-                 the first tried
+    tips       : (n, 3) float64, mm, the admissible tip; else a tip at which the cutting part alone touches; else the
+                 first tried tip
     """
     tips = contact_tips(field.tool, points, normals, lift + field.allowance)
     by_cutter, by_tool = np.zeros(len(points), np.bool_), np.zeros(len(points), np.bool_)
-    seen = np.flatnonzero(normals[:, 2] > SEEN)  # the rest, half of a part, no tool is asked about
+    seen = np.flatnonzero(normals[:, 2] > SEEN)  # no tool can touch the rest, half of a part
     by_cutter[seen], by_tool[seen], tips[seen] = _touched(field, points[seen], normals[seen], tips[seen], play)
     return by_cutter, by_tool, tips
 
 
 def _touched(field: TipField, points: F64, normals: F64, tips: F64,
              play: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_], F64]:
-    """``touchable`` of samples in sight, with the tips to try first."""
+    """``touchable`` for samples in sight, with the tips to try first."""
     tips = tips + [0.0, 0.0, LEVEL_TOLERANCE]
     cutter = ~field.blocked_by_cutter(tips)
     upright = np.flatnonzero(cutter & (np.abs(normals[:, 2]) < 0.5))

@@ -1,4 +1,4 @@
-"""What no tool reaches, for which reason, and which tool would.
+"""Area that no tool reaches, with the reason, and the tool that reaches it.
 
 Nothing here changes a zone.
 """

@@ -1,4 +1,4 @@
-"""What stands above samples, and what fixtures keep tools from: the same questions, asked of the part alone."""
+"""Obstacles above samples, and the reach of the tools over the part alone, without fixtures. Access frame."""
 
 from __future__ import annotations
 
@@ -21,26 +21,27 @@ AIR = 4.0  # mm beside the part, beyond the cutter's radius
 
 
 def above(samples: SurfaceSamples, tree: TriangleTree) -> NDArray[np.int64]:
-    """(n,) int64: the triangle of the tree that stands lowest above each sample, -1 where none does; access frame."""
+    """(n,) int64, index: the lowest triangle of the tree above each sample, -1 where none is; access frame."""
     hit = first_hits(tree, samples.points + SKIN * samples.normals, (0.0, 0.0, 1.0), 1e-4, 1e6)[1]
     return hit.astype(np.int64)
 
 
 def covered(samples: SurfaceSamples, tree: TriangleTree) -> NDArray[np.bool_]:
-    """(n,) bool: something of the tree stands above; access frame."""
+    """(n,) bool: a triangle of the tree lies above the sample; access frame."""
     return above(samples, tree) >= 0
 
 
 def in_sight(samples: SurfaceSamples, tree: TriangleTree) -> NDArray[np.bool_]:
-    """(n,) bool: faces the access, and nothing of the tree stands above; access frame."""
+    """(n,) bool: the sample faces the access, and no triangle of the tree lies above it; access frame."""
     return np.asarray((samples.normals[:, 2] > SEEN) & ~covered(samples, tree))
 
 
 def over_the_part(fields: Mapping[str, TipField], bare: TriangleTree, bounds: F64,
                   clear: Clearances) -> dict[str, TipField]:
-    """Tip limits of the same tools with the fixtures gone.
+    """Tip limits of the same tools without the fixtures.
 
-    bare : TriangleTree of the part alone, access frame; bounds : (2, 3) float64 of the part, mm
+    bare   : TriangleTree of the part alone, access frame
+    bounds : (2, 3) float64, mm, of the part, access frame
     """
     standing = DiscHeights(bare)
     return {t: TipField(bare, f.tool, clear, bounds, f.tool.radius + AIR, lattice_step(f.tool), f.allowance, f.cusp,

@@ -1,10 +1,15 @@
-"""What no tool of the setup reaches, why, and which tool would.
+"""The remainder: area that no tool of the setup reaches, with the reason and the tool that reaches it.
 
-A sample nobody took is asked, in this order: is something of the part above it (undercut), or a fixture; can a tool at
-hand touch it after all (then it was too little for a zone, or no pass got there); could one if the fixtures were gone
-(fixture); could a cutter of the setup touch it if shank and holder were out of the way (then how much longer a tool it
-needs); would a thinner ball or a sharp-cornered end fit (then how thick it may be). What is left after that is a corner
-no rotating tool makes. With several accesses each is asked, and the one counts along which least is in the way.
+For each sample without a zone these checks follow in order:
+
+1. Material of the part above it gives 'undercut', a fixture above it gives 'fixture'.
+2. A tool at hand touches it: the area is too small for a zone, or no pass gets there ('pass').
+3. A tool at hand touches it without the fixtures ('fixture').
+4. A cutter of the setup touches it without shank and holder; the result is the length of the tool it needs.
+5. A thinner ball or a sharp-cornered end fits; the result is its largest diameter.
+
+The rest are corners that no rotating tool makes. With several accesses all are checked, and the access with the least
+obstruction counts.
 """
 
 from __future__ import annotations
@@ -24,28 +29,28 @@ from zones.reach.access_view import View
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import TipField
 from zones.remainder.obstructions import above, covered
-from zones.remainder.tool_catalogue import MOST_SLENDER
-from zones.remainder.tool_requirements import DOES, Buyer, Cutter
+from zones.remainder.tool_catalogue import MAX_SLENDERNESS
+from zones.remainder.tool_requirements import DOES, CuttingPart, ToolRequirement
 from zones.zoning.zones import LEAST_ZONE_MM2
 
-ASKED_AT_MOST = 6000  # samples that are asked one by one; their areas are scaled so that they stand for all
-# how much is in the way of a sample along an access direction, least first; 'undercut ...' comes last
+MAX_SAMPLES = 6000  # samples to check one by one; their areas are scaled so that they represent all
+# degree of obstruction of a sample along an access direction, least first; 'undercut ...' comes last
 GRAVITY = {"pass": 0, "holder": 1, "shank": 2, "fixture": 3, "gap": 4, "corner": 5, "sharp corner": 6}
 NO_PASS, TOO_LITTLE = "no pass gets there", "less than a zone is made of"
 
 
 @dataclass(frozen=True)
-class Remainder:
-    """Area of one region that stays, for one reason, and the one tool that would do.
+class RemainderEntry:
+    """Area of one region that remains for one reason, and the one tool that reaches it.
 
     faces        : face numbers; area : mm²
     reason       : 'undercut', 'undercut behind connection C2', 'fixture', 'shank', 'holder', 'gap', 'corner',
                    'sharp corner' or 'pass'
-    would_need   : the tool that would do, or what else would; empty where no tool would
+    would_need   : the tool or other measure that reaches it; empty where none does
     at           : a point of it, mm
-    tool_at_hand : id of the tool of the setup that touches it ('pass'), or would without the fixtures; else ''
-    why_left     : of 'pass', why that tool was not used; else ''
-    samples      : those that were asked, frame of the first view; their areas sum to ``area``
+    tool_at_hand : id of the tool of the setup that touches it ('pass'), or touches it without the fixtures; else ''
+    why_left     : for 'pass', why that tool was not used; else ''
+    samples      : the checked samples, frame of the first view; their areas sum to ``area``
     """
 
     faces: tuple[int, ...]
@@ -60,8 +65,11 @@ class Remainder:
 
 @dataclass(frozen=True, eq=False)
 class _Why:
-    """Of n samples: reason, tool at hand and why that was not used (objects, ''), stoutest Cutter (object, None) and
-    its neck in diameters, and the place of the view (n,) these were found in."""
+    """Results for n samples.
+
+    Reason, tool at hand and why it was not used (objects, ''), stoutest CuttingPart (object, None) and its neck in
+    diameters, and the index of the view (n,) of these results.
+    """
 
     reason: NDArray[np.object_]
     tool: NDArray[np.object_]
@@ -72,50 +80,50 @@ class _Why:
 
     @classmethod
     def blank(cls, n: int, view: int) -> _Why:
-        """Nothing known yet, in a view."""
+        """Empty results for a view."""
         reason, tool, left = (np.full(n, "", dtype=object) for _ in range(3))
         return cls(reason, tool, left, np.full(n, None, dtype=object), np.full(n, np.inf), np.full(n, view))
 
     def take(self, other: _Why, rows: NDArray[np.int64]) -> None:
-        """What the other knows of some rows (k,)."""
+        """Take the results of another for some rows (k,)."""
         for name in ("reason", "tool", "left", "cutter", "slenderness", "view"):
             getattr(self, name)[rows] = getattr(other, name)[rows]
 
     def key(self, row: int) -> tuple[str, ...]:
-        """What samples must share to be one entry: a ball and a flat end are two tools to buy."""
+        """Key that the samples of one entry share; a ball and a flat end are two tools to buy."""
         c = self.cutter[row]
         kind = "" if c is None else c.like if c.at_hand else "ball" if c.corner > 0 else "flat"
-        sold = str(bool(self.slenderness[row] <= MOST_SLENDER))
+        sold = str(bool(self.slenderness[row] <= MAX_SLENDERNESS))
         return str(self.reason[row]), str(self.tool[row]), str(self.left[row]), kind, sold, str(self.view[row])
 
 
 def explain(samples: SurfaceSamples, labels: Labels, views: Sequence[View], decomposition: Decomposition, lift: float,
-            given_up: NDArray[np.bool_] | None = None, *, clear: Clearances | None = None) -> list[Remainder]:
-    """Group samples that stay by region and reason.
+            given_up: NDArray[np.bool_] | None = None, *, clear: Clearances | None = None) -> list[RemainderEntry]:
+    """Group the remaining samples by region and reason.
 
     samples  : SurfaceSamples that no proved pass covers, mm, frame of the first view
     labels   : their regions
     views    : the access directions with the tools at hand
     lift     : mm, distance along the normal within which a touch counts
-    given_up : (n,) bool, samples a tool could touch but no pass of the plan does
-    clear    : Clearances of the setup; the usual ones where None
+    given_up : (n,) bool, samples that a tool can touch but no pass of the plan does
+    clear    : Clearances of the setup; the defaults where None
 
     Returns
     -------
-    list of Remainder
+    list of RemainderEntry
         Largest area first; areas sum to that of the samples.
     """
     n = len(samples)
     if not n:
         return []
     rng = np.random.default_rng(7)
-    asked = np.sort(rng.choice(n, ASKED_AT_MOST, replace=False)) if n > ASKED_AT_MOST else np.arange(n)
-    few = samples.subset(asked)
+    examined = np.sort(rng.choice(n, MAX_SAMPLES, replace=False)) if n > MAX_SAMPLES else np.arange(n)
+    few = samples.subset(examined)
     few = replace(few, area=few.area * (float(samples.area.sum()) / max(float(few.area.sum()), 1e-12)))
-    buyers = [Buyer(v, lift, clear or Clearances()) for v in views]
-    why = _of_views(few, buyers, decomposition)
+    requirements = [ToolRequirement(v, lift, clear or Clearances()) for v in views]
+    why = _of_views(few, requirements, decomposition)
     if given_up is not None:
-        lost = given_up[asked]
+        lost = given_up[examined]
         why.left[lost & (why.reason == "pass")] = NO_PASS
         lost &= np.isin(why.reason, ("gap", "corner", "sharp corner"))
         blank = _Why.blank(len(few), 0)
@@ -123,24 +131,25 @@ def explain(samples: SurfaceSamples, labels: Labels, views: Sequence[View], deco
         why.take(blank, np.flatnonzero(lost))
     groups: dict[tuple[str, ...], list[int]] = {}
     for row in range(len(few)):
-        groups.setdefault((labels.regions[labels.code[asked[row]]].base, *why.key(row)), []).append(row)
+        groups.setdefault((labels.regions[labels.code[examined[row]]].base, *why.key(row)), []).append(row)
     out = [_entry(few, why, rows, need) for members in groups.values()
-           for rows, need in _needs(few, why, np.array(members), buyers)]
+           for rows, need in _needs(few, why, np.array(members), requirements)]
     return sorted(out, key=lambda r: (-r.area, r.reason, r.faces))
 
 
-def _entry(few: SurfaceSamples, why: _Why, rows: NDArray[np.int64], need: dict[str, object]) -> Remainder:
+def _entry(few: SurfaceSamples, why: _Why, rows: NDArray[np.int64], need: dict[str, object]) -> RemainderEntry:
     mine, one = few.subset(rows), rows[0]
-    return Remainder(tuple(int(f) for f in np.unique(mine.face)), float(mine.area.sum()), str(why.reason[one]), need,
+    return RemainderEntry(tuple(int(f) for f in np.unique(mine.face)), float(mine.area.sum()), str(why.reason[one]),
+    need,
                      tuple(mine.points[len(rows) // 2].tolist()), str(why.tool[one]), str(why.left[one]), mine)
 
 
 def _needs(few: SurfaceSamples, why: _Why, rows: NDArray[np.int64],
-           buyers: Sequence[Buyer]) -> Iterator[tuple[NDArray[np.int64], dict[str, object]]]:
-    """Samples of one group by the tool that would do, with that tool."""
+           requirements: Sequence[ToolRequirement]) -> Iterator[tuple[NDArray[np.int64], dict[str, object]]]:
+    """Samples of one group by the tool that reaches them, with that tool."""
     reason, tool, at = str(why.reason[rows[0]]), str(why.tool[rows[0]]), int(why.view[rows[0]])
-    buyer = buyers[at]
-    access: dict[str, object] = {"access": buyer.view.id} if len(buyers) > 1 else {}
+    requirement = requirements[at]
+    access: dict[str, object] = {"access": requirement.view.id} if len(requirements) > 1 else {}
     if reason.startswith("undercut"):
         yield rows, {"kind": "other access"}
     elif reason == "fixture":
@@ -148,45 +157,45 @@ def _needs(few: SurfaceSamples, why: _Why, rows: NDArray[np.int64],
     elif why.cutter[rows[0]] is None or tool:
         yield rows, {}
     else:
-        turn = buyers[0].view.rotation @ buyer.view.rotation.T
+        turn = requirements[0].view.rotation @ requirement.view.rotation.T
         here = few if at == 0 else replace(few, points=few.points @ turn, normals=few.normals @ turn)
-        if why.slenderness[rows[0]] <= MOST_SLENDER:  # of all or of none in a group
-            for mine, need in _bought(few, here, why, rows, buyer):
+        if why.slenderness[rows[0]] <= MAX_SLENDERNESS:  # the same for all samples of a group
+            for mine, need in _bought(few, here, why, rows, requirement):
                 yield mine, {**need, **access} if need else {}
         else:
             slender = round(float(why.slenderness[rows].min()), 1)
             yield rows, {"kind": "other process", "slenderness": slender, **access}
 
 
-def _bought(few: SurfaceSamples, here: SurfaceSamples, why: _Why, rows: NDArray[np.int64],
-            buyer: Buyer) -> Iterator[tuple[NDArray[np.int64], dict[str, object]]]:
-    """Samples of one group by the tool to buy, with that tool; ``here`` in the frame of the buyer.
+def _bought(few: SurfaceSamples, turned: SurfaceSamples, why: _Why, rows: NDArray[np.int64],
+            requirement: ToolRequirement) -> Iterator[tuple[NDArray[np.int64], dict[str, object]]]:
+    """Samples of one group by the tool to buy, with that tool; ``turned`` in the frame of the requirement.
 
-    Where one that was picked for several does for less than half of them, each is asked for the cutter of its own; {}
-    where that one does for less than half as well.
+    Where a tool picked for several samples suffices for less than half of them, each gets its own cutter. The dict is
+    empty where that cutter suffices for less than half as well.
     """
     for mine, cutter in _stoutest(few, why, rows):
-        need = buyer.named(cutter, here.subset(mine))
+        need = requirement.named(cutter, turned.subset(mine))
         own = _cutters(why, mine)
         if need or len(own) == 1:
             yield mine, need
             continue
         for cutter in own:
             of = mine[why.cutter[mine] == cutter]
-            yield of, buyer.named(cutter, here.subset(of))
+            yield of, requirement.named(cutter, turned.subset(of))
 
 
-def _cutters(why: _Why, rows: NDArray[np.int64]) -> list[Cutter]:
+def _cutters(why: _Why, rows: NDArray[np.int64]) -> list[CuttingPart]:
     """The cutters noted for some samples, stout to thin."""
     return sorted(set(why.cutter[rows]), key=lambda c: -c.diameter)
 
 
 def _stoutest(few: SurfaceSamples, why: _Why,
-              rows: NDArray[np.int64]) -> Iterator[tuple[NDArray[np.int64], Cutter]]:
-    """Samples by cutter: the stoutest that does for half of the area, then the same of the rest while that is worth it.
+              rows: NDArray[np.int64]) -> Iterator[tuple[NDArray[np.int64], CuttingPart]]:
+    """Samples by cutter: the stoutest that suffices for half of the area, then the same for the rest while it pays.
 
-    Where none does for half, the one that does for most. What a cutter touches a thinner one of its kind touches too,
-    but the neck has to be as long, and a thin cutter is not sold on it.
+    Where none suffices for half, the cutter for the largest area counts. A thinner cutter of one kind touches all
+    that a thicker one touches, but needs a neck of the same length, on which thin cutters are not sold.
     """
     while len(rows):
         d = np.array([why.cutter[k].diameter for k in rows])
@@ -201,25 +210,25 @@ def _stoutest(few: SurfaceSamples, why: _Why,
         rows = rows[~mine]
 
 
-def _of_views(few: SurfaceSamples, buyers: Sequence[Buyer], decomposition: Decomposition) -> _Why:
-    """What is known of each sample along the view in which least is in its way.
+def _of_views(few: SurfaceSamples, requirements: Sequence[ToolRequirement], decomposition: Decomposition) -> _Why:
+    """Results for each sample along the view with the least obstruction.
 
     few : in the frame of the first view
     """
     out, gravity = _Why.blank(len(few), 0), np.full(len(few), np.inf)
-    first = buyers[0].view
-    for k, buyer in enumerate(buyers):
-        turn = first.rotation @ buyer.view.rotation.T
+    first = requirements[0].view
+    for k, requirement in enumerate(requirements):
+        turn = first.rotation @ requirement.view.rotation.T
         here = few if k == 0 else replace(few, points=few.points @ turn, normals=few.normals @ turn)
-        found = _reasons(here, buyer, decomposition, k)
+        found = _reasons(here, requirement, decomposition, k)
         how = np.array([GRAVITY.get(str(w), len(GRAVITY)) for w in found.reason])
         out.take(found, np.flatnonzero(how < gravity))
         gravity = np.minimum(gravity, how)
     return out
 
 
-def _reasons(few: SurfaceSamples, buyer: Buyer, decomposition: Decomposition, place: int) -> _Why:
-    view = buyer.view
+def _reasons(few: SurfaceSamples, requirement: ToolRequirement, decomposition: Decomposition, place: int) -> _Why:
+    view = requirement.view
     part, n = view.part, len(few)
     out = _Why.blank(n, place)
     reason = out.reason
@@ -228,22 +237,23 @@ def _reasons(few: SurfaceSamples, buyer: Buyer, decomposition: Decomposition, pl
     for k in np.flatnonzero((few.normals[:, 2] <= SEEN) | (roof >= 0)):
         c = owner.get(int(part.mesh.face_ids[roof[k]])) if roof[k] >= 0 else None
         reason[k] = f"undercut behind connection {c}" if c and c != owner.get(int(few.face[k])) else "undercut"
-    if buyer.clamped:
+    if requirement.clamped:
         reason[covered(few, view.obstacles) & (reason == "")] = "fixture"
-    _at_hand(few, view.fields, buyer, out, "pass")
+    _at_hand(few, view.fields, requirement, out, "pass")
     out.left[reason == "pass"] = TOO_LITTLE
-    if buyer.clamped and bool((reason == "").any()):  # these limits are dear
-        _at_hand(few, buyer.unclamped, buyer, out, "fixture")
+    if requirement.clamped and bool((reason == "").any()):  # these limits are dear
+        _at_hand(few, requirement.unclamped, requirement, out, "fixture")
     left = np.flatnonzero(reason == "")
-    wants = buyer.wants(few.subset(left))
+    wants = requirement.wants(few.subset(left))
     reason[left], out.cutter[left], out.slenderness[left] = wants.reason, wants.cutter, wants.slenderness
     reason[reason == ""] = "sharp corner"
     return out
 
 
-def _at_hand(few: SurfaceSamples, fields: Mapping[str, TipField], buyer: Buyer, out: _Why, word: str) -> None:
-    """Give ``word`` to samples without a reason that one of these tools touches, and note the stoutest such tool."""
+def _at_hand(few: SurfaceSamples, fields: Mapping[str, TipField], requirement: ToolRequirement, out: _Why,
+             word: str) -> None:
+    """Set ``word`` as the reason of open samples that one of these tools touches, and note the stoutest such tool."""
     left = np.flatnonzero(out.reason == "")
-    tool = buyer.touched_by(few.subset(left), fields)
+    tool = requirement.touched_by(few.subset(left), fields)
     out.tool[left] = tool
     out.reason[left[tool != ""]] = word

@@ -1,8 +1,8 @@
 """The smallest change of the tool set that empties the remainder, as one list of tools.
 
-Every cutter of a fixed grid, and every cutter at hand, is asked which samples it touches if nothing but the cutting
-part counts, and how long its neck and stickout must be there. That gives candidates of catalogue lengths, each with
-the samples it takes, and the list is a minimum set cover, solved exactly. Theory: docs/theory/tools.md.
+For every cutter of a fixed grid and every cutter at hand, two things are computed: the samples that its cutting part
+alone touches, and the lengths of neck and stickout it needs there. This gives candidates of catalogue lengths, each
+with the samples it takes. The list is a minimum set cover, solved exactly. Theory: docs/theory/tools.md.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ from scipy.sparse import csr_matrix, hstack, identity
 from geometry.errors import InternalError
 from geometry.mesh import F64
 from geometry.sampling import SurfaceSamples
-from geometry.tool_body import HolderSegment, ToolBody
+from geometry.tool_body import HolderFrustum, ToolBody
 from zones.remainder.obstructions import covered, in_sight
-from zones.remainder.tool_catalogue import BULL_CORNER, DIAMETERS, MOST_SLENDER, nearest
-from zones.remainder.tool_requirements import Buyer, Cutter
+from zones.remainder.tool_catalogue import BULL_CORNER, DIAMETERS, MAX_SLENDERNESS, nearest
+from zones.remainder.tool_requirements import CuttingPart, ToolRequirement
 from zones.zoning.zones import LEAST_ZONE_MM2
 
-ASKED_AT_MOST = 2000
+MAX_SAMPLES = 2000
 SEED = 11
-LEVELS = 8  # neck lengths tried for one cutter
-# weights of the ties, in tools: total slenderness, then a cutter that is not at hand, then thickness
+LEVELS = 8  # neck lengths to try for one cutter
+# weights that decide ties, in tools: total slenderness, then a cutter that is not at hand, then thickness
 PER_SLENDER, PER_NEW, PER_STOUT = 1e-2, 1e-3, 1e-4
 
 
 @dataclass(frozen=True)
-class ProposedTool:
+class ToolToAdd:
     """A tool to add, lengths mm from the tip.
 
-    instead_of : id of the tool at hand that has the same cutter and a shorter neck or stickout, '' where none has
-    holder_of  : id of the tool at hand whose shank and holder it was measured with
+    instead_of : id of the tool at hand with the same cutter and a shorter neck or stickout, '' where there is none
+    holder_of  : id of the tool at hand whose shank and holder were used
     """
 
     kind: str
@@ -49,34 +49,34 @@ class ProposedTool:
     instead_of: str
     holder_of: str
 
-    def body(self, id: str, number: int, holder: tuple[HolderSegment, ...]) -> ToolBody:
+    def body(self, id: str, number: int, holder: tuple[HolderFrustum, ...]) -> ToolBody:
         """The tool as a ToolBody in a given holder."""
         return ToolBody(id, number, self.diameter_mm, self.corner_radius_mm, self.flute_length_mm,
                         self.neck_diameter_mm, self.neck_length_mm, self.shank_diameter_mm, self.stickout_mm, holder)
 
 
 @dataclass(frozen=True, eq=False)
-class Proposal:
-    """What to add, and what is known of the samples that were asked.
+class ToolProposal:
+    """The tools to add, and the verdict on each examined sample.
 
     tools : stoutest first
-    asked : (n,) int64, rows of the samples that were asked
-    why   : (n,) str of each of these: 'taken' where a tool of the list takes it; else why it stays: 'undercut', 'pass'
-            (a tool at hand touches it), 'slender' (only a neck longer than the limit in diameters does), 'sharp corner'
-            (no round tool), 'too little' (not worth a tool), 'fixture' (one stands above it, or keeps the tools at
-            hand from it that touch it on the bare part)
+    rows  : (n,) int64, index of the samples that were examined
+    why   : (n,) str of each of these: 'taken' where a tool of the list takes it, else the reason why it remains:
+            'undercut', 'pass' (a tool at hand touches it), 'slender' (only a neck longer than the limit in diameters
+            reaches it), 'sharp corner' (no round tool), 'too little' (not worth a tool), 'fixture' (a fixture lies
+            above it, or blocks the tools at hand that touch it on the bare part)
     """
 
-    tools: tuple[ProposedTool, ...]
-    asked: NDArray[np.int64]
+    tools: tuple[ToolToAdd, ...]
+    rows: NDArray[np.int64]
     why: NDArray[np.object_]
 
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
-    """A tool with the samples it would take; need (k, 2): neck length and stickout each of them asks for, mm."""
+    """A tool with the samples it takes; need (k, 2): neck length and stickout that each of them needs, mm."""
 
-    cutter: Cutter
+    cutter: CuttingPart
     body: ToolBody
     rows: NDArray[np.int64]
     need: F64
@@ -86,26 +86,26 @@ class _Candidate:
         return self.body.neck_length / self.body.diameter
 
 
-def propose(samples: SurfaceSamples, buyer: Buyer) -> Proposal:
-    """Fewest tools that take what no tool at hand does.
+def propose(samples: SurfaceSamples, requirement: ToolRequirement) -> ToolProposal:
+    """Fewest tools that take the samples that no tool at hand takes.
 
-    samples : SurfaceSamples of the remainder, mm, access frame
-    buyer   : Buyer of the access
+    samples     : SurfaceSamples of the remainder, mm, access frame
+    requirement : ToolRequirement of the access
 
     Notes
     -----
-    Of more than 2000 samples 2000 are asked, drawn with a fixed seed, and stand for the rest.
+    Of more than 2000 samples, 2000 are drawn with a fixed seed and represent the rest.
     """
     n = len(samples)
     if not n:
-        return Proposal((), np.zeros(0, np.int64), np.zeros(0, object))
+        return ToolProposal((), np.zeros(0, np.int64), np.zeros(0, object))
     rng = np.random.default_rng(SEED)
-    asked = np.sort(rng.choice(n, ASKED_AT_MOST, replace=False)) if n > ASKED_AT_MOST else np.arange(n)
-    few = samples.subset(asked)
+    rows = np.sort(rng.choice(n, MAX_SAMPLES, replace=False)) if n > MAX_SAMPLES else np.arange(n)
+    few = samples.subset(rows)
     area = few.area * (float(samples.area.sum()) / max(float(few.area.sum()), 1e-300))
-    why = _known(few, buyer)
+    why = _known(few, requirement)
     left = np.flatnonzero(why == "")
-    candidates, why[left] = _candidates(few.subset(left), buyer)
+    candidates, why[left] = _candidates(few.subset(left), requirement)
     tools = []
     for c in sorted(_fewest(candidates, np.where(why[left] == "tool", area[left], 0.0)),
                     key=lambda c: (-c.body.diameter, c.body.neck_length)):
@@ -114,53 +114,53 @@ def propose(samples: SurfaceSamples, buyer: Buyer) -> Proposal:
             why[left[c.rows[mine]]] = "taken"
             tools.append(_named(c, c.need[mine]))
     why[why == "tool"] = "too little"
-    if buyer.clamped:
+    if requirement.clamped:
         rest = np.flatnonzero(np.isin(why, ("slender", "sharp corner")))
-        why[rest[buyer.touched_by(few.subset(rest), buyer.unclamped) != ""]] = "fixture"
-    return Proposal(tuple(tools), asked, why)
+        why[rest[requirement.touched_by(few.subset(rest), requirement.unclamped) != ""]] = "fixture"
+    return ToolProposal(tuple(tools), rows, why)
 
 
-def _known(few: SurfaceSamples, buyer: Buyer) -> NDArray[np.object_]:
-    """Reason of the samples no new tool is asked for: out of sight or covered, or touched by a tool at hand."""
-    view = buyer.view
+def _known(few: SurfaceSamples, requirement: ToolRequirement) -> NDArray[np.object_]:
+    """Reason of the samples that need no new tool: out of sight or covered, or touched by a tool at hand."""
+    view = requirement.view
     why = np.full(len(few), "", dtype=object)
-    if buyer.clamped:
+    if requirement.clamped:
         why[covered(few, view.obstacles)] = "fixture"
     why[~in_sight(few, view.tree)] = "undercut"
     open_to = np.flatnonzero(why == "")
-    why[open_to[buyer.touched_by(few.subset(open_to), view.fields) != ""]] = "pass"
+    why[open_to[requirement.touched_by(few.subset(open_to), view.fields) != ""]] = "pass"
     return why
 
 
-def _cutters(buyer: Buyer) -> list[Cutter]:
-    """What is asked, stout to thin: the cutters at hand and those of the series."""
-    tools = list(buyer.tools.values())
-    out = [Cutter(t.diameter, t.corner_radius, t.id, True) for t in tools]
+def _cutters(requirement: ToolRequirement) -> list[CuttingPart]:
+    """The cutters to try, stout to thin: those at hand and those of the series."""
+    tools = list(requirement.tools.values())
+    out = [CuttingPart(t.diameter, t.corner_radius, t.id, True) for t in tools]
     have = {(c.diameter, c.corner) for c in out}
     for d in DIAMETERS:
-        if 0.5 * d <= buyer.cusp:  # such a tool cannot keep its cusp below its own radius, and no setup takes it
+        if 0.5 * d <= requirement.cusp:  # the cusp would exceed the radius of such a tool, and no setup allows it
             continue
         like = nearest(tools, d).id
-        out += [Cutter(d, corner, like, False) for corner in (d / 2, 0.0, round(BULL_CORNER * d, 6))
+        out += [CuttingPart(d, corner, like, False) for corner in (d / 2, 0.0, round(BULL_CORNER * d, 6))
                 if (d, corner) not in have]
     return sorted(out, key=lambda c: (-c.diameter, -c.corner, c.like))
 
 
-def _candidates(samples: SurfaceSamples, buyer: Buyer) -> tuple[list[_Candidate], NDArray[np.object_]]:
-    """Every tool that takes some of the samples, and of each sample 'tool', 'slender' or 'sharp corner'."""
+def _candidates(samples: SurfaceSamples, requirement: ToolRequirement) -> tuple[list[_Candidate], NDArray[np.object_]]:
+    """Every tool that takes some of the samples, and for each sample 'tool', 'slender' or 'sharp corner'."""
     why = np.full(len(samples), "sharp corner", dtype=object)
     out: list[_Candidate] = []
-    for cutter in _cutters(buyer):
-        rows, tips = buyer.touches(cutter, samples)
-        need = buyer.need(cutter, tips)
+    for cutter in _cutters(requirement):
+        rows, tips = requirement.touches(cutter, samples)
+        need = requirement.need(cutter, tips)
         short = cutter.sold_on(need[:, 0])
         why[rows[~short & (why[rows] != "tool")]] = "slender"
         why[rows[short]] = "tool"
-        out.extend(_levels(cutter, buyer.body(cutter), rows[short], need[short]))
+        out.extend(_levels(cutter, requirement.body(cutter), rows[short], need[short]))
     return out, why
 
 
-def _levels(cutter: Cutter, body: ToolBody, rows: NDArray[np.int64], need: F64) -> list[_Candidate]:
+def _levels(cutter: CuttingPart, body: ToolBody, rows: NDArray[np.int64], need: F64) -> list[_Candidate]:
     """The cutter on necks of several lengths, each with the samples it is long enough for."""
     if not len(rows):
         return []
@@ -176,10 +176,10 @@ def _levels(cutter: Cutter, body: ToolBody, rows: NDArray[np.int64], need: F64) 
 
 
 def _fewest(candidates: list[_Candidate], area: F64) -> list[_Candidate]:
-    """Candidates that together take most with fewest tools: a set cover in which leaving a least zone costs a tool.
+    """Candidates that take most with the fewest tools: a set cover in which an open area of a least zone costs a tool.
 
-    No tool that gains less is proposed: zones would not use it either. Samples that the same candidates take are one
-    row. Solved exactly by HiGHS (branch and bound).
+    A tool that gains less is not proposed, since zones do not use it either. Samples that the same candidates take are
+    one row. HiGHS solves the problem exactly (branch and bound).
     """
     if not candidates or not float(area.sum()) > 0.0:
         return []
@@ -197,20 +197,20 @@ def _fewest(candidates: list[_Candidate], area: F64) -> list[_Candidate]:
     diameters = np.array([candidates[j].body.diameter for j in useful])
     slender = np.array([candidates[j].slenderness for j in useful])
     new = np.array([not candidates[j].cutter.at_hand for j in useful])
-    price = 1.0 + PER_SLENDER * slender / MOST_SLENDER + PER_NEW * new - PER_STOUT * diameters / max(DIAMETERS)
+    price = 1.0 + PER_SLENDER * slender / MAX_SLENDERNESS + PER_NEW * new - PER_STOUT * diameters / max(DIAMETERS)
     rows = hstack([csr_matrix(kinds.astype(np.float64)), identity(len(kinds))], format="csr")
     answer = milp(np.concatenate([price, worth]), constraints=LinearConstraint(rows, lb=1.0),
                   integrality=np.concatenate([np.ones(len(useful)), np.zeros(len(kinds))]),
                   bounds=Bounds(0.0, 1.0), options={"mip_rel_gap": 0.0, "presolve": True})
-    if answer.x is None:  # leaving everything is always allowed, so there is an answer
+    if answer.x is None:  # an empty choice is always allowed, so there is a solution
         raise InternalError(f"no set of tools was found: {answer.message}", code="cover_failed")
     return [candidates[useful[j]] for j in np.flatnonzero(answer.x[:len(useful)] > 0.5)]
 
 
-def _named(c: _Candidate, need: F64) -> ProposedTool:
-    """The candidate, no longer than the samples it takes ask for."""
+def _named(c: _Candidate, need: F64) -> ToolToAdd:
+    """The candidate with the least lengths that the samples it takes need."""
     t = c.body
     neck, stickout = (float(v) for v in need.max(axis=0))
-    return ProposedTool(t.kind, t.diameter, round(t.corner_radius, 6), round(min(t.flute_length, neck), 6),
+    return ToolToAdd(t.kind, t.diameter, round(t.corner_radius, 6), round(min(t.flute_length, neck), 6),
                         round(t.neck_diameter, 6), neck, t.shank_diameter, stickout,
                         c.cutter.like if c.cutter.at_hand else "", c.cutter.like)

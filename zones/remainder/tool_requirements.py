@@ -1,6 +1,6 @@
-"""Which tool would do where none at hand does, in sizes that are sold, and whether it really does.
+"""The tool that reaches samples where no tool at hand does, in sizes on sale, checked on the samples.
 
-Asked of one access direction, against part and fixtures together. Theory: docs/theory/zones.md, remainder.
+It holds for one access direction, with part and fixtures as obstacles. Theory: docs/theory/zones.md, remainder.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from zones.reach.access_view import View
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField, touchable
 from zones.remainder.obstructions import over_the_part
-from zones.remainder.tool_catalogue import DIAMETERS, MOST_SLENDER, Lengths, catalogue, nearest, sold
+from zones.remainder.tool_catalogue import DIAMETERS, MAX_SLENDERNESS, Lengths, catalogue, nearest, sold
 
-ALL_BUT = 0.98  # of the samples a named tool is long enough for; one more may ask for a neck of twice the length
-DOES = 0.5  # of the area of an entry, the least a tool named for it takes
-GAP = 1.5  # times the thinnest cutter: what lies nearer ahead makes it a gap
+ALL_BUT = 0.98  # of the samples: share that a named tool is long enough for; the rest may need a neck twice as long
+DOES = 0.5  # of the area of an entry: least share that its named tool takes
+GAP = 1.5  # times the thinnest cutter: material nearer ahead makes the place a gap
 
 
 @dataclass(frozen=True)
-class Cutter:
-    """A cutting part, mm, of a tool at hand (``at_hand``, named by ``like``) or new in the holder of that one."""
+class CuttingPart:
+    """A cutting part, mm, of a tool at hand (``at_hand``, id ``like``), or new in the holder of tool ``like``."""
 
     diameter: float
     corner: float
@@ -40,21 +40,21 @@ class Cutter:
     at_hand: bool
 
     def sold_on(self, neck: F64) -> NDArray[np.bool_]:
-        """(k,) bool: such a cutter is sold on necks of these lengths (k,), mm."""
-        return np.asarray(neck <= MOST_SLENDER * self.diameter + 1e-9)
+        """(k,) bool: such a cutter is sold on necks of these lengths. neck : (k,) float64, mm."""
+        return np.asarray(neck <= MAX_SLENDERNESS * self.diameter + 1e-9)
 
 
 @dataclass(frozen=True, eq=False)
-class Wants:
-    """Of n samples: reason (object, '' where unknown), stoutest Cutter (object, None), its neck in diameters (n,)."""
+class CutterNeeds:
+    """For n samples: reason (object, '' where unknown), stoutest CuttingPart (object, None), neck in diameters (n,)."""
 
     reason: NDArray[np.object_]
     cutter: NDArray[np.object_]
     slenderness: F64
 
 
-class Buyer:
-    """Tools for what one view leaves.
+class ToolRequirement:
+    """Tools that the remainder of one view needs. Points are float64 in the access frame of the view.
 
     view  : View with the tools at hand
     lift  : mm, distance along the normal within which a touch counts
@@ -72,11 +72,11 @@ class Buyer:
 
     @cached_property
     def unclamped(self) -> dict[str, TipField]:
-        """Tip limits of the tools at hand with the fixtures gone."""
+        """Tip limits of the tools at hand without the fixtures."""
         return over_the_part(self.view.fields, self.view.tree, self.view.part.bounds, self.clear)
 
     def touched_by(self, samples: SurfaceSamples, fields: Mapping[str, TipField]) -> NDArray[np.object_]:
-        """(n,) id of the stoutest of the tools, whole, that touches each and can finish it; '' where none does."""
+        """(n,) object array: id of the stoutest whole tool that touches and can finish each sample, '' where none."""
         out = np.full(len(samples), "", dtype=object)
         for t in sorted(fields, key=lambda t: (-fields[t].tool.diameter, t)):
             left = np.flatnonzero(out == "")
@@ -85,16 +85,18 @@ class Buyer:
             out[left[got & able(fields[t].tool, normals, self.cusp)]] = t
         return out
 
-    def body(self, cutter: Cutter) -> ToolBody:
-        """The tool with the lengths of the one it goes with."""
+    def body(self, cutter: CuttingPart) -> ToolBody:
+        """The tool with the lengths of its companion at hand."""
         like = self.tools[cutter.like]
         return like if cutter.at_hand else sold(like, cutter.diameter, cutter.corner)
 
-    def need(self, cutter: Cutter, tips: F64) -> F64:
-        """Neck length and stickout (k, 2), mm, the tool has to have at tips (k, 3), mm, where its cutting part fits.
+    def need(self, cutter: CuttingPart, tips: F64) -> F64:
+        """Neck length and stickout that the tool needs, (k, 2) float64, mm.
 
-        One at hand keeps at least its own: instead of it, nothing is lost. One to buy has flutes up the whole of its
-        corner.
+        tips : (k, 3) float64, mm, access frame, tips at which its cutting part fits
+
+        A tool at hand keeps at least its own lengths, so that its replacement loses nothing. The flutes of a tool to
+        buy cover its whole corner.
         """
         if not len(tips):
             return np.zeros((0, 2))
@@ -102,8 +104,8 @@ class Buyer:
         own = float(catalogue(np.array(body.corner_radius)))
         return self.lengths.at(body, tips, (body.neck_length, body.stickout) if cutter.at_hand else (own, own))
 
-    def touches(self, cutter: Cutter, samples: SurfaceSamples) -> tuple[NDArray[np.int64], F64]:
-        """Rows (k,) of the samples that the cutting part alone touches and can finish, and its tips (k, 3), mm."""
+    def touches(self, cutter: CuttingPart, samples: SurfaceSamples) -> tuple[NDArray[np.int64], F64]:
+        """Samples that the cutting part alone touches and can finish: (k,) int64, index, and tips (k, 3), mm."""
         body = self.body(cutter)
         rows = np.flatnonzero(able(body, samples.normals, self.cusp))
         bare = replace(body, shank_diameter=body.diameter, holder=())
@@ -112,12 +114,12 @@ class Buyer:
         _, fits, tips = touchable(field, samples.points[rows], samples.normals[rows], self.lift)
         return rows[fits], tips[fits]
 
-    def wants(self, samples: SurfaceSamples) -> Wants:
-        """What would do for n samples that no tool at hand touches: one of these with more neck, or a thinner one."""
+    def wants(self, samples: SurfaceSamples) -> CutterNeeds:
+        """Needs of n samples that no tool at hand touches: a cutter at hand on a longer neck, or a thinner cutter."""
         n = len(samples)
-        out = Wants(np.full(n, "", dtype=object), np.full(n, None, dtype=object), np.full(n, np.inf))
+        out = CutterNeeds(np.full(n, "", dtype=object), np.full(n, None, dtype=object), np.full(n, np.inf))
         for tid, field in self.view.fields.items():
-            rows, tips = self._ask(Cutter(field.tool.diameter, field.tool.corner_radius, tid, True), samples,
+            rows, tips = self._ask(CuttingPart(field.tool.diameter, field.tool.corner_radius, tid, True), samples,
                                    np.arange(n), out)
             out.reason[rows] = _stopped_by(field, tips)
         ahead = np.asarray(first_hits(self.view.obstacles, samples.points, samples.normals, 1e-3, 1e6)[0])
@@ -129,13 +131,13 @@ class Buyer:
                 if not len(left):
                     return out
                 like = nearest(list(self.tools.values()), d).id
-                rows, _ = self._ask(Cutter(d, corner, like, False), samples, left, out)
+                rows, _ = self._ask(CuttingPart(d, corner, like, False), samples, left, out)
                 out.reason[rows] = reason[rows]
         return out
 
-    def _ask(self, cutter: Cutter, samples: SurfaceSamples, rows: NDArray[np.int64],
-             out: Wants) -> tuple[NDArray[np.int64], F64]:
-        """Note the cutter for those of ``rows`` it would do for with a stouter neck than what is noted.
+    def _ask(self, cutter: CuttingPart, samples: SurfaceSamples, rows: NDArray[np.int64],
+             out: CutterNeeds) -> tuple[NDArray[np.int64], F64]:
+        """Note the cutter for those of ``rows`` that it reaches with a stouter neck than the noted one.
 
         Returns these (k,) and its tips there (k, 3), mm.
         """
@@ -146,10 +148,10 @@ class Buyer:
         out.cutter[mine], out.slenderness[mine] = cutter, slender[better]
         return mine, tips[better]
 
-    def named(self, cutter: Cutter, samples: SurfaceSamples) -> dict[str, object]:
-        """The tool to buy for samples, asked whether it does: {} where it does for less than half of the area.
+    def named(self, cutter: CuttingPart, samples: SurfaceSamples) -> dict[str, object]:
+        """The tool to buy for samples; {} where it reaches less than half of the area.
 
-        Its neck and stickout do for nearly all of the samples it touches, for all where that is too little.
+        Neck and stickout suffice for nearly all of the samples it touches, or for all where that area is too small.
         """
         rows, tips = self.touches(cutter, samples)
         need = self.need(cutter, tips)
@@ -157,7 +159,7 @@ class Buyer:
         if not short.any():
             return {}
         body, whole = self.body(cutter), max(float(samples.area.sum()), 1e-300)
-        for part in (ALL_BUT, 1.0):  # the longest necks only where what asks for them is half of the area
+        for part in (ALL_BUT, 1.0):  # the longest necks only where the samples that need them are half of the area
             neck, stickout = (float(v) for v in np.quantile(need[short], part, axis=0, method="higher"))
             does = rows[short & (need[:, 0] <= neck) & (need[:, 1] <= stickout)]
             share = float(samples.area[does].sum()) / whole
@@ -170,9 +172,9 @@ class Buyer:
 
 
 def _stopped_by(field: TipField, tips: F64) -> NDArray[np.object_]:
-    """'shank' or 'holder', what a tool at hand is farther from clearing at tips (k, 3), mm.
+    """'shank' or 'holder', the body of a tool at hand that lacks more clearance at tips (k, 3), mm.
 
-    Seen from a cell diagonal around, as the look-up sees them.
+    The search covers a cell diagonal around, as the look-up does.
     """
     short = {name: np.full(len(tips), -np.inf) for name in ("shank", "holder")}
     for d in field.discs:

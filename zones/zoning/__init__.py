@@ -1,4 +1,4 @@
 """Zones: cutting planes, patches and the share of each tool.
 
-Paths are laid in ``toolpath``.
+Paths belong to ``toolpath``.
 """

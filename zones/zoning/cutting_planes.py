@@ -1,10 +1,10 @@
-"""Cutting planes: how deep a tool may be asked, and who cuts what between two opposite sides.
+"""Cutting planes: the depth limit of each tool, and the split between two opposite sides [Arivazhagan2020].
 
-Ln is the depth at which shank or holder of a tool first meets its surroundings (the neck rule). From one side a
-plane stands where a tool ends, so that every depth is cut by the shortest and stoutest tool that gets there; planes
-every Ln would gain nothing. From two opposite sides there is none where the stoutest tool gets the whole height from
-the first; else one at half height where both get their half; else one at the deepest reach from the first.
-Source: ALGORITHMS 1, step 2 of the 4-step algorithm.
+Ln is the depth at which shank or holder of a tool first meets its surroundings (the neck rule). From one side a plane
+lies where a tool ends, so that the shortest and stoutest tool that gets there cuts every depth; planes every Ln gain
+nothing. From two opposite sides there is no plane where the stoutest tool reaches the whole height from the first.
+Otherwise it lies at half height where both reach their half, else at the deepest reach from the first.
+This is step 2 of the four-step algorithm.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from zones.machinable_area import Form
+from zones.machinable_area import AreaForm
 from zones.plan_view.regions import base_of
 from zones.reach.access_reach import Sight
 
 PLANE_MARGIN = 0.02  # mm, cutting plane above the first sample a shank or holder forbids
 OPPOSITE = -0.99  # d1·d2 below: two views look at each other
-SHARED_SHARE = 0.995  # of an area a tool must get to be said to get all of it
-FITS_SHARE = 0.5  # of an area the cutting part of a tool must touch for its neck to decide
+SHARED_SHARE = 0.995  # of an area: a tool that gets this share counts as getting all of it
+FITS_SHARE = 0.5  # of an area: least share that the cutting part must touch for the neck to decide
 
 
 @dataclass(frozen=True)
-class CuttingPlane:
-    """A plane that ends what a tool is asked for in a region.
+class RegionPlane:
+    """A plane that limits the depth of a tool in a region.
 
     height : mm along the access direction
     region : name of the cell, or of the region two opposite accesses share
@@ -43,9 +43,9 @@ class CuttingPlane:
 
 
 def snapped(plane: float, bands: Sequence[tuple[float, float]]) -> float:
-    """A cutting plane moved to just above the connections it would cut through, mm.
+    """A cutting plane moved to just above the connections that it cuts through, mm [Arivazhagan2020].
 
-    So what lies above it keeps one approach, and the flanks of a connection are cut by one tool.
+    So the area above it keeps one approach, and one tool cuts the flanks of a connection.
     """
     for low, high in sorted(bands):
         if low < plane < high + PLANE_MARGIN:
@@ -54,9 +54,9 @@ def snapped(plane: float, bands: Sequence[tuple[float, float]]) -> float:
 
 
 def neck_planes(sight: Sight, left: NDArray[np.int64], tid: str, base: str) -> dict[int, float]:
-    """Cutting plane of a tool by cell, mm: the neck rule, snapped to connections of the channel.
+    """Cutting plane of a tool by cell, mm, access frame: the neck rule of [Arivazhagan2020], snapped to connections.
 
-    left : (k,) int64, samples that are not taken yet
+    left : (k,) int64, index of the samples that no tool has taken yet
     """
     r, code = sight.reach[tid], sight.view.labels.code
     stopped = left[sight.can[tid][left] & r.by_cutter[left] & ~r.by_tool[left]]
@@ -68,40 +68,39 @@ def neck_planes(sight: Sight, left: NDArray[np.int64], tid: str, base: str) -> d
     return out
 
 
-def shares(sights: Sequence[Sight]) -> tuple[list[NDArray[np.bool_]], list[CuttingPlane]]:
-    """What each view is asked for first, and the planes between two.
+def shares(sights: Sequence[Sight]) -> tuple[list[NDArray[np.bool_]], list[RegionPlane]]:
+    """Samples that each view takes first, (n,) bool for each, and the planes between two views [Arivazhagan2020].
 
-    All, but of walls in reach of two opposite views only its own side.
+    A view takes all samples, but of walls in reach of two opposite views only its own side.
 
-    No plane where the stoutest tool of the earlier view gets the whole height. Else the plane is at half height
-    where both get their half with the stoutest tool; else at the deepest reach of the earlier one.
-    Source: ALGORITHMS 1, step 2 of the 4-step algorithm.
+    There is no plane where the stoutest tool of the earlier view reaches the whole height. Otherwise the plane is at
+    half height where both reach their half with the stoutest tool, else at the deepest reach of the earlier view.
     """
     allowed = [np.ones(len(s.samples), np.bool_) for s in sights]
-    planes: list[CuttingPlane] = []
+    planes: list[RegionPlane] = []
     for i, a in enumerate(sights):
         for j in range(i + 1, len(sights)):
             b = sights[j]
             if float(a.view.direction @ b.view.direction) > OPPOSITE:
                 continue
-            for base, form, members in a.groups(np.asarray(a.form == Form.STEEP)):
+            for base, form, members in a.groups(np.asarray(a.form == AreaForm.STEEP)):
                 through, plane = common_plane(a, b, members, form)
                 if not np.isfinite(plane):
                     continue
-                planes.append(CuttingPlane(a.view.id, plane, base, None, f"between {a.view.id} and {b.view.id}"))
+                planes.append(RegionPlane(a.view.id, plane, base, None, f"between {a.view.id} and {b.view.id}"))
                 z = a.samples.points[through, 2]
                 allowed[i][through[z < plane]] = False
                 allowed[j][through[z >= plane]] = False
     return allowed, planes
 
 
-def common_plane(a: Sight, b: Sight, members: NDArray[np.int64], form: Form) -> tuple[NDArray[np.int64], float]:
-    """What of some samples two opposite views share, and the height in the frame of ``a`` of the plane between them.
+def common_plane(a: Sight, b: Sight, members: NDArray[np.int64], form: AreaForm) -> tuple[NDArray[np.int64], float]:
+    """Samples that two opposite views share, and the height of the plane between them, mm, in the frame of ``a``.
 
-    members : (k,) int64, samples of one region and form
-    Returns (m,) int64 samples and the height, mm.
+    members : (k,) int64, index of samples of one region and form
+    Returns (m,) int64, index of the samples, and the height, mm.
 
-    Asked of the stoutest tool whose cutting part touches most of the samples that any touches from both sides. The
+    The stoutest tool decides whose cutting part touches most of the samples that any tool touches from both sides. The
     height is -inf where ``a`` needs no plane.
     """
     area = a.samples.area

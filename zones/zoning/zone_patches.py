@@ -1,7 +1,7 @@
-"""Zones as trimmed faces of the part: what each zone holds of every B-rep face, with its borders in (u, v).
+"""Zones as trimmed faces of the part: the pieces of every B-rep face in each zone, with their borders in (u, v).
 
 A point belongs to the zone of the nearest sample of its own face, form and cell of the plan view. So borders between
-cells and forms are exact, and those where a tool ends its reach are right to the spacing of the samples.
+cells and forms are exact. Borders at the end of a tool's reach are accurate to the spacing of the samples.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from zones.machinable_area import LEVEL, STEEP
 from zones.reach.access_view import View
 from zones.zoning.zones import ZoneArea
 
-PITCH = 0.5  # mm between the points a face is asked at first; wider where that would be more than MOST of them
-MOST = 4e5
-WIDE = 1e3  # mm, the same on faces of one zone, where nothing is to be found
-TOLERANCE = 0.02  # mm, how near a border is to the change of zone
-REST = 0  # label of what no zone holds
-MOST_CELLS = 1 << 20
+PITCH = 0.5  # mm between the first points on a face; wider where there would be more than MAX_POINTS
+MAX_POINTS = 4e5
+WIDE = 1e3  # mm, the same on faces of one zone, which have no border
+TOLERANCE = 0.02  # mm, largest distance of a border from the change of zone
+REST = 0  # label of the area outside all zones
+MAX_CELLS = 1 << 20
 
 
 def zone_patches(view: View, zones: Sequence[ZoneArea]) -> dict[str, tuple[FacePatch, ...]]:
@@ -47,7 +47,7 @@ def zone_patches(view: View, zones: Sequence[ZoneArea]) -> dict[str, tuple[FaceP
     inner = samples.area > 0
     owners = _owners(samples.face[inner], owner[inner])
     mixed = [f for f in faces if owners.get(f) is None]
-    pitch = max(PITCH, float(np.sqrt(2.0 * area / MOST)))
+    pitch = max(PITCH, float(np.sqrt(2.0 * area / MAX_POINTS)))
     found = [trim_faces(view.part, mixed, Nearest(view, owner), pitch, TOLERANCE)] if mixed else []
     for label in sorted({one for one in owners.values() if one is not None}):
         found.append(trim_faces(view.part, [f for f in faces if owners.get(f) == label], _constant(label), WIDE))
@@ -60,7 +60,7 @@ def zone_patches(view: View, zones: Sequence[ZoneArea]) -> dict[str, tuple[FaceP
 
 
 def _owners(face: I32, owner: NDArray[np.int64]) -> dict[int, int | None]:
-    """The owner of all samples of each face, None where there are several."""
+    """The common owner of all samples of each face, None where there are several."""
     low, high = (np.full(int(face.max()) + 1, fill, np.int64) for fill in (np.iinfo(np.int64).max, -1))
     np.minimum.at(low, face, owner)
     np.maximum.at(high, face, owner)
@@ -68,7 +68,7 @@ def _owners(face: I32, owner: NDArray[np.int64]) -> dict[int, int | None]:
 
 
 def _constant(label: int) -> Callable[[F64, F64, I32], NDArray[np.int64]]:
-    """The label function of faces that are one label throughout."""
+    """The label function of faces with a single label."""
 
     def everywhere(points: F64, _normals: F64, _face: I32) -> NDArray[np.int64]:
         return np.full(len(points), label, np.int64)
@@ -83,7 +83,7 @@ class Nearest:
     """
 
     def __init__(self, view: View, owner: NDArray[np.int64]) -> None:
-        # samples on the borders stand for no area: what they say of themselves would be given a strip of it
+        # samples on the borders represent no area; with them a border sample would get a strip of it
         inner = np.flatnonzero(view.samples.area > 0)
         s = view.samples.subset(inner)
         self.view, self.owner = view, owner[inner]
@@ -92,7 +92,7 @@ class Nearest:
         self.faces = KeyedPoints(s.face.astype(np.int64), s.points)
 
     def __call__(self, points: F64, normals: F64, face: I32) -> NDArray[np.int64]:
-        """Labels (k,) of points (k, 3) mm with unit normals on faces (k,)."""
+        """Labels (k,) of points (k, 3) mm with unit normals on faces (k,), in the access frame."""
         here = SurfaceSamples(points, normals, np.zeros(len(points)), face, np.zeros(len(points), np.int32))
         labels = self.view.label(here)
         code = np.array([self.names.get(r, -1) for r in labels.regions], dtype=np.int64)[labels.code]
@@ -105,4 +105,4 @@ class Nearest:
 def _key(samples: SurfaceSamples, code: NDArray[np.int64]) -> NDArray[np.int64]:
     nz = samples.normals[:, 2]
     form = np.where(nz > LEVEL, 0, np.where(nz < STEEP, 2, 1))
-    return np.asarray((samples.face.astype(np.int64) * 3 + form) * MOST_CELLS + code)
+    return np.asarray((samples.face.astype(np.int64) * 3 + form) * MAX_CELLS + code)

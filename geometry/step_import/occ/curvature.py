@@ -1,4 +1,4 @@
-"""What each face is and how it bends."""
+"""Kind and curvature of each face."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ NAMES = {
     Kind.GeomAbs_BezierSurface: "bezier", Kind.GeomAbs_SurfaceOfRevolution: "revolution",
     Kind.GeomAbs_SurfaceOfExtrusion: "extrusion", Kind.GeomAbs_OffsetSurface: "offset",
 }
-# Triangle centres and nodes looked at per face; the nodes bring in the rim, where free-form faces bend most.
+# Triangle centres and nodes per face at which curvature is taken. Free-form faces bend most at nodes on the rim.
 SAMPLES = 144
 RESOLUTION = 1e-7
-# A face narrower than this many modelling tolerances is a leftover, not a surface someone designed.
+# A face narrower than this many modelling tolerances is a sliver.
 SLIVER_TOLERANCES = 10.0
 
 
@@ -54,18 +54,18 @@ def face_info(number: int, shape: Shape, name: str, mesh: FaceMesh, tolerance: f
 
 
 def curvatures(surface: BRepAdaptor_Surface, uv: F64, reversed_face: bool) -> F64:
-    """Principal curvatures at surface parameters.
+    """Principal curvatures at surface parameters [DoCarmo1976].
 
     surface       : kernel surface of a face
-    uv            : (n, 2) float64
-    reversed_face : bool, the face looks against the surface's own normal
+    uv            : (n, 2) float64, parameters of the surface
+    reversed_face : bool, the normal of the face is opposite to that of its surface
 
     Returns (n, 2) float64, 1/mm, least and greatest, positive where the material is convex; NaN where the surface
     has no curvature (cone tip, collapsed side of a patch).
     """
     out = np.full((len(uv), 2), np.nan)
     properties = BRepLProp_SLProps(surface, 2, RESOLUTION)
-    # the kernel counts bending towards its normal as positive; out of the material that is concave
+    # in the kernel, bending towards the normal is positive; with the normal out of the material that is concave
     sign = 1.0 if reversed_face else -1.0
     for row, (u, v) in enumerate(uv):
         properties.SetParameters(float(u), float(v))

@@ -28,21 +28,21 @@ def largest_deviation(shapes: Sequence[Shape], faces: Sequence[FaceMesh], chord:
 
     shapes : kernel faces
     faces  : FaceMesh of each
-    chord  : float, mm; distances above it are looked at more closely
+    chord  : float, mm; distances above it are refined
 
     Returns float, mm.
-    Notes   planes, cylinders, cones, spheres and tori by formula, every triangle. Of the others at most some 20 000
-            triangles, an even share of each face and always its largest ones: the distance to the surface point at
-            the mean (u, v) of the corners bounds the true distance from above, a few Gauss-Newton steps towards the
-            foot point bring the bound down, and where it still exceeds ``chord`` the kernel projects the point.
-            So the value is never too small for a measured triangle. Centres are where a chord errs most on a smooth
-            surface; the trim of the face is not looked at.
+    Notes   Planes, cylinders, cones, spheres and tori: by formula, every triangle. Other faces: at most some 20 000
+            triangles, an even share of each face with its largest ones. The distance to the surface point at the
+            mean (u, v) of the corners bounds the true distance from above. A few Gauss-Newton steps towards the foot
+            point lower the bound. Where it still exceeds ``chord``, the kernel projects the point. So the value is
+            never too small for a measured triangle. On a smooth surface a chord errs most at its centre. The trim of
+            the face is ignored.
     """
     return float(face_deviations(shapes, faces, chord).max(initial=0.0))
 
 
 def face_deviations(shapes: Sequence[Shape], faces: Sequence[FaceMesh], chord: float) -> F64:
-    """Largest distance per face, see ``largest_deviation``; arguments as there. Returns (len(faces),) float64, mm."""
+    """Largest distance per face, (f,) float64, mm, for f faces; arguments as in ``largest_deviation``."""
     total = sum(len(f.triangles) for f in faces)
     out = []
     for shape, face in zip(shapes, faces, strict=True):
@@ -77,7 +77,7 @@ def _formula(surface: BRepAdaptor_Surface, points: F64) -> float | None:
     if kind == GeomAbs_Torus:
         return float(np.abs(np.hypot(away - body.MajorRadius(), along) - body.MinorRadius()).max())
     slope = body.SemiAngle()
-    # the kernel's cone axis points where the radius grows for a positive angle; the lower nappe is never meshed
+    # for a positive angle the kernel's cone axis points to growing radii; the lower nappe is never meshed
     sides = [(s * away - body.RefRadius()) * np.cos(slope) - along * np.sin(slope) for s in (1.0, -1.0)]
     return float(np.minimum(np.abs(sides[0]), np.abs(sides[1])).max())
 
@@ -109,8 +109,13 @@ def _face_deviation(shape: Shape, surface: BRepAdaptor_Surface, face: FaceMesh, 
 
 
 def node_gaps(surface: BRepAdaptor_Surface, nodes: F64, uv: F64) -> F64:
-    """(n,) float64, mm, distance of nodes (n, 3) to the surface point at their parameters (n, 2): what the edges of
-    the file miss their face by, no mesh can be nearer there."""
+    """Distance of nodes from the surface point at their parameters, (n,) float64, mm: the gaps of the file's edges.
+
+    nodes : (n, 3) float64, mm, frame of the surface
+    uv    : (n, 2) float64, parameters of the surface
+
+    No mesh can be nearer to the surface at these nodes.
+    """
     if not len(nodes):
         return np.zeros(0)
     exact = np.array([surface.Value(u, v).Coord() for u, v in uv.tolist()])
@@ -123,9 +128,9 @@ def distance_near(surface: BRepAdaptor_Surface, centre: list[float], uv: F64, en
     surface : kernel surface
     centre  : 3 numbers, mm
     uv      : (2,) float64, parameters near the foot point
-    enough  : float, mm; a bound below this is not brought further down
+    enough  : float, mm; a bound below this is not lowered further
 
-    Returns float, mm: distance to the nearest surface point that a few Gauss-Newton steps from ``uv`` come by.
+    Returns float, mm: least distance to the surface points of a few Gauss-Newton steps from ``uv``.
     """
     point, along_u, along_v = gp_Pnt(), gp_Vec(), gp_Vec()
     u, v = float(uv[0]), float(uv[1])

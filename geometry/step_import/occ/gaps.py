@@ -1,4 +1,4 @@
-"""How far apart the loose ends of an open shell are."""
+"""Gaps between the free edges of an open shell."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ SAMPLES = 33
 
 
 def free_edge_gap(edges: Sequence[Shape]) -> float:
-    """Largest, over the free edges, of the distance to their neighbours among the other free edges.
+    """Largest distance of a free edge from its nearest neighbour among the other free edges.
 
     edges : kernel edges
 
     Returns float, mm; infinity when there is a single free edge, 0 when there is none.
-    Notes   sampled at 33 points an edge against the polylines of the others, so an edge of length L is off by at
-            most its sag over L/32.
+    Notes   Each edge is sampled at 33 points against the polylines of the others. The error for an edge of length L is
+            at most its sag over L/32.
     """
     if len(edges) < 2:
         return float("inf") if edges else 0.0

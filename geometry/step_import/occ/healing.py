@@ -1,4 +1,4 @@
-"""One valid, closed solid out of what the file holds, or words why not."""
+"""One valid, closed solid from the shapes of the file, or an error with the reason."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from geometry.errors import PartError
 from geometry.step_import.occ.gaps import free_edge_gap, free_edges
 from geometry.step_import.occ.topology import Shape, box_of, edges_of, faces_of, shells_of, solids_of, volume_of
 
-# Faces further apart than this are a different part, not a sloppy export: sewing must stay below what is machined.
+# Faces farther apart than this do not belong together. Sewing must stay below the size of machined features.
 SEWING_TOLERANCE = 0.01
 # Bodies nearer than this count as one; well above the kernel's 1e-7, well below any cutting tolerance.
 FUSE_TOLERANCE = 1e-4
 STRAY_VOLUME = 1e-5
 STRAY_WIDTH = 0.2
-# A clean-up after fusing that moves the volume by more than this share did more than merge faces.
+# A clean-up after fusing that changes the volume by more than this share did more than merge faces.
 UNIFY_VOLUME = 1e-6
 
 
 def one_solid(shape: Shape, solid: int | None, warnings: list[str]) -> Shape:
-    """Reduce a shape to the one solid that is to be machined.
+    """Reduce a shape to the one solid to machine.
 
     shape    : kernel shape, mm
-    solid    : 1-based number among the separate solids, None when there should be one
+    solid    : 1-based number among the separate solids, None when there must be only one
     warnings : sentences are appended for every change made
 
     Returns a closed kernel solid with its normals outward.
@@ -44,7 +44,7 @@ def one_solid(shape: Shape, solid: int | None, warnings: list[str]) -> Shape:
     if solids:
         loose = len(faces_of(shape)) - sum(len(faces_of(s)) for s in solids)
         if loose > 0:
-            warnings.append(f"{loose} loose faces beside the solids were left out")
+            warnings.append(f"{loose} loose faces outside the solids were left out")
     else:
         solids = [_sewn(shape, warnings)]
     if len(solids) > 1:
@@ -55,14 +55,14 @@ def one_solid(shape: Shape, solid: int | None, warnings: list[str]) -> Shape:
 def swept_as_splines(solid: Shape) -> Shape:
     """The same solid with extruded and revolved surfaces written as splines, which is exact.
 
-    The kernel's mesher ignores the chord inside swept surfaces and fills them with needless points: a spline wall
-    asked for 0.005 mm came out 0.057 mm off with 7962 triangles, as a spline 0.0023 mm off with 236. Faces keep
-    their number; returned unchanged where the rewriting fails.
+    The kernel's mesher ignores the chord inside swept surfaces and fills them with needless points. A wall meshed for
+    0.005 mm was 0.057 mm off with 7962 triangles as a swept surface, and 0.0023 mm off with 236 as a spline. Faces keep
+    their numbers. Where the rewriting fails, the solid comes back unchanged.
     """
     out = ShapeCustom.ConvertToBSpline_s(solid, True, True, False, False)
     if len(solids_of(out)) != 1 or len(faces_of(out)) != len(faces_of(solid)):
         return solid
-    # the kernel integrates swept surfaces coarsely (0.05 % off on the wall above), so this only catches a wreck
+    # the kernel integrates swept surfaces coarsely (0.05 % off on the wall above), so this catches gross errors only
     before = volume_of(solid)
     if abs(volume_of(out) - before) > 5e-3 * abs(before) or free_edges(out):
         return solid
@@ -84,7 +84,7 @@ def _sewn(shape: Shape, warnings: list[str]) -> Shape:
     if free or len(shells) == 0:
         gap = free_edge_gap([tool.FreeEdge(i + 1) for i in range(free)])
         raise PartError(
-            f"the file holds {len(faces)} faces that do not close into a solid: {free} edges stay free after sewing "
+            f"the file holds {len(faces)} faces that do not close to a solid: {free} edges stay free after sewing "
             f"within {SEWING_TOLERANCE:g} mm, the largest gap between neighbours is {gap:.4g} mm",
             code="open_shell", measured={"free_edges": free, "largest_gap_mm": gap}, limit=SEWING_TOLERANCE,
             remedy="close the body in the CAD system (knit or stitch the surfaces) and export a solid")
@@ -119,7 +119,7 @@ def _fused(solids: list[Shape], warnings: list[str]) -> list[Shape]:
 
 
 def _groups(boxes: Sequence[np.ndarray]) -> list[list[int]]:
-    """Indices of solids whose boxes hang together, in order of their first member."""
+    """Indices of solids whose boxes overlap in groups, in order of their first member."""
     left, groups = list(range(len(boxes))), []
     while left:
         group, todo = [left[0]], [left.pop(0)]
@@ -135,7 +135,7 @@ def _groups(boxes: Sequence[np.ndarray]) -> list[list[int]]:
 
 
 def _fuse(bodies: list[Shape], warnings: list[str]) -> list[Shape]:
-    """Union of bodies; those that share no volume and no face area stay separate."""
+    """Union of bodies; bodies that share no volume and no face area stay separate."""
     first, rest = TopTools_ListOfShape(), TopTools_ListOfShape()
     first.Append(bodies[0])
     for body in bodies[1:]:
@@ -159,7 +159,7 @@ def _fuse(bodies: list[Shape], warnings: list[str]) -> list[Shape]:
 
 
 def _unified(solid: Shape) -> Shape:
-    """Faces that the fuse cut although they lie on one surface, merged again where nothing else changes."""
+    """The solid with faces of one surface merged again after the fuse, where nothing else changes."""
     tool = ShapeUpgrade_UnifySameDomain(BRepBuilderAPI_Copy(solid).Shape(), True, True, False)
     tool.Build()
     merged = solids_of(tool.Shape())
@@ -174,12 +174,12 @@ def _unified(solid: Shape) -> Shape:
 def _chosen(solids: list[Shape], solid: int | None) -> Shape:
     if solid is not None:
         if not 1 <= solid <= len(solids):
-            raise PartError(f"solid {solid} was asked for, but the file holds {len(solids)}", code="no_such_solid",
+            raise PartError(f"solid {solid} does not exist; the file holds {len(solids)} solids", code="no_such_solid",
                             subjects=(f"solid {solid}",), measured=solid, limit=len(solids),
                             remedy=f"name a solid from 1 to {len(solids)}:\n" + _listing(solids))
         return solids[solid - 1]
     if len(solids) > 1:
-        raise PartError(f"the file holds {len(solids)} separate solids; one is needed:\n" + _listing(solids),
+        raise PartError(f"the file holds {len(solids)} separate solids; a job needs one:\n" + _listing(solids),
                         code="several_solids", subjects=tuple(f"solid {i + 1}" for i in range(len(solids))),
                         measured=len(solids), limit=1,
                         remedy="name one with part.solid in the setup, or export it alone")
@@ -198,7 +198,7 @@ def _listing(solids: list[Shape]) -> str:
 def _valid(solid: Shape, warnings: list[str]) -> Shape:
     if BRepCheck_Analyzer(solid).IsValid():
         return solid
-    # the fixer widens tolerances in place, so it gets a copy
+    # the fixer widens tolerances in place, so it works on a copy
     fixer = ShapeFix_Shape(BRepBuilderAPI_Copy(solid).Shape())
     fixer.Perform()
     fixed = solids_of(fixer.Shape())
@@ -211,7 +211,7 @@ def _valid(solid: Shape, warnings: list[str]) -> Shape:
 
 
 def _is_better(fixed: Shape, solid: Shape) -> bool:
-    """A repair that moves the volume, or only declares wider tolerances, is none."""
+    """Whether a repair neither changes the volume nor only widens tolerances."""
     before = volume_of(solid)
     return (BRepCheck_Analyzer(fixed).IsValid() and abs(volume_of(fixed) - before) <= 1e-4 * abs(before)
             and _tolerance(fixed) <= max(1.5 * _tolerance(solid), SEWING_TOLERANCE))
@@ -230,7 +230,7 @@ def _outward(solid: Shape, warnings: list[str]) -> Shape:
                         measured={"free_edges": len(edges), "largest_gap_mm": gap}, limit=SEWING_TOLERANCE,
                         remedy="close the body in the CAD system and export it again")
     if volume_of(solid) < 0:
-        warnings.append("the solid was inside out and was turned")
+        warnings.append("the solid was inside out; its orientation was reversed")
         turned = TopoDS.Solid_s(solid)
         BRepLib.OrientClosedSolid_s(turned)
         return turned

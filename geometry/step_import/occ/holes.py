@@ -1,4 +1,4 @@
-"""Closing the small holes that the kernel's mesher leaves where it gives up on a sliver face."""
+"""Closes the small holes that the kernel's mesher leaves where it fails on a sliver face."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from geometry.mesh import F64, TriangleMesh
 
 MAX_SIDES = 6
-# A hole wider than this many chords is a missing face, not a sliver, and stays open (with a warning).
+# A hole wider than this many chords is a missing face, not a sliver. It stays open, with a warning.
 MAX_WIDTH = 10.0
 
 
@@ -50,12 +50,12 @@ def fill_slivers(mesh: TriangleMesh, chord: float) -> tuple[TriangleMesh, int]:
 def extend_parameters(mesh: TriangleMesh, uv: F64, project: Callable[[int, F64, F64], F64]) -> F64:
     """Surface parameters for the triangles that ``fill_slivers`` appended.
 
-    mesh    : TriangleMesh with m triangles
+    mesh    : TriangleMesh with m triangles, mm
     uv      : (k, 3, 2) float64, parameters of the corners of the first k triangles, k <= m
     project : face number, point (3,) mm and a start (2,) -> parameters (2,) near the start
 
-    Returns (m, 3, 2) float64 parameters. A corner that lies on the face already copies its value there (of several,
-    at a seam, the one nearest to the first corner's); any other is projected on the face.
+    Returns (m, 3, 2) float64 parameters. A corner that lies on the face already copies its value there; of several
+    values at a seam it takes the one nearest to that of the first corner. Other corners are projected on the face.
     """
     extra: list[F64] = []
     for corners, face in zip(mesh.faces[len(uv):], mesh.face_ids[len(uv):], strict=True):
@@ -77,7 +77,7 @@ def _open_sides(mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def _loop(follow: dict[int, tuple[int, int]]) -> tuple[list[int], list[int]]:
-    """Walk one hole, taking its sides out of the table; empty when the walk does not come back."""
+    """Walk around one hole and remove its sides from the table; empty when the walk does not return."""
     first = next(iter(follow))
     loop, owners, here = [], [], first
     while here in follow:

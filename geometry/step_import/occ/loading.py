@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from geometry.part import EdgeInfo, FaceInfo, Part
-from geometry.setup_frame import Placement
+from geometry.setup_frame import SetupFrame
 from geometry.step_import.occ.curvature import face_info, surface_name
 from geometry.step_import.occ.edges import edge_infos
 from geometry.step_import.occ.healing import one_solid, swept_as_splines
@@ -18,9 +18,9 @@ from geometry.step_import.occ.sizes import REFUSE_ABOVE, REFUSE_BELOW, check_siz
 from geometry.step_import.occ.topology import Shape, box_of, exact_volume, faces_of, quick_box
 from geometry.step_import.reader import check_tolerances
 
-# Modelling tolerance (mm) taken when the file names none, and the range in which a named one is believed.
+# Modelling tolerance (mm) of a file that names none, and the range in which a named one is accepted.
 USUAL_TOLERANCE, TOLERANCE_RANGE = 1e-3, (1e-5, 0.05)
-# A mesh off by d everywhere changes the volume by area * d; this many times that, and something else is wrong.
+# A mesh off by d everywhere changes the volume by area * d. A change this many times larger has another cause.
 VOLUME_ROOM = 2.0
 
 
@@ -30,8 +30,8 @@ class LoadedSolid:
 
     step     : StepShape, the file
     body     : kernel solid, STEP coordinates, mm
-    surfaces : kind of surface the file gives each face
-    warnings : what was doubtful or done to it; later stages append
+    surfaces : kind of surface of each face in the file
+    warnings : doubts and changes, as sentences; later stages append
     """
 
     step: StepShape
@@ -51,10 +51,12 @@ def load_solid(path: str | Path, solid: int | None = None) -> LoadedSolid:
     return LoadedSolid(step, swept_as_splines(body), surfaces, warnings)
 
 
-def load_part(path: str | Path, *, placement: Placement | None = None, solid: int | None = None,
+def load_part(path: str | Path, *, placement: SetupFrame | None = None, solid: int | None = None,
               chord: float = 0.002, angle: float = 0.2) -> Part:
-    """The work behind ``geometry.step_import.reader.read_part``, in this process; arguments and errors are those of ``read_part``
-    except that nothing limits time or memory here."""
+    """The work of ``geometry.step_import.reader.read_part`` in this process, with its arguments and errors.
+
+    Nothing limits time or memory here.
+    """
     check_tolerances(chord, angle)
     loaded = load_solid(path, solid)
     step, body, warnings = loaded.step, loaded.body, loaded.warnings
@@ -68,7 +70,7 @@ def load_part(path: str | Path, *, placement: Placement | None = None, solid: in
     volume = _volume(body, mesh, VOLUME_ROOM * area * max(chord, mesh.deviation), warnings)
     warnings += _slivers(faces, tolerance)
     warnings += doubts(mesh.mesh.bounds, volume, area, step.unit, step.factor, step.text.products)
-    matrix = (placement or Placement()).matrix
+    matrix = (placement or SetupFrame()).matrix
     check_size(mesh.mesh.bounds, step.unit, step.factor)
     moved = mesh.mesh.transformed(matrix)
     return Part(mesh=moved, faces=faces, edges=tuple(_moved(e, matrix) for e in edges), volume=volume,
@@ -77,9 +79,9 @@ def load_part(path: str | Path, *, placement: Placement | None = None, solid: in
 
 
 def _check_size(shape: Shape, step: StepShape) -> None:
-    """Before healing, which could take long on a shape of absurd size, and after it."""
+    """Check the size before healing, which takes long on a shape of absurd size, and after it."""
     rough = quick_box(shape)
-    # the rough box is never too small, and on free-form faces rarely more than twice too large
+    # the rough box is never too small; on free-form faces it is rarely more than twice too large
     if not 10.0 * REFUSE_BELOW <= (rough[1] - rough[0]).max() <= REFUSE_ABOVE:
         check_size(box_of(shape), step.unit, step.factor)
 
@@ -92,8 +94,8 @@ def _tolerance(step: StepShape) -> float:
 def _volume(body: Shape, mesh: SolidMesh, room: float, warnings: list[str]) -> float:
     exact, meshed = exact_volume(body), mesh.mesh.volume
     if abs(exact - meshed) > room + 1e-6 * abs(meshed):
-        warnings.append(f"the exact solid claims {exact:.6g} mm³ and its mesh encloses {meshed:.6g} mm³; "
-                        "the mesh is believed")
+        warnings.append(f"the exact solid has {exact:.6g} mm³, but its mesh encloses {meshed:.6g} mm³; "
+                        "the volume of the mesh is used")
         return meshed
     return exact
 

@@ -1,4 +1,4 @@
-"""Faces of a meshed solid whose triangles leave the exact surface, meshed better between the same border nodes."""
+"""Refines faces of a meshed solid whose triangles leave the exact surface, between the same border nodes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from geometry.step_import.occ.refining import I64, Net, present, refine_net
 from geometry.step_import.occ.topology import Shape, faces_of
 from geometry.step_import.occ.triangulating import FaceMesh, edge_sides, triangulate_plainly
 
-# Triangles that mending may make in one solid; a face that meets its share stays as far as it got.
+# Triangles that mending may make in one solid. The refinement of a face ends at its share.
 MAX_MENDED = 200_000
 
 
@@ -23,19 +23,19 @@ def mend_faces(solid: Shape, faces: list[FaceMesh], numbers: Iterable[int], limi
 
     solid   : kernel solid, mm, with the mesh that ``faces`` were read from; it keeps that mesh
     faces   : FaceMesh of every face
-    numbers : which of them to refine, from 0
-    limit   : float, mm, distance to the surface that the middle of inner sides and triangles must keep
-    chord   : float, mm, deflection the mesh was made with
-    angle   : float, rad, likewise
+    numbers : faces to refine, from 0
+    limit   : float, mm, largest distance of the middle of inner sides and triangles from the surface
+    chord   : float, mm, deflection of the mesh
+    angle   : float, rad, angle of the mesh
 
     Returns list of FaceMesh: the others as they were, the refined ones with the nodes they had in their old places
     and new ones behind them. Sides along edges of the solid are those of before, so neighbours still fit.
-    Notes   starts from the kernel's triangles between border nodes alone, because what its own rounds of insertion
-            leave on such a face is large and badly shaped; from these where the borders do not agree.
+    Notes   Starts from the kernel's triangles between border nodes alone, because its own rounds of insertion leave
+            large and badly shaped triangles on such a face. Where the borders do not agree, it starts from the latter.
     """
     out = list(faces)
     shapes = faces_of(solid)
-    # a copy that shares the geometry: the mesh in the solid itself says which nodes lie on which edge
+    # a copy that shares the geometry: the mesh in the solid itself links nodes to edges
     plain = triangulate_plainly(BRepBuilderAPI_Copy(solid, False, False).Shape(), chord, angle)
     room = MAX_MENDED
     for k in numbers:
@@ -48,7 +48,7 @@ def mend_faces(solid: Shape, faces: list[FaceMesh], numbers: Iterable[int], limi
 
 
 def _start(full: FaceMesh, plain: FaceMesh | None, kept: I64) -> Net:
-    """The plain triangles on the nodes of the full ones, if all sides along edges are among them."""
+    """The plain triangles on the nodes of the full mesh, if they contain all sides along edges."""
     old = Net(full.nodes, full.uv, full.triangles.astype(np.int64), kept)
     if plain is None:
         return old

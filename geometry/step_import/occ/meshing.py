@@ -1,4 +1,4 @@
-"""Solid -> watertight triangle mesh with face numbers, and how far it is from the exact surface."""
+"""Solid -> watertight triangle mesh with face numbers, and its distance from the exact surface."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from geometry.step_import.occ.triangulating import FaceMesh, triangulate
 __all__ = ["FaceMesh", "SolidMesh", "count_open_edges", "mesh_solid"]
 
 MAX_REMESH = 2
-# A mesh larger than half of this is not made once more with a smaller chord.
+# A mesh larger than half of this is not repeated with a smaller chord.
 MAX_TRIANGLES = 1_000_000
-# A smaller chord for the whole solid that leaves more than this share of the deviation is not made smaller still.
+# A smaller chord for the whole solid that leaves more than this share of the deviation is not reduced further.
 WORTH = 0.8
-# A mesh counts as good while its measured deviation stays below this multiple of the chord asked for.
+# A mesh counts as good while its measured deviation stays below this multiple of the requested chord.
 DEVIATION_ROOM = 1.5
 # Nodes nearer than this on one edge of a triangle are one point (the kernel's own confusion distance).
 WELD = 1e-7
@@ -48,7 +48,7 @@ class SolidMesh:
     faces     : FaceMesh per B-rep face
     edge_nodes: per edge in kernel order, (k,) indices into ``mesh.vertices`` along the edge; empty when degenerate
     deviation : float, mm, largest measured distance of triangle centres to the exact surface
-    chord     : float, mm, the deflection the kernel was given at last
+    chord     : float, mm, deflection of the last run of the kernel's mesher
     warnings  : sentences
     """
 
@@ -62,7 +62,7 @@ class SolidMesh:
 
 
 def mesh_solid(solid: Shape, chord: float, angle: float) -> SolidMesh:
-    """Mesh a solid until its measured deviation is within 1.5 times the chord, or nothing helps any more.
+    """Mesh a solid until its measured deviation is within 1.5 times the chord, or no step improves it.
 
     solid : kernel solid, mm
     chord : float, mm, absolute deflection
@@ -70,35 +70,35 @@ def mesh_solid(solid: Shape, chord: float, angle: float) -> SolidMesh:
 
     Returns SolidMesh.
     Raises GeometryError (``mesh_failed``) when faces stay without triangles.
-    Notes   faces that deviate too far are refined one by one between the nodes of their edges; only where that does
-            not do, and not because edges miss their faces, is the whole solid meshed again with a smaller chord, at
-            most twice, as long as it helps and the mesh stays below half a million triangles.
+    Notes   Faces that deviate too far are refined one by one between the nodes of their edges. Where that does not
+            suffice, and gaps between edges and faces are not the cause, the whole solid is meshed again with a smaller
+            chord: at most twice, as long as it helps and the mesh stays below half a million triangles.
     """
-    asked, before = chord, np.inf
-    limit = DEVIATION_ROOM * asked
+    requested, before = chord, np.inf
+    limit = DEVIATION_ROOM * requested
     shapes = faces_of(solid)
     for attempt in range(MAX_REMESH + 1):
         faces = triangulate(solid, chord, angle)
-        off = face_deviations(shapes, faces, asked)
+        off = face_deviations(shapes, faces, requested)
         if off.max(initial=0.0) > limit:
-            faces = mend_faces(solid, faces, np.flatnonzero(off > limit), asked, chord, angle)
-            off = face_deviations(shapes, faces, asked)
+            faces = mend_faces(solid, faces, np.flatnonzero(off > limit), requested, chord, angle)
+            off = face_deviations(shapes, faces, requested)
         deviation = float(off.max(initial=0.0))
         count = sum(len(f.triangles) for f in faces)
         if (not _curable(shapes, faces, off, limit) or attempt == MAX_REMESH or 2 * count > MAX_TRIANGLES
                 or deviation > WORTH * before):
             break
         before = deviation
-        # the deviation falls about in proportion to the chord, so aim a little below the limit at once
+        # the deviation falls about in proportion to the chord, so aim a little below the limit
         chord *= float(np.clip(0.9 * limit / deviation, 0.3, 0.8))
     mesh, uv, edge_nodes = _join(solid, faces)
     warnings = []
-    if deviation > DEVIATION_ROOM * asked:
+    if deviation > DEVIATION_ROOM * requested:
         warnings.append(f"the mesh deviates up to {deviation:.4g} mm from the exact surface; "
-                        f"{asked:g} mm were asked for")
+                        f"the requested chord is {requested:g} mm")
     open_edges = count_open_edges(mesh)
     if open_edges:
-        mesh, holes = fill_slivers(mesh, asked)
+        mesh, holes = fill_slivers(mesh, requested)
         uv = extend_parameters(mesh, uv, _projector(faces_of(solid)))
         open_edges = count_open_edges(mesh)
         if holes:
@@ -120,7 +120,7 @@ def _curable(shapes: list[Shape], faces: list[FaceMesh], off: F64, limit: float)
 
 
 def count_open_edges(mesh: TriangleMesh) -> int:
-    """Number of directed triangle edges without exactly one partner in the other direction; 0 when watertight."""
+    """Count of directed triangle edges without exactly one partner in the other direction; 0 when watertight."""
     f = mesh.faces.astype(np.int64)
     n = len(mesh.vertices)
     start, end = f.ravel(), f[:, [1, 2, 0]].ravel()
@@ -157,7 +157,7 @@ def _join(solid: Shape, faces: list[FaceMesh]) -> tuple[TriangleMesh, F64, list[
     corners = np.concatenate([f.triangles + offsets[i] for i, f in enumerate(faces)])
     ids = np.repeat(np.arange(1, len(faces) + 1), [len(f.triangles) for f in faces])
     triangles = label[corners]
-    # points that the kernel set apart by less than its own resolution are one as well
+    # points closer than the kernel's own resolution are one as well
     sides = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
     short = np.linalg.norm(nodes[sides[:, 0]] - nodes[sides[:, 1]], axis=1) < WELD
     if short.any():

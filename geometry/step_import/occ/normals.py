@@ -11,21 +11,21 @@ from OCP.TopAbs import TopAbs_REVERSED
 from geometry.mesh import F64, I32
 from geometry.step_import.occ.topology import Shape
 
-# Derivatives shorter than this (mm), the confusion distance of the kernel, or as parallel as this give no normal.
+# Derivatives shorter than this (mm, the confusion distance of the kernel) or more parallel than this give no normal.
 SHORTEST, PARALLEL = 1e-7, 1e-6
 # At a singular point (pole, tip of a cone) the normal is taken this share of the way to the other corners.
 ASIDE = 1e-2
 
 
 def corner_normals(shapes: list[Shape], ids: I32, uv: F64) -> F64:
-    """Normals of the surfaces at the corners of triangles.
+    """Normals of the surfaces at the corners of triangles [DoCarmo1976].
 
     shapes : kernel faces in order
-    ids    : (m,) int32, 1-based number of the face of every triangle
+    ids    : (m,) int32, index, 1-based, of the face of every triangle
     uv     : (m, 3, 2) float64, surface parameters of the corners
 
-    Returns (m, 3, 3) float64, unit, out of the material, in the frame of the shapes. At a singular point every triangle
-    has its own, that of the surface just beside the point; NaN where there is none either.
+    Returns (m, 3, 3) float64, dimensionless, out of the material, in the frame of the shapes. At a singular point every
+    triangle has its own normal, that of the surface just beside the point; NaN where that does not exist either.
     """
     out = np.full((len(ids), 3, 3), np.nan)
     order = np.argsort(ids, kind="stable")
@@ -42,7 +42,7 @@ def corner_normals(shapes: list[Shape], ids: I32, uv: F64) -> F64:
         if len(row):
             here = corners[row, corner]
             way = 0.5 * (corners[row].sum(axis=1) - here) - here
-            # along a collapsed side the parameter of the node says nothing, so that of the other corners is taken
+            # along a collapsed side the parameter of the node has no meaning; that of the other corners is taken
             share = np.where(still[place.reshape(-1)].reshape(-1, 3, 2)[row, corner], 1.0, ASIDE)
             found[row, corner] = _across(surface, here + share * way)[0]
         out[rows] = -found if shape.Orientation() == TopAbs_REVERSED else found
@@ -50,7 +50,7 @@ def corner_normals(shapes: list[Shape], ids: I32, uv: F64) -> F64:
 
 
 def _across(surface: BRepAdaptor_Surface, uv: F64) -> tuple[F64, NDArray[np.bool_]]:
-    """Unit vectors (n, 3) along u x v at parameters (n, 2), NaN where these are singular; which do not move, (n, 2)."""
+    """Unit vectors (n, 3) along u x v at parameters (n, 2), NaN where singular, and vanishing derivatives, (n, 2)."""
     ways = np.empty((len(uv), 2, 3))
     point, along_u, along_v = gp_Pnt(), gp_Vec(), gp_Vec()
     for row, (u, v) in enumerate(uv.tolist()):

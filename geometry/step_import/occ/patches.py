@@ -17,8 +17,8 @@ from OCP.GeomConvert import GeomConvert, GeomConvert_ApproxSurface
 from OCP.TopAbs import TopAbs_REVERSED
 
 from geometry.mesh import F64
-from geometry.setup_frame import Placement
-from geometry.step_import.face_surfaces import FacePatch, no_such_face, patches_to_bytes
+from geometry.setup_frame import SetupFrame
+from geometry.step_import.face_surfaces import FaceSurface, no_such_face, patches_to_bytes
 from geometry.step_import.occ.loading import load_solid
 from geometry.step_import.occ.topology import Shape, faces_of
 from geometry.surfaces.nurbs import NurbsSurface
@@ -28,15 +28,15 @@ ANGULAR = {Kind.GeomAbs_Cylinder: (True, False), Kind.GeomAbs_Cone: (True, False
            Kind.GeomAbs_Torus: (True, True)}
 # Longest arc between two knots (rad): its middle weight is a half.
 LONGEST_ARC = 2.0 * np.pi / 3.0
-# What is no spline comes as one, as near as this (mm) where the kernel manages with so many spans.
-NEAR, MOST_SPANS, DEGREE = 1e-6, 400, 9
+# Other surfaces are approximated by splines: to this tolerance (mm) where this many spans suffice.
+NEAR, MAX_SPANS, DEGREE = 1e-6, 400, 9
 # Parameters of a patch that is measured, along each side.
 LOOKS = 15
 
 
-def load_patches(path: str | Path, *, placement: Placement | None = None, solid: int | None = None,
+def load_patches(path: str | Path, *, placement: SetupFrame | None = None, solid: int | None = None,
                  faces: Iterable[int] | None = None) -> bytes:
-    """The work behind ``geometry.step_import.face_surfaces.read_patches``, in this process; arguments and errors as there.
+    """The work of ``geometry.step_import.face_surfaces.read_patches`` in this process, arguments and errors as there.
 
     Returns the bytes ``patches_from_bytes`` reads.
     """
@@ -45,11 +45,11 @@ def load_patches(path: str | Path, *, placement: Placement | None = None, solid:
     for number in wanted:
         if not 1 <= number <= len(shapes):
             raise no_such_face(number, len(shapes))
-    matrix = (placement or Placement()).matrix
+    matrix = (placement or SetupFrame()).matrix
     return patches_to_bytes(_moved(face_patch(n, shapes[n - 1]), matrix) for n in wanted)
 
 
-def face_patch(number: int, face: Shape) -> FacePatch:
+def face_patch(number: int, face: Shape) -> FaceSurface:
     """One kernel face as a patch, STEP coordinates (mm).
 
     number : int, 1-based
@@ -65,17 +65,17 @@ def face_patch(number: int, face: Shape) -> FacePatch:
     else:
         trimmed = Geom_RectangularTrimmedSurface(whole, box[0, 0], box[1, 0], box[0, 1], box[1, 1])
         if adaptor.GetType() in (Kind.GeomAbs_OffsetSurface, Kind.GeomAbs_OtherSurface):
-            spline = GeomConvert_ApproxSurface(trimmed, NEAR, GeomAbs_C1, GeomAbs_C1, DEGREE, DEGREE, MOST_SPANS,
+            spline = GeomConvert_ApproxSurface(trimmed, NEAR, GeomAbs_C1, GeomAbs_C1, DEGREE, DEGREE, MAX_SPANS,
                                                0).Surface()
         else:
             spline = GeomConvert.SurfaceToBSplineSurface_s(trimmed)
         surface = _surface(spline, box[0], side)
-    patch = FacePatch(number, surface, box, angular, 0.0)
+    patch = FaceSurface(number, surface, box, angular, 0.0)
     return replace(patch, deviation=_deviation(patch, adaptor))
 
 
 def _box(face: Shape, whole: Shape) -> F64:
-    """Parameters the face lies in: not beyond the surface, and not more than once round it."""
+    """Parameters of the face: not beyond the surface, and not more than one period."""
     box = np.ascontiguousarray(np.array(BRepTools.UVBounds_s(face)).reshape(2, 2).T)
     limits = np.array(whole.Bounds()).reshape(2, 2).T
     turns = ((whole.IsUPeriodic, whole.UPeriod), (whole.IsVPeriodic, whole.VPeriod))
@@ -90,7 +90,7 @@ def _box(face: Shape, whole: Shape) -> F64:
 def _turned(exact: BRepAdaptor_Surface, box: F64, side: int) -> NurbsSurface:
     """Cylinder, cone, sphere or torus: an arc about the axis by a line or an arc in its half plane, homogeneous.
 
-    The kernel's own conversion cannot begin a full turn at any angle: eight bores of a test part came out 0.13 mm off.
+    The kernel's own conversion cannot begin a full turn at any angle; eight bores of a test part were 0.13 mm off.
     """
     kind = exact.GetType()
     if kind == Kind.GeomAbs_Cylinder:
@@ -130,7 +130,7 @@ def _line(ends: F64, radius: F64, height: F64) -> tuple[F64, F64]:
 
 
 def _surface(spline: Shape, low: F64, side: int) -> NurbsSurface:
-    """Poles, weights and knots of a kernel spline; its knots, a period off at times, shifted to begin at ``low``."""
+    """Poles, weights and knots of a kernel spline; the knots, which may be off by a period, begin at ``low``."""
     spline.SetUNotPeriodic()
     spline.SetVNotPeriodic()
     n, m = spline.NbUPoles(), spline.NbVPoles()
@@ -146,12 +146,12 @@ def _surface(spline: Shape, low: F64, side: int) -> NurbsSurface:
     return NurbsSurface(control, knots[0], knots[1], orders, weights, side)
 
 
-def _deviation(patch: FacePatch, exact: BRepAdaptor_Surface) -> float:
+def _deviation(patch: FaceSurface, exact: BRepAdaptor_Surface) -> float:
     ways = [np.linspace(patch.box[0, axis], patch.box[1, axis], LOOKS) for axis in (0, 1)]
     uv = np.stack(np.meshgrid(*ways, indexing="ij"), axis=-1).reshape(-1, 2)
     there = np.array([exact.Value(u, v).Coord() for u, v in uv.tolist()])
     return float(np.linalg.norm(patch.surface.points(patch.parameters(uv)) - there, axis=1).max())
 
 
-def _moved(patch: FacePatch, matrix: F64) -> FacePatch:
+def _moved(patch: FaceSurface, matrix: F64) -> FaceSurface:
     return replace(patch, surface=patch.surface.moved(matrix))

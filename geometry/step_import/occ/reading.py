@@ -29,7 +29,7 @@ class StepShape:
     shape    : kernel shape, mm
     unit     : length unit of the file, a key word such as 'mm' or 'inch'
     factor   : mm in one unit of the file
-    text     : what the bytes themselves said
+    text     : facts read from the bytes
     warnings : sentences for the report
     """
 

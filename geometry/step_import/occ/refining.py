@@ -1,9 +1,9 @@
-"""Finer triangles inside one face, where those of the kernel leave the exact surface; its border stays as it is.
+"""Finer triangles inside one face, where those of the kernel leave the exact surface; its border does not change.
 
-The kernel checks its triangles against the surface and inserts nodes for a fixed number of rounds, with triangles that
-are Delaunay in the plane of the parameters stretched to a square. On long ruled faces that turns triangles which ran
-along the rulings into wide fans across the bend, and some are left when the rounds are over. Here a flip has to pay in
-distance to the surface, and splitting goes on until every triangle keeps the chord.
+The kernel checks its triangles against the surface and inserts nodes for a fixed number of rounds. Its triangles are
+Delaunay in the plane of the parameters, stretched to a square. On long ruled faces this turns triangles along the
+rulings into wide fans across the bend, and some remain after the rounds. Here a flip must reduce the distance to the
+surface, and splitting goes on until every triangle keeps the chord.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ I64 = NDArray[np.int64]
 
 ROUNDS = 40
 FLIP_ROUNDS = 12
-# A flip must bring the distance of the shared side below this share of what it was, else flips could go on for ever.
+# A flip must bring the distance of the shared side below this share of its old value, so that flips end.
 FLIP_GAIN = 0.8
-# Twice the area in (u, v) that a flipped triangle must have at least, as a share of that of both triangles.
+# Least double area in (u, v) of a flipped triangle, as a share of that of both triangles.
 FLIP_ROOM = 1e-3
 # A triangle with an angle above this (rad) is a cap.
 CAP = np.radians(165.0)
-# Sides are not split below this many chords and this many times the gap between their ends and the surface: such a
-# short side deviates because its ends do, not because it is long.
+# Least length of a split side, in chords and in gaps between its ends and the surface. A shorter side deviates because
+# its ends do, not because of its length.
 SHORTEST, SHORTEST_GAPS = 2.0, 8.0
 
 
@@ -39,7 +39,7 @@ class Net:
     nodes     : (n, 3) float64, mm
     uv        : (n, 2) float64, surface parameters of the nodes
     triangles : (m, 3) int64, indices into ``nodes``
-    kept      : (k, 2) int64, pairs of nodes whose sides are to stay; sides of a single triangle stay anyway
+    kept      : (k, 2) int64, pairs of nodes whose sides stay; sides of a single triangle stay anyway
     """
 
     nodes: F64
@@ -68,14 +68,14 @@ class _Sides:
 
 
 class _Distances:
-    """Distance of the middle of sides and triangles to the surface, each asked once."""
+    """Distance of the middle of sides and triangles to the surface, each computed once."""
 
     def __init__(self, surface: BRepAdaptor_Surface, chord: float) -> None:
         self.surface, self.chord = surface, chord
         self.known: dict[tuple[int, ...], float] = {}
 
     def __call__(self, net: Net, corners: I64) -> F64:
-        """Upper bound per row of ``corners`` (k, 2 or 3); below the chord no more than that is said."""
+        """Upper bound for each row of ``corners`` (k, 2 or 3); below the chord it is not refined."""
         keys = [tuple(row) for row in np.sort(corners, axis=1).tolist()]
         fresh = [i for i, key in enumerate(keys) if key not in self.known]
         points, uv = net.nodes[corners[fresh]].mean(axis=1).tolist(), net.uv[corners[fresh]].mean(axis=1)
@@ -84,19 +84,19 @@ class _Distances:
         return np.array([self.known[key] for key in keys])
 
 
-def refine_net(surface: BRepAdaptor_Surface, net: Net, chord: float, most: int) -> Net:
+def refine_net(surface: BRepAdaptor_Surface, net: Net, chord: float, max_triangles: int) -> Net:
     """Flip and split inner sides until the middle of every inner side and triangle keeps the chord.
 
     surface : kernel surface of the face, in the frame of the nodes
     net     : Net of the face; its parameters do not jump inside a triangle
     chord   : float, mm
-    most    : int, number of triangles above which no further round begins
+    max_triangles : int, number of triangles above which no further round begins
 
     Returns Net: the nodes of ``net`` in their order, new ones on the surface behind them; the border is that of
     ``net``, side by side.
-    Notes   a split puts the new node at the mean (u, v) of the ends of a side, and both triangles of a side are split,
-            so no gap can open. Ends early at ``most`` triangles or where only sides deviate that are short beside
-            the chord or beside what nodes of the border miss the surface by; measure afterwards.
+    Notes   A split puts the new node at the mean (u, v) of the ends of a side and splits both triangles of the side, so
+            no gap can open. The rounds end early at ``max_triangles``, or where the only sides that deviate are short
+            against the chord or against the gaps of border nodes. Measure the deviation afterwards.
     """
     distances = _Distances(surface, chord)
     gaps = node_gaps(surface, net.nodes, net.uv)
@@ -105,7 +105,7 @@ def refine_net(surface: BRepAdaptor_Surface, net: Net, chord: float, most: int) 
         sides = _sides(net)
         gaps = np.concatenate([gaps, np.zeros(len(net.nodes) - len(gaps))])
         marked = _marked(net, sides, gaps, distances)
-        if not marked.any() or len(net.triangles) > most:
+        if not marked.any() or len(net.triangles) > max_triangles:
             break
         net = _split(surface, net, sides, marked)
     return net
@@ -120,7 +120,7 @@ def _sides(net: Net) -> _Sides:
     first = np.concatenate([[0], np.cumsum(counts)[:-1]])
     uses = np.full((len(keys), 2), -1, np.int64)
     uses[:, 0] = order[first]
-    # a side of three triangles has no two neighbours to split or flip; it is left alone like a border
+    # a side of three triangles has no two neighbours to split or flip; it stays like a border
     uses[counts == 2, 1] = order[first[counts == 2] + 1]
     ends = np.stack([keys // size, keys % size], axis=1)
     uses[present(net.kept, ends), 1] = -1
@@ -128,7 +128,7 @@ def _sides(net: Net) -> _Sides:
 
 
 def _marked(net: Net, sides: _Sides, gaps: F64, distances: _Distances) -> np.ndarray:
-    """(k,) bool, sides to split: inner ones that deviate, and the longest inner one of a triangle that does."""
+    """(k,) bool, sides to split: inner sides that deviate, and the longest inner side of a triangle that does."""
     inner = sides.inner
     length = np.linalg.norm(net.nodes[sides.ends[:, 0]] - net.nodes[sides.ends[:, 1]], axis=1)
     marked = np.zeros(len(sides.ends), bool)
@@ -157,7 +157,7 @@ def _split(surface: BRepAdaptor_Surface, net: Net, sides: _Sides, marked: np.nda
     for cuts in (1, 2, 3):
         rows = np.flatnonzero(count == cuts)
         cut = marked[sides.of[rows]]
-        # turned so that the cut sides come first: one cut 0-1, two cuts 0-1 and 1-2
+        # rotated so that the cut sides come first: one cut 0-1, two cuts 0-1 and 1-2
         start = np.argmax(cut & ~np.roll(cut, 1, axis=1), axis=1) if cuts < 3 else np.zeros(len(rows), np.int64)
         turn = (start[:, None] + np.arange(3)) % 3
         a, b, c = np.take_along_axis(net.triangles[rows], turn, axis=1).T
@@ -173,7 +173,7 @@ def _pieces(nodes: F64, cuts: int, corners: tuple[I64, I64, I64], middles: tuple
         return [np.stack([a, p, c], axis=1), np.stack([p, b, c], axis=1)]
     if cuts == 3:
         return [np.stack(t, axis=1) for t in ((a, p, r), (p, b, q), (r, q, c), (p, q, r))]
-    # what is left of a b c without its corner b is cut along its shorter diagonal
+    # the quadrilateral left of a b c without its corner b is cut along its shorter diagonal
     through_a = (np.linalg.norm(nodes[a] - nodes[q], axis=1) <= np.linalg.norm(nodes[p] - nodes[c], axis=1))[:, None]
     return [np.stack([p, b, q], axis=1),
             np.where(through_a, np.stack([a, p, q], axis=1), np.stack([a, p, c], axis=1)),
@@ -181,14 +181,14 @@ def _pieces(nodes: F64, cuts: int, corners: tuple[I64, I64, I64], middles: tuple
 
 
 def _flipped(net: Net, distances: _Distances) -> Net:
-    """Sides that leave the surface exchanged for the other diagonal of their two triangles, where that is nearer."""
+    """Exchange sides that leave the surface for the other diagonal of their two triangles, where that is nearer."""
     triangles = net.triangles.copy()
     for _ in range(FLIP_ROUNDS):
         net = Net(net.nodes, net.uv, triangles, net.kept)
         sides = _sides(net)
         inner = sides.inner
         first, second = sides.uses[inner, 0], sides.uses[inner, 1]
-        # seen from the first triangle the side runs from a to b, c lies on its left, d on its right
+        # in the first triangle the side runs from a to b, c lies on its left, d on its right
         a, b, c = (triangles[first // 3, (first + k) % 3] for k in (0, 1, 2))
         d = triangles[second // 3, (second + 2) % 3]
         now = distances(net, sides.ends[inner])
@@ -204,19 +204,20 @@ def _flipped(net: Net, distances: _Distances) -> Net:
     return Net(net.nodes, net.uv, triangles, net.kept)
 
 
-def _gain(net: Net, corners: tuple[I64, ...], now: F64, flat: F64, distances: _Distances) -> tuple[F64, np.ndarray]:
-    """What flips of side a b into c d bring, larger first, and whether they may be done at all.
+def _gain(net: Net, corners: tuple[I64, ...], distance: F64, flat: F64,
+          distances: _Distances) -> tuple[F64, np.ndarray]:
+    """Gain of flips of side a b into c d, and whether each flip is allowed.
 
-    A cap, three corners almost on a line, comes before everything: its normal says nothing, and halving its long side
-    only makes more of them.
+    A cap, three corners almost on a line, comes first: its normal has no meaning, and halving its long side only makes
+    more caps.
     """
     a, b, c, d = corners
     other = distances(net, np.stack([c, d], axis=1))
     angles = [_angle(net.nodes, *k) for k in ((c, a, d), (a, d, c), (d, c, a), (d, b, c), (b, c, d), (c, d, b))]
     worst = np.max(angles, axis=0)
     cured = (flat > CAP) & (worst < CAP)
-    better = cured | ((other < FLIP_GAIN * now) & (worst < np.maximum(CAP, flat)))
-    return np.where(cured, flat, 0.0) + now - other, better
+    better = cured | ((other < FLIP_GAIN * distance) & (worst < np.maximum(CAP, flat)))
+    return np.where(cured, flat, 0.0) + distance - other, better
 
 
 def _angle(nodes: F64, a: I64, b: I64, c: I64) -> F64:
@@ -226,7 +227,7 @@ def _angle(nodes: F64, a: I64, b: I64, c: I64) -> F64:
 
 
 def _convex(uv: F64, a: I64, b: I64, c: I64, d: I64) -> np.ndarray:
-    """Whether triangles c a d and c d b would stand the same way round in (u, v) as a b c and b a d do."""
+    """Whether triangles c a d and c d b have the same orientation in (u, v) as a b c and b a d."""
     old = _double(uv, a, b, c), _double(uv, b, a, d)
     new = _double(uv, c, a, d), _double(uv, c, d, b)
     whole = old[0] + old[1]
@@ -241,14 +242,17 @@ def _double(uv: F64, a: I64, b: I64, c: I64) -> F64:
 
 
 def present(known: I64, pairs: I64) -> np.ndarray:
-    """(k,) bool, which of ``pairs`` (k, 2) are among the pairs ``known`` (n, 2), either way round."""
+    """Which pairs are known, in either order, (k,) bool.
+
+    known : (n, 2) int64, index; pairs : (k, 2) int64, index, nodes in the frame of the net
+    """
     size = max(int(known.max(initial=0)), int(pairs.max(initial=0))) + 1
     keys = [p.min(axis=1) * size + p.max(axis=1) for p in (pairs, known)]
     return np.isin(keys[0], keys[1])
 
 
 def _apart(pick: I64, gain: F64, first: I64, second: I64, count: int) -> I64:
-    """The flips that gain most among those that share a triangle."""
+    """The flips with the largest gain among those that share a triangle."""
     best = np.full(count, len(pick))
     rank = np.empty(len(pick), np.int64)
     rank[np.argsort(-gain, kind="stable")] = np.arange(len(pick))

@@ -1,4 +1,4 @@
-"""Is the part as large as a part can be, and is its unit believable?"""
+"""Checks of the size of a part and of its unit."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from geometry.mesh import F64
 
 REFUSE_BELOW, REFUSE_ABOVE = 0.5, 10_000.0
 DOUBT_BELOW, DOUBT_ABOVE = 2.0, 5_000.0
-# Mean wall thickness (mm) below which a whole part is more likely mis-scaled than machinable.
+# Mean wall thickness (mm) below which a whole part is more likely in a wrong unit than machinable.
 DOUBT_THICKNESS = 0.1
-# What a unit may have been meant to be, mm in one of it. Likeliest first: mm against m is the usual slip, since many
+# Units that the author may have meant, in mm. The likeliest come first: mm against m is the usual mistake, since many
 # CAD kernels count in metres; then inch.
 FACTORS = {"mm": 1.0, "m": 1000.0, "inch": 25.4, "cm": 10.0, "foot": 304.8}
-# Things nobody makes smaller than a metre in earnest; a small one under such a name is worth a question.
+# Names of things that are larger than a metre. A small part under such a name gets a warning.
 LARGE_THINGS = re.compile(r"wind[\s_-]*(turbine|blade)|turbine[\s_-]*tower|fuselage|\bhull\b|wing[\s_-]*spar",
                           re.IGNORECASE)
 
 
 def check_size(box: F64, unit: str, factor: float) -> None:
-    """Refuse a part no milling machine can mean.
+    """Refuse a part whose size no milling machine can take.
 
-    box    : (2, 3) float64, mm
+    box    : (2, 3) float64, mm, STEP coordinates
     unit   : str, length unit of the file
     factor : float, mm in one unit of the file
     Raises PartError (``part_too_small`` below 0.5 mm overall, ``part_too_large`` above 10 m).
@@ -33,7 +33,7 @@ def check_size(box: F64, unit: str, factor: float) -> None:
     small = size < REFUSE_BELOW
     raise PartError(
         f"the part measures {size:.4g} mm overall ({size / factor:.4g} {unit} in the file), "
-        f"{'less' if small else 'more'} than the {REFUSE_BELOW if small else REFUSE_ABOVE:g} mm that can be planned"
+        f"{'less' if small else 'more'} than the limit of {REFUSE_BELOW if small else REFUSE_ABOVE:g} mm"
         + _likely(size, unit, factor),
         code="part_too_small" if small else "part_too_large", measured=size,
         limit=REFUSE_BELOW if small else REFUSE_ABOVE,
@@ -43,7 +43,7 @@ def check_size(box: F64, unit: str, factor: float) -> None:
 def doubts(box: F64, volume: float, area: float, unit: str, factor: float, names: tuple[str, ...]) -> list[str]:
     """Sentences about a unit that may be wrong; nothing is rescaled.
 
-    box    : (2, 3) float64, mm
+    box    : (2, 3) float64, mm, STEP coordinates
     volume : float, mm³
     area   : float, mm²
     unit   : str, length unit of the file
@@ -67,7 +67,7 @@ def doubts(box: F64, volume: float, area: float, unit: str, factor: float, names
 
 
 def _likely(size: float, unit: str, factor: float, at_least: float = 0.0) -> str:
-    """The likeliest unit that would make the part plausible, in words."""
+    """The likeliest unit that makes the part plausible, in words."""
     for name, millimetres in FACTORS.items():
         scale = millimetres / factor
         if name != unit and DOUBT_BELOW <= size * scale <= DOUBT_ABOVE and scale >= at_least:

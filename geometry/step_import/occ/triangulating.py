@@ -1,4 +1,4 @@
-"""What the kernel's mesher makes of each face of a solid."""
+"""Triangles of the kernel's mesher for each face of a solid."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from geometry.step_import.occ.topology import Shape, faces_of
 
 @dataclass
 class FaceMesh:
-    """Triangles of one face as the kernel made them, or refined since; nodes that no triangle uses may be among them.
+    """Triangles of one face from the kernel, refined or not; some nodes may belong to no triangle.
 
     nodes     : (n, 3) float64, mm
     uv        : (n, 2) float64, surface parameters of the nodes
@@ -61,8 +61,10 @@ def triangulate(solid: Shape, chord: float, angle: float) -> list[FaceMesh]:
 
 
 def triangulate_plainly(solid: Shape, chord: float, angle: float) -> list[FaceMesh | None]:
-    """Like ``triangulate`` without the kernel's own check of its triangles against free-form faces, so with few nodes
-    inside them; None for a face that stays bare. The edges get the same nodes."""
+    """``triangulate`` without the kernel's check of its triangles against free-form faces.
+
+    Faces have few inner nodes and edges the same nodes as in ``triangulate``. None stands for a face without triangles.
+    """
     parameters = _parameters(chord, angle)
     parameters.ControlSurfaceDeflection = False
     _run(solid, parameters)
@@ -76,7 +78,7 @@ def triangulate_plainly(solid: Shape, chord: float, angle: float) -> list[FaceMe
 
 
 def edge_sides(face: Shape) -> NDArray[np.int64]:
-    """(k, 2) int64, pairs of neighbouring nodes of a meshed face along the edges of the solid."""
+    """(k, 2) int64, index: pairs of neighbouring nodes along the edges of the solid, frame of the face mesh."""
     out = [np.zeros((0, 2), np.int64)]
     location = TopLoc_Location()
     triangulation = BRep_Tool.Triangulation_s(face, location)
@@ -91,7 +93,7 @@ def edge_sides(face: Shape) -> NDArray[np.int64]:
 
 
 def _run(solid: Shape, parameters: IMeshTools_Parameters) -> None:
-    # A mesh left from an earlier, coarser run would be kept silently, hence the clean-up.
+    # The kernel silently keeps a mesh of an earlier, coarser run, hence the clean-up.
     BRepTools.Clean_s(solid)
     BRepMesh_IncrementalMesh(solid, parameters)
 
@@ -102,7 +104,7 @@ def _parameters(chord: float, angle: float) -> IMeshTools_Parameters:
     out.Deflection = out.DeflectionInterior = chord
     # the kernel's usual rule: inside a face the chord governs, along edges the angle too
     out.Angle, out.AngleInterior = angle, 2.0 * angle
-    # Else one edge whose ends miss their vertices loosens the whole face: 0.07 mm where 0.01 mm was asked.
+    # Otherwise one edge whose ends miss their vertices loosens the whole face: 0.07 mm instead of 0.01 mm.
     out.ForceFaceDeflection = True
     out.InParallel = True
     return out

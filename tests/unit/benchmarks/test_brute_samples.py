@@ -14,8 +14,8 @@ from benchmarks.reach import brute_samples as brute
 from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.sampling import sample_surface
-from geometry.setup_frame import Placement
-from geometry.tool_body import HolderSegment
+from geometry.setup_frame import SetupFrame
+from geometry.tool_body import HolderFrustum
 from tests.hand_parts import as_part, ball, bent_strip, low_walls, slope_field, tool
 from tests.step_files import write_step
 from zones.reach.assembly import Clearances
@@ -76,7 +76,7 @@ def test_admissible_is_what_every_point_allows(solid):
     assert got.tolist() == expected and 0.1 < got.mean() < 0.9
 
 
-HOLDER = (HolderSegment(8, 12, 4), HolderSegment(12, 12, 10))
+HOLDER = (HolderFrustum(8, 12, 4), HolderFrustum(12, 12, 10))
 
 
 @pytest.mark.parametrize("body", [ball(2.0, neck=2.5, shank=3.4, stickout=6.0, holder=HOLDER), tool(2.4, 0.4),
@@ -120,7 +120,7 @@ def test_the_kernel_gives_the_normals_of_the_faces(tmp_path):
     path = write_step(cq.Workplane().box(12, 12, 5).faces(">Z").workplane().hole(8), tmp_path / "a.step")
     setup = SimpleNamespace(placement=SimpleNamespace(origin_mm=(0, 0, 1), z_axis=(0, 0, 1), x_axis=(1, 0, 0)),
                             part=SimpleNamespace(solid=None))
-    part = load_part(path, placement=Placement((0, 0, 1), (0, 0, 1), (1, 0, 0)), chord=0.01)
+    part = load_part(path, placement=SetupFrame((0, 0, 1), (0, 0, 1), (1, 0, 0)), chord=0.01)
     points, triangles = brute.scattered(part.mesh, np.arange(len(part.mesh.faces)), 2000)
     got = brute.kernel_normals(part, path, setup)(points, triangles)
     hole = np.hypot(points[:, 0], points[:, 1]) < 4.001

@@ -8,16 +8,16 @@ import pytest
 pytest.importorskip("cadquery")
 import cadquery as cq  # noqa: E402
 
+from benchmarks.reach.exact_faces import ExactFaces  # noqa: E402
 from geometry.errors import GeometryError, StepError  # noqa: E402
-from geometry.setup_frame import Placement  # noqa: E402
-from geometry.step_import.exact_faces import ExactFaces  # noqa: E402
+from geometry.setup_frame import SetupFrame  # noqa: E402
 from geometry.step_import.face_surfaces import patches_from_bytes, read_patches  # noqa: E402
 from geometry.step_import.occ.loading import load_part  # noqa: E402
 from geometry.step_import.occ.patches import load_patches  # noqa: E402
 from geometry.step_import.reader import read_part  # noqa: E402
 from tests.step_files import real_part, write_step  # noqa: E402
 
-PLACE = Placement((1, 2, 3), (0.1, 1, 0.2), (1, 0, 0))
+PLACE = SetupFrame((1, 2, 3), (0.1, 1, 0.2), (1, 0, 0))
 
 
 def read_here(path):

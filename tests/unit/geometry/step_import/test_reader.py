@@ -7,10 +7,10 @@ import psutil
 import pytest
 import trimesh
 
+from benchmarks.reach.exact_faces import ExactFaces
 from geometry.mesh import TriangleMesh
 from geometry.part import EdgeKind
-from geometry.setup_frame import Placement
-from geometry.step_import.exact_faces import ExactFaces
+from geometry.setup_frame import SetupFrame
 from geometry.step_import.occ.holes import fill_slivers
 from geometry.step_import.occ.loading import load_part
 from geometry.step_import.occ.meshing import count_open_edges
@@ -66,7 +66,7 @@ def test_units_give_the_same_part(tmp_path, unit, word):
 
 def test_placement_moves_mesh_edges_and_bounds(tmp_path):
     path = write_step(bracket(), tmp_path / "l.step")
-    frame = Placement(origin=(1, 2, 3), z_axis=(0, 1, 0), x_axis=(0, 0, 1))
+    frame = SetupFrame(origin=(1, 2, 3), z_axis=(0, 1, 0), x_axis=(0, 0, 1))
     here, there = load_part(path), load_part(path, placement=frame)
     assert np.allclose(there.bounds, [[-3, -1, -2], [17, 19, 18]], atol=1e-9)
     assert there.mesh.volume == pytest.approx(here.mesh.volume)
@@ -190,7 +190,7 @@ def test_loose_faces_are_sewn(tmp_path):
 
 def test_exact_normals_and_curvature(tmp_path):
     path = write_step(cq.Solid.makeTorus(10, 3), tmp_path / "t.step")
-    frame = Placement(origin=(0, 0, 5), z_axis=(0, 1, 0), x_axis=(1, 0, 0))
+    frame = SetupFrame(origin=(0, 0, 5), z_axis=(0, 1, 0), x_axis=(1, 0, 0))
     points = np.array([[13.5, 0, 0], [6.5, 0, 0], [10, 0, 3.2]])  # STEP: outside, hole, top
     there = points @ frame.matrix[:3, :3].T + frame.matrix[:3, 3]
     exact = ExactFaces(path, placement=frame)
@@ -221,7 +221,7 @@ def test_inch_propeller():
 @pytest.mark.slow
 def test_compressor_wheel_is_fused_and_its_stray_dropped():
     part = read_part(real_part("imp_kj66_compressor_wheel.step"), chord=0.05,
-                     placement=Placement(z_axis=(0, 1, 0), x_axis=(1, 0, 0)))
+                     placement=SetupFrame(z_axis=(0, 1, 0), x_axis=(1, 0, 0)))
     assert part.deviation <= 0.075 and count_open_edges(part.mesh) == 0
     assert any("stray" in w for w in part.warnings) and any("fused into 1" in w for w in part.warnings)
     assert 65_534 < part.volume < 78_553

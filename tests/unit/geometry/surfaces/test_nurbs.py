@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
+from benchmarks.passes.faceting import facet_deviation, steps_for_chord
 from examples.family.thesis import Kind, control_points, surface
 from geometry.errors import GeometryError
 from geometry.mesh import TriangleMesh
-from geometry.setup_frame import Placement
-from geometry.surfaces.faceting import facet_deviation, steps_for_chord
+from geometry.setup_frame import SetupFrame
 from geometry.surfaces.foot_points import foot_points
 from geometry.surfaces.nurbs import NurbsSurface, open_uniform_knots
 
@@ -108,7 +108,7 @@ def test_weights_that_are_equal_change_nothing():
 
 def test_a_motion_moves_points_and_normals_and_leaves_curvature():
     s, uv = random_surface(), inner(random_surface())
-    matrix = Placement((1, 2, 3), (0.3, 1, 0.2), (1, 0, 0)).matrix
+    matrix = SetupFrame((1, 2, 3), (0.3, 1, 0.2), (1, 0, 0)).matrix
     m = s.moved(matrix)
     assert np.allclose(m.points(uv), s.points(uv) @ matrix[:3, :3].T + matrix[:3, 3], atol=1e-13)
     assert np.allclose(m.normals(uv), s.normals(uv) @ matrix[:3, :3].T, atol=1e-13)

@@ -7,16 +7,16 @@ import xml.etree.ElementTree as ET
 
 import pytest
 
-from geometry.tool_body import HolderSegment, ToolBody
+from geometry.tool_body import HolderFrustum, ToolBody
 from service.pictures.tool_drawing import HEIGHT, LETTER, WIDTH, draw_tool, svg_of
 
 SVG = "{http://www.w3.org/2000/svg}"
-HOLDER = (HolderSegment(14.0, 20.0, 12.0), HolderSegment(20.0, 20.0, 30.0))
+HOLDER = (HolderFrustum(14.0, 20.0, 12.0), HolderFrustum(20.0, 20.0, 30.0))
 BALL = ToolBody("T1", 1, 3.0, 1.5, 9.0, 2.8, 20.0, 6.0, 45.0, HOLDER)
 BULL = ToolBody("T7", 7, 8.0, 1.0, 20.0, 8.0, 20.0, 8.0, 50.0)
-LONG = ToolBody("T9", 9, 0.4, 0.0, 0.8, 0.38, 6.0, 4.0, 60.0, (HolderSegment(63.0, 63.0, 160.0),) * 3)
-CROWDED = ToolBody("T3", 3, 1.0, 0.5, 1.0, 0.9, 1.2, 3.0, 1.4, (HolderSegment(40.0, 40.0, 0.3),) * 12)
-STACKED = ToolBody("T4", 4, 6.0, 0.0, 12.0, 6.0, 12.0, 6.0, 30.0, (HolderSegment(20.0, 22.0, 1.0),) * 50)
+LONG = ToolBody("T9", 9, 0.4, 0.0, 0.8, 0.38, 6.0, 4.0, 60.0, (HolderFrustum(63.0, 63.0, 160.0),) * 3)
+CROWDED = ToolBody("T3", 3, 1.0, 0.5, 1.0, 0.9, 1.2, 3.0, 1.4, (HolderFrustum(40.0, 40.0, 0.3),) * 12)
+STACKED = ToolBody("T4", 4, 6.0, 0.0, 12.0, 6.0, 12.0, 6.0, 30.0, (HolderFrustum(20.0, 22.0, 1.0),) * 50)
 TOOLS = [(BALL, 87.0), (BULL, 50.0), (LONG, 560.0), (CROWDED, 5.0), (STACKED, 80.0)]
 
 

@@ -131,7 +131,7 @@ def test_reasons_are_told_once_with_their_area():
 
 
 def test_colours_and_classes_are_those_of_the_page():
-    source = (Path(__file__).parents[4] / "web" / "src" / "colours.ts").read_text()
+    source = (Path(__file__).parents[4] / "web" / "src" / "scene" / "colours.ts").read_text()
 
     def rows(name):
         body = re.search(rf"const {name}: RGB(?:\[\])? = (.*?);", source, re.S)[1]

@@ -8,7 +8,7 @@ import pytest
 from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import drop_tips
-from geometry.tool_body import HolderSegment
+from geometry.tool_body import HolderFrustum
 from tests.hand_parts import ball, box_mesh, dome, field_of, joined
 from toolpath.passes.pass_family import Target
 from toolpath.passes.reach_border import COARSEST, FAR, beyond
@@ -67,7 +67,7 @@ def test_a_disc_on_a_plate_is_ringed_all_round(copies):
 def test_the_border_of_what_the_holder_lets_reach_is_known_to_a_step():
     # a holder of 6 mm round the axis and a wall at x = 8: the ball touches the plate up to x = 8 - 6 - clearance
     block = joined(plate(), box_mesh((8.0, -20.0, 0.0), (12.0, 20.0, 30.0)))
-    field = field_of(TriangleTree(block), ball(3.0, stickout=8.0, holder=(HolderSegment(12, 12, 30),)))
+    field = field_of(TriangleTree(block), ball(3.0, stickout=8.0, holder=(HolderFrustum(12, 12, 30),)))
     far = np.linspace(0.0, 3.0, 3001)
     line = np.column_stack([far, np.zeros(3001), np.zeros(3001)])
     border = far[touchable(field, line, np.tile([0.0, 0.0, 1.0], (3001, 1)), LIFT)[1]].max()

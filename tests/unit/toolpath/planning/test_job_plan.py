@@ -20,7 +20,7 @@ from toolpath.stock.cut_history import OVERLAP, Depths, Walked
 from toolpath.stock.stock_map import StockMap
 from toolpath.strategies.depth_layers import EVEN
 from toolpath.workingsteps import Motion
-from zones.machinable_area import Form
+from zones.machinable_area import AreaForm
 
 STEP_DOWN = 0.3  # tool diameters, as ``plan_part`` has it
 CUT = {"T1": CutData(11_000, 810, 210, 3100, 0.9), "T2": CutData(12_000, 820, 220, 3200, 1.2)}
@@ -64,7 +64,7 @@ def bytes_of(c: Case) -> list[bytes]:
 def test_a_later_round_walks_only_what_no_earlier_one_has():
     """Rounds ask for the first six tenths of a line, for its first four, and for all of it."""
     c = case("walls")
-    zone = next(z for z in c.zones if z.form is Form.STEEP)
+    zone = next(z for z in c.zones if z.form is AreaForm.STEEP)
     check = Target(c.samples.points[zone.samples], c.samples.normals[zone.samples], zone.tips, 0.2)
     cut = CutData(10_000, 800, 200, 3000, 0.75)
     stock = StockMap(c.stock_before.lattice, c.stock_before.top.copy())
@@ -92,7 +92,7 @@ def test_a_later_round_walks_only_what_no_earlier_one_has():
 def test_what_layers_have_finished_gets_no_pass_and_says_so():
     """What a finish has cut is measured as if layers had: once nothing is left, not even another way is tried."""
     c = case("walls")
-    zone = next(z for z in c.zones if z.form is Form.STEEP)
+    zone = next(z for z in c.zones if z.form is AreaForm.STEEP)
     check = Target(c.samples.points[zone.samples], c.samples.normals[zone.samples], zone.tips, 0.2)
     cut = CutData(10_000, 800, 200, 3000, 0.75)
 
@@ -117,7 +117,7 @@ def test_what_layers_have_finished_gets_no_pass_and_says_so():
 def test_zones_of_a_tool_do_not_walk_the_same_line_twice():
     """The second of two zones asks for the line of the first and for one more; both count for it as walked."""
     c = case("walls")
-    zone = next(z for z in c.zones if z.form is Form.STEEP)
+    zone = next(z for z in c.zones if z.form is AreaForm.STEEP)
     check = Target(c.samples.points[zone.samples], c.samples.normals[zone.samples], zone.tips, 0.2)
     cut = CutData(10_000, 800, 200, 3000, 0.75)
     stock = StockMap(c.stock_before.lattice, c.stock_before.top.copy())
@@ -194,7 +194,8 @@ def test_what_became_of_a_zone_agrees_with_its_step(name):
         assert p.passes == sum(b and not a for a, b in zip([False, *cuts], cuts, strict=False)) > 0
         flat = p.zone.tool.radius - p.zone.tool.corner_radius
         dragged = {"zigzag", "spiral"}
-        want = {Form.STEEP: {"waterline"}, Form.LEVEL: {"planar_floor"} if flat > 0 else dragged, Form.SHALLOW: dragged}
+        want = {AreaForm.STEEP: {"waterline"}, AreaForm.LEVEL: {"planar_floor"} if flat > 0 else dragged,
+                AreaForm.SHALLOW: dragged}
         assert p.strategy in want[p.zone.form]
 
 
@@ -397,7 +398,7 @@ def above_part(c: Case, **changes) -> np.ndarray:
     checks = [Target(c.samples.points[z.samples], c.samples.normals[z.samples], z.tips, 0.2) for z in c.zones]
     cut = {t: CutData(10_000, 800, 200, 3000, STEP_DOWN * f.tool.diameter) for t, f in c.fields.items()}
     plan_job(c.zones, checks, c.fields, cut, stock, replace(c.settings, finishing=False, **changes))
-    mine = np.concatenate([z.samples for z in c.zones if z.form is not Form.LEVEL])
+    mine = np.concatenate([z.samples for z in c.zones if z.form is not AreaForm.LEVEL])
     points, normals = c.samples.points[mine], c.samples.normals[mine]
     up = normals[:, 2] > 0.3
     return (stock.top[lat.cells(points[up, :2])] - points[up, 2]) * normals[up, 2]

@@ -17,7 +17,7 @@ from toolpath.planning.zone_finishing import Finish
 from toolpath.stock.residual_map import ResidualMap
 from toolpath.stock.stock_map import StockMap
 from toolpath.stock.wall_skin import Skins, behind
-from zones.machinable_area import Form
+from zones.machinable_area import AreaForm
 from zones.reach.assembly import Clearances, Disc
 
 SCALLOP, STEP = 0.02, 0.15
@@ -161,7 +161,7 @@ def test_surroundings_become_those_of_a_copy():
 
 def test_a_zone_knows_its_skins_as_it_measured_them():
     c = plan_part(low_walls(), [ball(2.5), ball(1.5, "T2")])
-    zone = next(z for z in c.zones if z.form is Form.STEEP)
+    zone = next(z for z in c.zones if z.form is AreaForm.STEEP)
     check = Target(c.samples.points[zone.samples], c.samples.normals[zone.samples], zone.tips, 0.2)
     finish = Finish(zone, check, c.fields[zone.tool.id], CutData(10_000, 800, 200, 3000, 0.75), c.stock_before,
                     replace(c.settings, turning=FREE))

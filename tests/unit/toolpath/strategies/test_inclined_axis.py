@@ -34,7 +34,7 @@ from toolpath.plan_settings import CutData, Leaned
 from toolpath.stock.stock_map import SKIN, StockMap
 from toolpath.strategies import inclined_axis
 from toolpath.workingsteps import Motion, Trajectory
-from zones.machinable_area import Form
+from zones.machinable_area import AreaForm
 from zones.reach.assembly import Clearances
 
 BALL = ball(6.0)
@@ -191,11 +191,12 @@ def test_what_the_machine_cannot_take_is_left_with_the_reason():
 
 def test_level_zones_and_tools_without_a_corner_are_not_asked_and_walls_only_by_name():
     asked = Leaned(0.1, 0.2, walls=1.0)
-    assert inclined_axis.asked(None, Form.SHALLOW, BALL) is None
-    assert inclined_axis.asked(asked, Form.LEVEL, BALL) is None and inclined_axis.asked(asked, Form.SHALLOW, tool(6.0, 0.0)) is None
-    assert inclined_axis.asked(asked, Form.SHALLOW, BALL) == asked
-    assert inclined_axis.asked(asked, Form.STEEP, BALL) == Leaned(0.0, 1.0, 1.0)
-    assert inclined_axis.asked(TILTED, Form.STEEP, BALL) is None
+    assert inclined_axis.asked(None, AreaForm.SHALLOW, BALL) is None
+    assert inclined_axis.asked(asked, AreaForm.LEVEL, BALL) is None
+    assert inclined_axis.asked(asked, AreaForm.SHALLOW, tool(6.0, 0.0)) is None
+    assert inclined_axis.asked(asked, AreaForm.SHALLOW, BALL) == asked
+    assert inclined_axis.asked(asked, AreaForm.STEEP, BALL) == Leaned(0.0, 1.0, 1.0)
+    assert inclined_axis.asked(TILTED, AreaForm.STEEP, BALL) is None
 
 
 def test_a_zone_that_stays_upright_although_asked_to_lean_is_a_caution_with_the_reason():
@@ -208,10 +209,11 @@ def test_a_zone_that_stays_upright_although_asked_to_lean_is_a_caution_with_the_
         return SimpleNamespace(zone=name, strategy=strategy, trajectories=[
             Trajectory(Motion.CUT, points[:2], FEED), Trajectory(Motion.LIFT, points[1:], FEED)])
 
-    zones = [zone("Z1", Form.SHALLOW, "inclined_axis"), zone("Z2", Form.SHALLOW, "zigzag", "a reason", "another"),
-             zone("Z3", Form.STEEP, "waterline"), zone("Z4", Form.SHALLOW, "depth_layers"),
-             zone("Z5", Form.SHALLOW, "zigzag"), zone("Z6", Form.SHALLOW, "zigzag", body=tool(6.0, 0.0)),
-             zone("Z7", Form.SHALLOW, "inclined_axis"), zone("Z8", Form.SHALLOW, "curvature_matched", "too slow")]
+    zones = [zone("Z1", AreaForm.SHALLOW, "inclined_axis"),
+             zone("Z2", AreaForm.SHALLOW, "zigzag", "a reason", "another"),
+             zone("Z3", AreaForm.STEEP, "waterline"), zone("Z4", AreaForm.SHALLOW, "depth_layers"),
+             zone("Z5", AreaForm.SHALLOW, "zigzag"), zone("Z6", AreaForm.SHALLOW, "zigzag", body=tool(6.0, 0.0)),
+             zone("Z7", AreaForm.SHALLOW, "inclined_axis"), zone("Z8", AreaForm.SHALLOW, "curvature_matched", "too slow")]
     steps = [step(z.zone.id, z.strategy) for z in zones if z.strategy != "depth_layers"]
     steps += [step(None, "depth_layers"), step("Z1", "zigzag", 29.0), step("Z7", "zigzag", 31.0), step("Z8", "spiral", 90.0)]
     first, second, third, fourth = upright(TILTED, zones, steps)

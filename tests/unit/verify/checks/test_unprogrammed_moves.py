@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from geometry.tool_body import HolderSegment, ToolBody
+from geometry.tool_body import HolderFrustum, ToolBody
 from verify.checks.machine_limits import way_findings
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
 from verify.model import ProofSetup, StockKind
 
-TOOL = ToolBody("T1", 1, 3.0, 1.5, 9.0, 2.8, 20.0, 6.0, 45.0, (HolderSegment(50.0, 50.0, 30.0),))
+TOOL = ToolBody("T1", 1, 3.0, 1.5, 9.0, 2.8, 20.0, 6.0, 45.0, (HolderFrustum(50.0, 50.0, 30.0),))
 BOUNDS = np.array([[-20.0, -20.0, 0.0], [20.0, 20.0, 20.0]])
 PIVOTS = {"table-table-AC": ((0.0, 0.0, -50.0), (0.0, 0.0, 0.0)), "head-table-BC": ((0.0, 0.0, 100.0), (0.0, 0.0, 0.0)),
           "head-head-AC": ((0.0, 0.0, 100.0),)}

@@ -18,7 +18,7 @@ from zones.plan_view.channel_plan import ChannelPlan
 from zones.plan_view.free_places import MATERIAL, LevelPlaces
 from zones.plan_view.plan_cover import FACES_UP, cover_border
 from zones.plan_view.plan_map import PlanMap
-from zones.plan_view.regions import Labels, Region, Regioner, base_of, connections_of, place_of
+from zones.plan_view.regions import Labels, Region, RegionLocator, base_of, connections_of, place_of
 
 pytest.importorskip("cadquery")
 
@@ -37,7 +37,7 @@ def measured(webs, bar=False) -> tuple[Part, Decomposition, ChannelPlan, Surface
     d = decompose(part)
     plan = ChannelPlan.of(part, d)
     samples = sample_surface(part.mesh, 6.0, seed=4)
-    return part, d, plan, samples, Regioner(part, d, plan).of(samples.points, samples.normals, samples.face)
+    return part, d, plan, samples, RegionLocator(part, d, plan).of(samples.points, samples.normals, samples.face)
 
 
 def spans(names, samples, web) -> dict[str, bool]:

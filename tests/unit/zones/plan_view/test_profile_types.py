@@ -12,7 +12,7 @@ from geometry.errors import GeometryError
 from geometry.surfaces.bspline import SplineCurve
 from tests.profile_curves import DRAW, draw
 from tests.source_tree import ROOT
-from zones.plan_view.curve_bends import Way, _pivots, measure_bends, size_of
+from zones.plan_view.curve_bends import BendSide, _pivots, measure_bends, size_of
 from zones.plan_view.profile_types import LEVEL, ROUND, SKEW, Level, ProfileType, VoidSide, classify
 
 # Limits were chosen on seeds below 1000; scores are taken on these.
@@ -99,7 +99,7 @@ def test_bends_alternate_and_add_up_to_the_turn() -> None:
             ways = [b.way for b in level.bends]
             assert all(a != b for a, b in zip(ways, ways[1:], strict=False))
         bends = measures.levels[0].bends
-        signed = sum(b.turn * (-1 if b.way == Way.UP else 1) for b in bends)
+        signed = sum(b.turn * (-1 if b.way == BendSide.UP else 1) for b in bends)
         assert signed == pytest.approx(measures.turn, abs=1e-9)
 
 
@@ -173,8 +173,8 @@ def test_bends_of_a_ring_start_at_its_least_curvature() -> None:
     for other in lists[1:]:
         assert [b.way for b in other] == [b.way for b in lists[0]]
         assert [b.turn for b in other] == pytest.approx([b.turn for b in lists[0]], abs=np.radians(3))
-    assert lists[0][0].way == Way.UP
-    turns = [b.turn * (-1 if b.way == Way.UP else 1) for b in lists[0]]
+    assert lists[0][0].way == BendSide.UP
+    turns = [b.turn * (-1 if b.way == BendSide.UP else 1) for b in lists[0]]
     assert sum(turns) == pytest.approx(2 * np.pi, rel=1e-6)
 
 

@@ -16,8 +16,8 @@ from zones.features.decomposition import decompose
 from zones.model import Decomposition
 from zones.plan_view.categories import Categories
 from zones.plan_view.channel_plan import ChannelPlan
-from zones.plan_view.channel_strips import Strip, spread
-from zones.plan_view.regions import Labels, Regioner
+from zones.plan_view.channel_strips import ChannelStrip, spread
+from zones.plan_view.regions import Labels, RegionLocator
 
 pytest.importorskip("cadquery")
 
@@ -28,7 +28,7 @@ def measured(name: str) -> tuple[Part, Decomposition, ChannelPlan, SurfaceSample
     d = decompose(part)
     plan = ChannelPlan.of(part, d)
     samples = sample_surface(part.mesh, 12.0, seed=4)
-    return part, d, plan, samples, Regioner(part, d, plan).of(samples.points, samples.normals, samples.face)
+    return part, d, plan, samples, RegionLocator(part, d, plan).of(samples.points, samples.normals, samples.face)
 
 
 def area_of(name: str, region: str) -> float:
@@ -105,7 +105,7 @@ def test_every_point_has_one_region_whatever_the_view() -> None:
     from zones.reach.access_view import turned, turned_samples
 
     here, seen = turned(part, flip), turned_samples(samples, flip)
-    other = Regioner(here, d, plan, first=False).of(seen.points, seen.normals, seen.face,
+    other = RegionLocator(here, d, plan, first=False).of(seen.points, seen.normals, seen.face,
                                                     (samples.points, samples.normals))
     base = np.array([labels.regions[k].base for k in labels.code])
     assert (np.array([other.regions[k].base for k in other.code]) == base).all()
@@ -124,5 +124,5 @@ def test_rays_start_evenly_and_point_to_the_left() -> None:
 
 def test_a_strip_is_as_wide_as_its_rays_are_long() -> None:
     x = np.linspace(0, 5, 6)
-    strip = Strip("H1", np.column_stack([x, 0 * x]), np.column_stack([x, 0 * x + 2]))
+    strip = ChannelStrip("H1", np.column_stack([x, 0 * x]), np.column_stack([x, 0 * x + 2]))
     assert strip.area.area == pytest.approx(10.0) and np.allclose(strip.centre_line[:, 1], 1.0)

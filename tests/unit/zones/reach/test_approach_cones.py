@@ -9,7 +9,7 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.sampling import sample_surface
-from geometry.tool_body import HolderSegment
+from geometry.tool_body import HolderFrustum
 from tests.hand_parts import ball, dome, field_of, low_walls, terraces, tool
 from zones.reach.approach_cones import approach, directions_over_hemisphere, resolution_of, zone_cone
 from zones.reach.assembly import Clearances
@@ -73,7 +73,7 @@ def test_ball_alone_on_a_plane_comes_from_everywhere_above():
 def test_ball_on_a_plane_leans_until_shank_or_holder_touches(neck, shank, stickout, holder):
     """The rim of a disc of radius B that begins A above the ball's centre: A cos t - B sin t = -(R + lift)."""
     R = 1.5
-    segments = (HolderSegment(holder, holder, 20.0),) if holder else ()
+    segments = (HolderFrustum(holder, holder, 20.0),) if holder else ()
     body = ball(2 * R, neck=neck, shank=shank, stickout=stickout, holder=segments)
     discs = [(neck, shank / 2 + 0.2)] if shank > 2 * R else []
     discs += [(stickout, holder / 2 + 1.0)] if holder else []
@@ -129,7 +129,7 @@ def test_top_of_a_dome_has_a_cone_near_the_half_space():
 
 
 @pytest.mark.parametrize("body", [
-    ball(2.0, neck=2.5, shank=3.4, stickout=5.0, holder=(HolderSegment(8, 14, 5), HolderSegment(14, 14, 20))),
+    ball(2.0, neck=2.5, shank=3.4, stickout=5.0, holder=(HolderFrustum(8, 14, 5), HolderFrustum(14, 14, 20))),
     tool(2.0, 0.0, neck=3.0, shank=4.0), tool(2.4, 0.4)], ids=["ball", "flat", "bull"])
 def test_upright_it_is_what_reach_says_without_play(body):
     mesh = low_walls()

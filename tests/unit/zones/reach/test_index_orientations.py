@@ -7,7 +7,7 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.sampling import sample_surface
-from geometry.tool_body import HolderSegment, ToolBody
+from geometry.tool_body import HolderFrustum, ToolBody
 from output.inverse_kinematics import RotaryMachine
 from service.stages.programs import room_to_turn
 from tests.hand_parts import box_mesh, joined
@@ -17,9 +17,9 @@ from verify.kinematics import Kinematics
 from verify.model import ProofSetup
 from zones.reach.approach_cones import directions_over_hemisphere
 from zones.reach.assembly import Clearances
-from zones.reach.index_orientations import Gatherer, _chosen, orientations
+from zones.reach.index_orientations import AxisCoverage, _chosen, orientations
 
-BALL = ToolBody("T1", 1, 3.0, 1.5, 9.0, 2.8, 24.0, 6.0, 36.0, (HolderSegment(20.0, 20.0, 30.0),))
+BALL = ToolBody("T1", 1, 3.0, 1.5, 9.0, 2.8, 24.0, 6.0, 36.0, (HolderFrustum(20.0, 20.0, 30.0),))
 
 
 UP = np.array([[0.0, 0.0, 1.0]])
@@ -33,22 +33,22 @@ def shelf():
 
 def test_under_a_roof_one_axis_from_the_open_side_does():
     mesh = shelf()
-    gatherer = Gatherer(TriangleTree(mesh), [BALL], Clearances(), 0.02, 0.005, 0.0)
+    coverage = AxisCoverage(TriangleTree(mesh), [BALL], Clearances(), 0.02, 0.005, 0.0)
     every = sample_surface(mesh, 2.0, seed=1)
     x, _, z = every.points.T
     under = np.flatnonzero((np.abs(z - 2.0) < 1e-6) & (every.normals[:, 2] > 0.9) & (x > 6.0) & (x < 16.0))
     few = every.subset(under)
-    assert not gatherer.reached(few, np.array([[0.0, 0.0, 1.0]])).any()
+    assert not coverage.reached(few, np.array([[0.0, 0.0, 1.0]])).any()
     machine = RotaryMachine("table-table-AC", None, np.radians([[-100.0, 100.0], [-360.0, 360.0]]))
-    axes = orientations(few, gatherer, machine.stands, machine.even, UP, 5.0)
+    axes = orientations(few, coverage, machine.stands, machine.even, UP, 5.0)
     assert 1 <= len(axes) <= 2 and axes[0] @ [1.0, 0.0, 0.0] > 0.3
-    got = gatherer.reached(few, axes).any(axis=1)
-    best = gatherer.reached(few, directions_over_hemisphere(241)).any(axis=1)
+    got = coverage.reached(few, axes).any(axis=1)
+    best = coverage.reached(few, directions_over_hemisphere(241)).any(axis=1)
     assert few.area[got].sum() > few.area[best].sum() - 5.0 * len(axes) - 1e-9
     turns = np.degrees(machine.turns(axes)[:, 0])
     assert np.allclose(turns, np.round(turns), atol=1e-6)  # whole degrees
     limited = RotaryMachine("table-table-AC", None, np.radians([[-10.0, 10.0], [-360.0, 360.0]]))
-    assert len(orientations(few, gatherer, limited.stands, limited.even, UP, 5.0)) == 0
+    assert len(orientations(few, coverage, limited.stands, limited.even, UP, 5.0)) == 0
 
 
 def test_the_choice_is_the_best_of_all_choices():

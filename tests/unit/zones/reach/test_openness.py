@@ -13,7 +13,7 @@ from tests.decomposition_shapes import box, to_part
 from tests.hand_parts import as_part, ball, field_of, samples_of, terraces, tool, view_of
 from zones.features.decomposition import decompose
 from zones.kernels.flood import escape_heights
-from zones.machinable_area import Form
+from zones.machinable_area import AreaForm
 from zones.model import Decomposition
 from zones.plan_view.regions import base_of
 from zones.reach.openness import escape_field, open_share
@@ -59,7 +59,7 @@ def share_of(mesh, body, inside):
     field = field_of(mesh, body)
     samples = samples_of(mesh, 12.0)
     view = view_of(as_part(mesh), samples, {body.id: field})
-    zones = [z for z in build_zones([view], Decomposition((), (), ()), 0.02, 0.002).zones if z.form is Form.STEEP]
+    zones = [z for z in build_zones([view], Decomposition((), (), ()), 0.02, 0.002).zones if z.form is AreaForm.STEEP]
     rows, tips = (np.concatenate([getattr(z, a) for z in zones]) for a in ("samples", "tips"))
     p = samples.points[rows]
     mine = ((p[:, :2] > inside[0]) & (p[:, :2] < inside[1])).all(axis=1)
@@ -106,7 +106,7 @@ def test_eight_congruent_channels_get_one_verdict(angle, closed, seed):
     view = view_of(part, samples, fields, d)
     verdicts = defaultdict(dict)
     for z in build_zones([view], d, 0.02, 0.003).zones:
-        if base_of(z.region)[0] == "H" and z.form is Form.STEEP:
+        if base_of(z.region)[0] == "H" and z.form is AreaForm.STEEP:
             verdicts[z.tool.id][z.region] = is_open(z, fields[z.tool.id], samples.area)
     assert max(len(v) for v in verdicts.values()) >= 8
     for tool_id, v in verdicts.items():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
-from geometry.tool_body import HolderSegment
+from geometry.tool_body import HolderFrustum
 from tests.hand_parts import ball, box_mesh, field_of, terraces, tool, walls
 from zones.lattice import Lattice, lattice_step
 from zones.reach.assembly import Clearances, discs_of
@@ -52,7 +52,7 @@ def test_lattice_steps_follow_the_tool_within_limits():
 
 def test_discs_enclose_shank_and_holder_with_their_clearance():
     body = ball(4.0, neck=20, shank=6.0, stickout=45,
-                holder=(HolderSegment(10, 22, 12), HolderSegment(22, 22, 20)))
+                holder=(HolderFrustum(10, 22, 12), HolderFrustum(22, 22, 20)))
     discs = discs_of(body, Clearances(shank=0.2, holder=1.0))
     assert (discs[0].name, discs[0].radius, discs[0].height) == ("shank", 3.2, 20)
     holder = [d for d in discs if d.name == "holder"]
@@ -112,7 +112,7 @@ def test_shank_and_holder_set_the_depth():
     by_cutter, by_tool, tips = touchable(field_of(mesh, ball(4.0, neck=7.0, shank=6.0)), p, n, 0.002)
     assert by_cutter.tolist() == [True, True, True, False]
     assert by_tool.tolist() == [True, True, False, False]
-    held = field_of(mesh, ball(4.0, stickout=5.0, holder=(HolderSegment(20, 20, 30),)))
+    held = field_of(mesh, ball(4.0, stickout=5.0, holder=(HolderFrustum(20, 20, 30),)))
     by_cutter, by_tool, tips = touchable(held, p, n, 0.002)
     assert by_tool.tolist() == [True, False, False, False]
     assert held.tips(np.array([[12.0, 5.0]]))[0] == pytest.approx(7.0)
@@ -141,7 +141,7 @@ def test_heights_at_the_nodes_are_the_tips_there():
 def test_beyond_the_look_up_a_holder_is_not_taken_for_free():
     # a holder of 40 mm reaches the part from far outside the lattice
     mesh = box_mesh([0, 0, 0], [10, 10, 30])
-    body = ball(4.0, stickout=10.0, holder=(HolderSegment(40, 40, 30),))
+    body = ball(4.0, stickout=10.0, holder=(HolderFrustum(40, 40, 30),))
     field = field_of(mesh, body)
     at = np.array([[17.5, 5.0, 0.0], [19.0, 5.0, 0.0], [-25.0, 5.0, 0.0]])
     assert field.blocked_by_body(at).all()
@@ -160,7 +160,7 @@ def test_many_queries_answer_like_few():
 
 @pytest.mark.parametrize("stickout", [12.0, 14.0, 16.0, 30.0])
 def test_discs_without_a_grid_block_nothing_a_grid_would(monkeypatch, stickout):
-    body = ball(3.0, neck=9.0, shank=5.0, stickout=stickout, holder=(HolderSegment(8, 14, 5), HolderSegment(20, 20, 9)))
+    body = ball(3.0, neck=9.0, shank=5.0, stickout=stickout, holder=(HolderFrustum(8, 14, 5), HolderFrustum(20, 20, 9)))
     mesh = walls()
     some = field_of(mesh, body, allowance=0.1)
     monkeypatch.setattr(type(some), "_can_meet", lambda _self, _disc: True)

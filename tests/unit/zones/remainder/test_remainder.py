@@ -10,7 +10,7 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.sampling import SurfaceSamples
-from geometry.tool_body import HolderSegment
+from geometry.tool_body import HolderFrustum
 from tests.hand_parts import as_part, ball, box_mesh, field_of, joined, samples_of, terraces, tool, view_of
 from zones.model import Connection, Decomposition
 from zones.reach.tip_field import touchable
@@ -59,9 +59,9 @@ def test_nothing_left_is_an_empty_list():
 
 @pytest.mark.parametrize("body, reason", [
     (ball(3.0, neck=4.0, shank=6.0), "shank"),
-    (ball(3.0, neck=60.0, stickout=5.0, holder=(HolderSegment(12, 30, 10), HolderSegment(30, 30, 20))), "holder"),
-    (ball(3.0, neck=5.0, shank=5.0, stickout=6.0, holder=(HolderSegment(20, 20, 20),)), "shank"),
-    (tool(4.0, 0.0, neck=3.0, shank=8.0, stickout=9.0, holder=(HolderSegment(20, 20, 20),)), "shank"),
+    (ball(3.0, neck=60.0, stickout=5.0, holder=(HolderFrustum(12, 30, 10), HolderFrustum(30, 30, 20))), "holder"),
+    (ball(3.0, neck=5.0, shank=5.0, stickout=6.0, holder=(HolderFrustum(20, 20, 20),)), "shank"),
+    (tool(4.0, 0.0, neck=3.0, shank=8.0, stickout=9.0, holder=(HolderFrustum(20, 20, 20),)), "shank"),
 ])
 def test_a_longer_tool_that_is_asked_for_reaches(body, reason):
     mesh = block()

@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
-from geometry.tool_body import HolderSegment
+from geometry.tool_body import HolderFrustum
 from tests.hand_parts import as_part, ball, box_mesh, field_of, joined, samples_of, terraces, tool, view_of
 from zones.reach.access_reach import able
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import touchable
 from zones.remainder import tool_proposal
-from zones.remainder.tool_catalogue import DIAMETERS, MOST_SLENDER, catalogue
+from zones.remainder.tool_catalogue import DIAMETERS, MAX_SLENDERNESS, catalogue
 from zones.remainder.tool_proposal import propose
-from zones.remainder.tool_requirements import Buyer, Cutter
+from zones.remainder.tool_requirements import CuttingPart, ToolRequirement
 from zones.zoning.zones import LEAST_ZONE_MM2
 
 LIFT = 0.002
-HOLDER = (HolderSegment(10, 16, 8), HolderSegment(16, 16, 20))
+HOLDER = (HolderFrustum(10, 16, 8), HolderFrustum(16, 16, 20))
 
 
 def takes(mesh, body, samples, margin=4.0):
@@ -40,7 +40,8 @@ def remainder(mesh, tools, density=8.0):
 
 def buyer_of(mesh, tools, samples):
     tree = TriangleTree(mesh)
-    return Buyer(view_of(as_part(mesh), samples, {t.id: field_of(tree, t) for t in tools}), LIFT, Clearances())
+    fields = {t.id: field_of(tree, t) for t in tools}
+    return ToolRequirement(view_of(as_part(mesh), samples, fields), LIFT, Clearances())
 
 
 def asked(mesh, tools, samples):
@@ -49,7 +50,7 @@ def asked(mesh, tools, samples):
 
 def areas(found, samples):
     """Area by what is said of the samples, mm²."""
-    area = samples.area[found.asked]
+    area = samples.area[found.rows]
     area = area * (samples.area.sum() / area.sum())
     return {str(w): float(area[found.why == w].sum()) for w in set(found.why.tolist())}
 
@@ -76,7 +77,7 @@ def test_what_is_proposed_takes_what_is_claimed_wherever_the_grid_lies():
     found = asked(mesh, AT_HAND, left)
     got = areas(found, left)
     assert found.tools and got["taken"] > 0.9 * float(left.area.sum())
-    taken = left.subset(found.asked[found.why == "taken"])
+    taken = left.subset(found.rows[found.why == "taken"])
     for margin in (4.0, 4.13, 4.27):
         by_tool = np.array([takes(mesh, body, taken, margin) for body in grown(AT_HAND, found)])
         assert by_tool.any(axis=0).all()
@@ -85,7 +86,7 @@ def test_what_is_proposed_takes_what_is_claimed_wherever_the_grid_lies():
             alone = by_tool[k] & ~np.delete(by_tool, k, axis=0).any(axis=0)
             assert scale * float(taken.area[alone].sum()) >= LEAST_ZONE_MM2
     for t in found.tools:
-        assert t.neck_length_mm <= MOST_SLENDER * t.diameter_mm + 1e-9
+        assert t.neck_length_mm <= MAX_SLENDERNESS * t.diameter_mm + 1e-9
         assert t.stickout_mm >= t.neck_length_mm + t.shank_diameter_mm - 1e-9
         assert t.flute_length_mm <= t.neck_length_mm
 
@@ -94,7 +95,7 @@ def test_no_shorter_neck_would_do():
     mesh = channel()
     left = remainder(mesh, AT_HAND)
     found = asked(mesh, AT_HAND, left)
-    taken = left.subset(found.asked[found.why == "taken"])
+    taken = left.subset(found.rows[found.why == "taken"])
     bodies = grown(AT_HAND, found)
     got = np.array([takes(mesh, body, taken) for body in bodies])
     for k, body in enumerate(bodies):
@@ -120,8 +121,8 @@ def test_a_ball_to_buy_has_flutes_up_the_whole_of_its_corner():
     """Over open ground no neck is needed; a ball of 40 with flutes of 4 mm is no tool."""
     mesh = terraces([0, 60], [0, 60], [[2]])
     short = ball(3.0, "T1", neck=5.0, shank=8.0, stickout=40.0)
-    buyer = buyer_of(mesh, [short], samples_of(mesh, 0.1))
-    need = buyer.need(Cutter(40.0, 20.0, "T1", False), np.array([[30.0, 30.0, 2.0]]))
+    requirement = buyer_of(mesh, [short], samples_of(mesh, 0.1))
+    need = requirement.need(CuttingPart(40.0, 20.0, "T1", False), np.array([[30.0, 30.0, 2.0]]))
     assert need[0, 0] == 20.0 and need[0, 1] >= 20.0
 
 
@@ -148,9 +149,9 @@ def test_under_a_roof_and_in_a_slot_too_narrow_nothing_is_proposed():
                     & (s.points[:, 1] > 1.0) & (s.points[:, 1] < 11.0) & (s.points[:, 2] > 2.5))
     found = asked(slot, AT_HAND, deep)
     assert found.tools == () and set(found.why) == {"slender"}
-    buyer, thin = buyer_of(slot, AT_HAND, deep), Cutter(0.2, 0.1, "T1", False)
-    rows, tips = buyer.touches(thin, deep)
-    assert len(rows) == len(deep) and (buyer.need(thin, tips)[:, 0] > MOST_SLENDER * 0.2).all()
+    requirement, thin = buyer_of(slot, AT_HAND, deep), CuttingPart(0.2, 0.1, "T1", False)
+    rows, tips = requirement.touches(thin, deep)
+    assert len(rows) == len(deep) and (requirement.need(thin, tips)[:, 0] > MAX_SLENDERNESS * 0.2).all()
 
 
 def test_what_a_tool_at_hand_touches_needs_none_and_a_little_is_not_worth_one():
@@ -161,7 +162,7 @@ def test_what_a_tool_at_hand_touches_needs_none_and_a_little_is_not_worth_one():
     assert found.tools == () and set(found.why) == {"pass"}
     left = remainder(mesh, AT_HAND)
     found = asked(mesh, AT_HAND, left)
-    few = found.asked[found.why == "taken"][:4]
+    few = found.rows[found.why == "taken"][:4]
     assert float(left.area[few].sum()) < LEAST_ZONE_MM2
     found = asked(mesh, AT_HAND, left.subset(few))
     assert found.tools == () and set(found.why) == {"too little"}
@@ -182,14 +183,15 @@ def test_the_cover_is_the_best_of_all_subsets(seed):
     for _ in range(10):
         body = ball(float(rng.choice([1.0, 2.0, 4.0])), neck=float(rng.integers(2, 20)))
         rows = np.flatnonzero(rng.random(30) < 0.35)
-        cutter = Cutter(body.diameter, body.corner_radius, "T1", bool(rng.random() < 0.3))
+        cutter = CuttingPart(body.diameter, body.corner_radius, "T1", bool(rng.random() < 0.3))
         candidates.append(tool_proposal._Candidate(cutter, body, rows, np.zeros((len(rows), 2))))
 
     def cost(chosen):
         got = np.zeros(30, bool)
         for c in chosen:
             got[c.rows] = True
-        ties = sum(tool_proposal.PER_SLENDER * c.slenderness / MOST_SLENDER + tool_proposal.PER_NEW * (not c.cutter.at_hand)
+        ties = sum(tool_proposal.PER_SLENDER * c.slenderness / MAX_SLENDERNESS
+                   + tool_proposal.PER_NEW * (not c.cutter.at_hand)
                    - tool_proposal.PER_STOUT * c.body.diameter / max(DIAMETERS) for c in chosen)
         return len(chosen) + ties + float(area[~got & reachable].sum()) / LEAST_ZONE_MM2
 

@@ -7,9 +7,9 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import as_part, ball, field_of, samples_of, terraces, view_of
-from zones.machinable_area import Form
+from zones.machinable_area import AreaForm
 from zones.model import Decomposition
-from zones.plan_view.regions import Regioner
+from zones.plan_view.regions import RegionLocator
 from zones.reach.access_view import View, access_rotation, turned, turned_samples
 from zones.zoning.cutting_planes import PLANE_MARGIN, snapped
 from zones.zoning.zones import build_zones
@@ -58,9 +58,9 @@ def both_sides(part, samples, tools) -> list[View]:
         first = view_of(part, samples, {})
         fields = {t.id: field_of(here.mesh, t) for t in tools}
         tree = TriangleTree(here.mesh)
-        regioner = Regioner(here, NOTHING, first.regioner.channels, first=name == "A1")
-        labels = regioner.of(seen.points, seen.normals, seen.face, (samples.points, samples.normals))
-        out.append(View(name, rotation, here, tree, tree, seen, labels, fields, regioner, np.eye(3)))
+        locator = RegionLocator(here, NOTHING, first.locator.channels, first=name == "A1")
+        labels = locator.of(seen.points, seen.normals, seen.face, (samples.points, samples.normals))
+        out.append(View(name, rotation, here, tree, tree, seen, labels, fields, locator, np.eye(3)))
     return out
 
 
@@ -79,7 +79,7 @@ def test_half_height_where_both_get_their_half() -> None:
     part, samples = slot(20.0)
     views = both_sides(part, samples, [ball(4, neck=13.0, shank=12.0)])
     zones = build_zones(views, NOTHING, 0.02, 0.002)
-    assert zones.taken.all() and {z.form for z in zones.zones} == {Form.STEEP}
+    assert zones.taken.all() and {z.form for z in zones.zones} == {AreaForm.STEEP}
     plane = zones.zoning.cutting_planes[0]
     assert plane.reason == "between A1 and A2" and plane.height == pytest.approx(10.0, abs=0.1)
     upper, lower = zones.zones

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from geometry.tool_body import HolderSegment
+from geometry.tool_body import HolderFrustum
 from tests.hand_parts import as_part, ball, dome, field_of, samples_of, terraces, tool, view_of, walls
-from zones.machinable_area import Form, forms_of, machinable_faces
+from zones.machinable_area import AreaForm, forms_of, machinable_faces
 from zones.model import Connection, Decomposition
 from zones.plan_view.regions import Labels, Region, face_bases
 from zones.reach.access_reach import able, preference
@@ -42,7 +42,7 @@ def face_at(mesh, point, normal) -> int:
 
 def test_forms_by_the_normal():
     n = np.array([[0, 0, 1.0], [0.6, 0, 0.8], [0.8, 0, 0.6], [1, 0, 0], [0, 0.0, -1]])
-    assert forms_of(n).tolist() == [Form.LEVEL, Form.SHALLOW, Form.STEEP, Form.STEEP, Form.STEEP]
+    assert forms_of(n).tolist() == [AreaForm.LEVEL, AreaForm.SHALLOW, AreaForm.STEEP, AreaForm.STEEP, AreaForm.STEEP]
 
 
 def test_the_seat_and_what_faces_down_are_not_machinable():
@@ -75,8 +75,8 @@ def test_a_sharp_end_is_for_planes_and_upright_walls():
 
 def test_flat_ends_come_first_on_planes_only():
     flat, thick = tool(4, 0), ball(6)
-    assert preference(flat, Form.LEVEL) < preference(thick, Form.LEVEL)
-    assert preference(thick, Form.STEEP) < preference(flat, Form.STEEP)
+    assert preference(flat, AreaForm.LEVEL) < preference(thick, AreaForm.LEVEL)
+    assert preference(thick, AreaForm.STEEP) < preference(flat, AreaForm.STEEP)
 
 
 def test_zones_partition_what_is_in_reach():
@@ -90,7 +90,7 @@ def test_zones_partition_what_is_in_reach():
         at = z.tips + [0, 0, 2e-5]
         assert not (field.blocked_by_cutter(at) | field.blocked_by_body(at)).any()
         assert samples.points[z.samples, 2].min() == z.bottom and samples.points[z.samples, 2].max() == z.top
-    level = [z for z in zones if z.form is Form.LEVEL]
+    level = [z for z in zones if z.form is AreaForm.LEVEL]
     assert {z.tool.id for z in level} == {"T2"}
     assert samples.area[taken].sum() == pytest.approx(samples.area.sum(), rel=0.01)
 
@@ -111,7 +111,7 @@ def test_the_stoutest_tool_stops_where_its_shank_meets_the_wall():
 def test_the_cutting_plane_costs_no_reach_where_no_other_tool_follows():
     # the holder meets the tall block over the upper floor; the lower floor far away is free to the same tool
     mesh = terraces([0, 6, 14, 40], [0, 20], [[30, 10, 4]])
-    body = tool(4, 0, neck=60.0, stickout=12.0, holder=(HolderSegment(16, 16, 40),))
+    body = tool(4, 0, neck=60.0, stickout=12.0, holder=(HolderFrustum(16, 16, 40),))
     floors = {face_at(mesh, (10, 10, 10), (0, 0, 1)), face_at(mesh, (30, 10, 4), (0, 0, 1))}
     samples, fields, zones = zones_of(mesh, [body], faces=floors)
     low = samples.points[:, 2] < 5
@@ -125,7 +125,7 @@ def test_the_cutting_plane_costs_no_reach_where_no_other_tool_follows():
 
 def test_a_thinner_tool_still_comes_before_what_lies_below_the_plane():
     mesh = terraces([0, 6, 14, 40], [0, 20], [[30, 10, 4]])
-    stout = tool(4, 0, "T1", stickout=12.0, holder=(HolderSegment(16, 16, 40),))
+    stout = tool(4, 0, "T1", stickout=12.0, holder=(HolderFrustum(16, 16, 40),))
     long = tool(3, 0, "T2", stickout=60.0)
     floors = {face_at(mesh, (10, 10, 10), (0, 0, 1)), face_at(mesh, (30, 10, 4), (0, 0, 1))}
     _, _, zones = zones_of(mesh, [stout, long], faces=floors)
@@ -209,6 +209,6 @@ def test_no_tool_that_is_used_leaves_what_is_worth_a_zone():
     for t in {z.tool.id for z in zones}:
         gets = touchable(fields[t], samples.points, samples.normals, 0.002)[1] & able(fields[t].tool, samples.normals,
                                                                                     0.02)
-        for form in Form:
+        for form in AreaForm:
             rows = gets & ~taken & (forms_of(samples.normals) == form)
             assert samples.area[rows].sum() <= LEAST_PART_MM2

@@ -11,7 +11,7 @@ cq = pytest.importorskip("cadquery")
 
 from geometry.mesh_queries.bvh import TriangleTree  # noqa: E402
 from geometry.part import Part  # noqa: E402
-from geometry.setup_frame import Placement  # noqa: E402
+from geometry.setup_frame import SetupFrame  # noqa: E402
 from geometry.step_import.occ.loading import load_part  # noqa: E402
 from service.from_wire import parse_setup  # noqa: E402
 from service.stages.job_inputs import JobInputs  # noqa: E402
@@ -61,7 +61,7 @@ def test_corners_have_the_normals_of_the_surface(name, tmp_path):
 
 def test_they_are_placed_and_kept(tmp_path):
     path = write_step(SHAPES["hole"][0](), tmp_path / "a.step")
-    part = load_part(path, placement=Placement((1, 2, 3), (1, 0, 0), (0, 1, 0)), chord=0.01)
+    part = load_part(path, placement=SetupFrame((1, 2, 3), (1, 0, 0), (0, 1, 0)), chord=0.01)
     dots = np.einsum("ijk,ik->ij", part.mesh.corner_normals, part.mesh.normals)
     assert dots.min() > math.cos(0.2)
     assert (Part.from_bytes(part.to_bytes()).mesh.corner_normals == part.mesh.corner_normals).all()

@@ -16,7 +16,7 @@ from OCP.TopoDS import TopoDS  # noqa: E402
 
 from geometry.mesh import TriangleMesh  # noqa: E402
 from geometry.part import Part  # noqa: E402
-from geometry.setup_frame import Placement  # noqa: E402
+from geometry.setup_frame import SetupFrame  # noqa: E402
 from geometry.step_import.occ.holes import extend_parameters  # noqa: E402
 from geometry.step_import.occ.loading import load_part, load_solid  # noqa: E402
 from geometry.step_import.occ.meshing import mesh_solid  # noqa: E402
@@ -105,7 +105,7 @@ def test_cylinder_has_angle_and_height(tmp_path):
 
 def test_placement_leaves_the_parameters_alone(tmp_path):
     path = write_step(SHAPES["moved"](), tmp_path / "part.step")
-    turned = load_part(path, placement=Placement((1, 2, 3), (0, 1, 0), (1, 0, 0)))
+    turned = load_part(path, placement=SetupFrame((1, 2, 3), (0, 1, 0), (1, 0, 0)))
     assert (turned.uv == load_part(path).uv).all()
 
 
