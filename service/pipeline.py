@@ -1,106 +1,54 @@
 """The life of one STEP file: read, zones, tool paths, programs, proof, report.
 
-``plan`` runs the whole chain and writes its files, ``zones_only`` stops before the first pass, ``verify_program``
-proves a program that may come from anywhere. Nothing is written as a program before the proof has read it and
-found nothing.
+``plan`` runs the whole chain and writes its files, ``zones_only`` stops before the first pass, and ``verify_program``
+proves a program of any origin. No program is written before the proof has read it and found nothing.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from functools import partial
-from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from geometry.errors import CamError, SetupError
-from geometry.sampling import SurfaceSamples
-from output.arc_fitting import SHARE as ARCS
-from schemas.setup import Lean, Setup
+from schemas.setup import Setup
 from service.checkpoint_store import Kept
-from service.cutting_data import STEP_DOWN, bending, cutting_data, rates_of
-from service.from_wire import (
-    check_plannable,
-    check_spindle_tool,
-    machine_kinematics,
-    rotary_limits,
-    tool_bodies,
-)
-from service.pictures.proof_picture import MAP_NAME, draw_proof
+from service.delivery.job_delivery import cautions_before_planning, deliver_job, deviation_map, warned
+from service.delivery.machined_mesh import MESH_NAME, MeshWish, machined_part
+from service.delivery.result_files import Files, clear_results, deliver
+from service.from_wire import check_plannable, check_spindle_tool
+from service.pictures.proof_picture import MAP_NAME
 from service.report import report as reporting
-from service.setup_sheet.setup_sheet import sheet_files
-from service.stages.access_plan import Look, Program, Side, in_setup_frame
-from service.stages.cautions import (
-    bent,
-    dry,
-    limited,
-    lives_ended,
-    sentences,
-    thin_walls,
-    uncut_centres,
-    unheld,
-    upright,
-)
-from service.stages.machined_mesh import MESH_NAME, MeshWish, machined_part
-from service.stages.preparation import Prepared, prepare, table_height
-from service.stages.programs import (
-    access_of,
-    fixture_boxes,
-    gauge_lengths,
-    programs_of,
-    proof_frame,
-    turning_of,
-    with_figures,
-)
+from service.stages.access_plan import ProofFrame, in_setup_frame
+from service.stages.access_settings import proof_setup
+from service.stages.cautions import sentences
+from service.stages.plan_prove_loop import Planner, Progress, plan_and_prove
+from service.stages.preparation import Prepared, prepare
+from service.stages.programs import proof_frame
 from service.stages.proof_samples import Score, score
-from service.stages.replanning import PLANS, Attempt, Learned, learned, worth_another
-from service.stages.result_files import Files, clear_results, deliver, json_bytes
 from service.stages.resume import Resumed
-from service.stages.stepnc_files import stepnc_under_way
 from service.stages.trimmed_faces import trimmed_faces
-from service.stages.wall_support import FREE_RATIO, band_planes, in_turn
-from service.viewer.preview_picture import draw_preview
-from service.viewer.view_data import VIEW_NAME, plan_view, verification_view
-from toolpath.feeds.tool_life import with_fresh_cutters, worn
-from toolpath.passes.pass_family import FinishTarget
+from service.viewer.view_data import verification_view
 from toolpath.passes.trimmed_faces import Faces
-from toolpath.plan_checkpoint import CheckpointKeeper
-from toolpath.plan_settings import CutData, Pattern, PlanSettings, ToolLean
-from toolpath.planning.job_plan import Plan, plan_job
-from toolpath.stock.stock_map import StockMap
-from toolpath.tool_deflection import effective_diameter
-from toolpath.workingsteps import CutDirection
-from verify.comparison.program_equivalence import carried
+from toolpath.planning.job_plan import plan_job
 from verify.gcode.dialects import dialect_of
-from verify.model import NcProgram, Proof, ProofSetup, ScoredSamples
+from verify.model import NcProgram, ScoredSamples
 from verify.prove import prove
-from zones.reach.access_view import View
-
-Progress = Callable[[str, float], None]
-Planner = Callable[..., Plan]
-RAMP_ANGLE = np.radians(3.0)
-LINK_FEED = 3000.0  # mm/min, feed moves in air
-STOCK_STEP = 0.08  # mm, the planner's stock lattice; wider where that would take more than STOCK_CELLS
-STOCK_CELLS = 4e6
-TOLD_APART = 0.15  # of the radius of a tool, between places of the stock: at the edge 32 degrees of it
-ABOVE = 1.0  # mm between the height rapids may go down to and the clearance plane
-PREPARED, PROVED = 0.28, 0.96  # shares of the work done
-FIRST_SHARE, PLAN_SHARE = 0.9, 0.7  # of what is left to a proof: of a plan and its proof; of these: of the plan
 
 
 def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: MeshWish | None = None,
          planner: Planner = plan_job, blank_path: Path | None = None, kept: Kept | None = None) -> dict[str, Any]:
     """Plan and prove a job and write its files into ``out``, from which those of an earlier job are removed.
 
-    mesh : also write the machined part as a mesh, in the frame of the proof (``service.stages.programs.proof_frame``)
-    planner : what makes workingsteps of the zones of an access, with the arguments of ``plan_job``
-    blank_path : STEP file of the blank where ``stock.kind`` is 'step'; what the setup calls it is not looked at
-    kept : what an attempt at this very job kept before and what this one keeps (``service.stages.resume``); nothing in None
+    mesh       : also write the machined part as a mesh, in the frame of the proof
+                 (``service.stages.programs.proof_frame``)
+    planner    : what makes workingsteps of the zones of an access, with the arguments of ``plan_job``
+    blank_path : STEP file of the blank where ``stock.kind`` is 'step'; ``stock.step_file`` is not read
+    kept       : plans and proofs that an earlier attempt at this job kept, and where this attempt keeps its own
+                 (``service.stages.resume``); None: nothing is kept
 
     Returns
     -------
@@ -117,154 +65,32 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     out.mkdir(parents=True, exist_ok=True)
     clear_results(out)
     ready = prepare(part_path, setup, progress, blank_path=blank_path)
-    cautions = [*limited(setup), *dry(setup), *thin_walls(ready)]
-    ready = replace(ready, warnings=(*ready.warnings, *sentences(cautions)))
-    ready, trimmed, scored = _trimmed_and_scored(part_path, ready)
-    checks = scored.checks(ready)
-    first, look = ready.views[0], proof_frame(ready)
-    dense = look.into(scored.samples, first)
-    resumed = Resumed(kept or Kept(), ready, checks, dense)
-    told, begun = Learned(), PREPARED
-    sides: list[Side] = []
-    found: list[int] = []
-    blanks: dict[str, StockMap] = {}
-    while True:
-        # how many there will be is not known: each takes most of what is left
-        ended = begun + FIRST_SHARE * (PROVED - begun)
-        span = _Span(progress, begun, begun + PLAN_SHARE * (ended - begun), ended)
-        for k, view in list(enumerate(ready.views))[len(sides):]:
-            sides.append(resumed.side(view, sides, told.along(view.id), partial(
-                _side, ready, view, checks, trimmed, sides, span.of(k, len(ready.views)), told, planner, blanks)))
-        made = Plan(tuple(t for s in sides for t in s.made.steps), tuple(z for s in sides for z in s.made.zones))
-        zone, given_up = scored.without(made, ready.zones)
-        written = programs_of(ready, sides, trimmed)
-        programs = [p.given() for p in written]
-        proof = resumed.proof(programs, zone, partial(
-            prove, programs, look.part, tool_bodies(setup), proof_setup(ready, look), ScoredSamples(dense, zone),
-            [z.id for z in ready.zones], span.proving))
-        more = learned(told, Attempt(sides, written, ready.zones, scored.zone, zone, look, proof))
-        found.append(sum(proof.counts.values()))
-        if more is None or not worth_another(found, PLANS):
-            break
-        # an access is planned from what those before it leave: those up to the first that is told something stay
-        sides, told, begun = list(takewhile(partial(_untold, told, more), sides)), more, ended
-    stated = in_setup_frame(look, proof)
-    late = [*unheld(stated.support), *bent(made.steps), *lives_ended(setup, made.steps),
-            *uncut_centres(setup, made.steps), *upright(_leaned(setup.operations.lean), made.zones, made.steps)]
-    cautions = [*cautions, *late]
-    ready = replace(ready, warnings=(*ready.warnings, *told.notes, *sentences(late)))
-    report, rest, stays = reporting.job_report(ready, made, stated, scored.samples, scored.labels, zone,
-                                               given_up, cautions)
-    if report["state"] == "proved":
-        # of every control's program one was simulated, before its figures were known; what is delivered is the same
-        final = with_figures(written, report)
-        report["proof"]["notes"] += _carried(ready, look, written, final)
-        written = final
-    clean = written if report["state"] == "proved" else []
-    with stepnc_under_way(clean, look.part, tool_bodies(setup), proof_setup(ready, look), out) as stepnc:
-        progress("report", PROVED)
-        files: Files = {}
-        if report["state"] == "proved":
-            for p in written:
-                files.update({name: ("program", dialect, p.access, text.encode()) for dialect, name, text in p.files()})
-        files["zones.json"] = ("zones", "", None, json_bytes(reporting.zones_document(report)))
-        page = plan_view(ready, look, scored, zone, rest, stays, proof, programs, proof_setup(ready, look), report)
-        if page:
-            _preview(ready, page[VIEW_NAME][3], report, out / "preview.png")
-            files["preview.png"] = ("preview", "", None, (out / "preview.png").read_bytes())
-        _deviation(ready, look, dense, proof, report, out / MAP_NAME)
-        files[MAP_NAME] = ("deviation", "", None, (out / MAP_NAME).read_bytes())
-        if mesh is not None and programs:
-            figures, data = machined_part(mesh, programs, look.part, tool_bodies(setup), proof_setup(ready, look),
-                                          lambda f: progress("mesh", PROVED + (1.0 - PROVED) * f))
-            report["machined"] = {"file": MESH_NAME, "access": first.id, **figures}
-            files[MESH_NAME] = ("machined", "", None, data)
-        if report["state"] == "proved":
-            files.update(stepnc())
-    files.update(sheet_files(ready, written, report, files))
-    files.update(page)
-    deliver(out, report, files)
+    cautions = cautions_before_planning(ready)
+    ready, trimmed, scored = _trimmed_and_scored(part_path, warned(ready, sentences(cautions)))
+    frame = proof_frame(ready)
+    samples = frame.into(scored.samples, ready.views[0])
+    resumed = Resumed(kept or Kept(), ready, scored.checks(ready), samples)
+    job = plan_and_prove(resumed, scored, trimmed, frame, proof_setup(ready, frame), planner, progress)
+    report = deliver_job(job, cautions, out, mesh, progress)
     progress("done", 1.0)
     return report
 
 
 def _trimmed_and_scored(part_path: Path, ready: Prepared) -> tuple[Prepared, Mapping[str, Sequence[Faces]], Score]:
-    """The exact faces, which another process reads meanwhile, and the samples of the proof."""
+    """The exact faces by zone, which another process reads meanwhile, and the samples of the proof."""
     with ThreadPoolExecutor(1) as pool:
-        faces = pool.submit(trimmed_faces, part_path, ready) if ready.setup.operations.finishing else None
+        faces = pool.submit(trimmed_faces, part_path, ready) if ready.inputs.operations.finishing else None
         scored = score(ready)
     try:
         return ready, faces.result() if faces is not None else {}, scored
-    except CamError as refusal:  # the part itself is read, and other strategies do without
-        warning = f"no passes along the borders of faces: {refusal.message}"
-        return replace(ready, warnings=(*ready.warnings, warning)), {}, scored
-
-
-def _carried(ready: Prepared, look: Look, written: Sequence[Program], final: Sequence[Program]) -> list[str]:
-    """Hold the programs as they are delivered, of all controls, against those that are proved; returns notes."""
-    tools, setup = tool_bodies(ready.setup), proof_setup(ready, look)
-    return [note for p, f in zip(written, final, strict=True)
-            for note in carried(p.given(), [f.given(), *f.twins()], look.part, tools, setup)]
-
-
-def _untold(told: Learned, more: Learned, side: Side) -> bool:
-    """Whether a proof had nothing to say of an access."""
-    return more.along(side.view.id) is told.along(side.view.id)
-
-
-@dataclass(frozen=True)
-class _Span:
-    """Progress of one plan and its proof: from where, to where the plan goes, and to where the proof."""
-
-    progress: Progress
-    begun: float
-    planned: float
-    proved: float
-
-    def of(self, k: int, count: int) -> Callable[[float], None]:
-        """What one access of several tells its share, 0 to 1, to."""
-        width = (self.planned - self.begun) / count
-        return lambda share: self.progress("plan", self.begun + width * (k + share))
-
-    def proving(self, share: float) -> None:
-        """Report a share, 0 to 1, of the proof."""
-        self.progress("prove", self.planned + (self.proved - self.planned) * share)
-
-
-def _side(ready: Prepared, view: View, checks: list[FinishTarget], trimmed: Mapping[str, Sequence[Faces]],
-          before: Sequence[Side], tell: Callable[[float], None], told: Learned, planner: Planner,
-          blanks: dict[str, StockMap], keeper: CheckpointKeeper) -> Side:
-    """Plan the zones of one access; ``blanks`` keeps what the blank looks like along it for the next plan.
-
-    On a machine with rotary axes, where all accesses are one program, from what the accesses before leave; else from
-    the whole blank, for who knows in which order programs are run. Heights are those of the whole blank in any case.
-    """
-    turned, steps = ready.setup.machine.kind == "5-axis", sum(len(s.made.steps) for s in before)
-    if view.id not in blanks:
-        blanks[view.id] = planning_stock(ready, view)
-    stock = blanks[view.id].copied()
-    found = told.along(view.id)
-    settings = replace(plan_settings(ready, view, stock), found=found, planes=band_planes(ready, view, found.unheld))
-    if turned:
-        lowest = float(ready.blank.corners(view.rotation)[0, 2]) - math.sqrt(3.0) * ready.blank.beyond  # of a box
-        stock.left_by([(s.left, s.view.rotation @ view.rotation.T) for s in before if s.left is not None], lowest)
-    mine = [k for k, z in enumerate(ready.zones) if z.access == view.id]
-    zones = [ready.zones[k] for k in mine]
-    made = planner(zones, [checks[k] for k in mine], view.fields, cut_table(ready.setup), stock, settings,
-                   lambda f: tell(0.98 * f), first_step=steps + 1, trimmed=trimmed, keeper=keeper)
-    stock.settle(last=True)
-    lives = {t.id: t.life_min for t in ready.setup.tools if t.life_min is not None}
-    used = worn(t for s in before for t in s.made.steps)
-    made = Plan(tuple(with_fresh_cutters(made.steps, lives, settings.clearance, used)), made.zones)
-    if turned:
-        made = Plan(tuple(replace(s, access=view.id) for s in made.steps), made.zones)
-    return Side(view, made, settings.clearance, stock if turned else None)
+    except CamError as refusal:  # the part itself is read, and other strategies need no exact faces
+        return warned(ready, [f"no passes along the borders of faces: {refusal.message}"]), {}, scored
 
 
 def zones_only(part_path: Path, setup: Setup, progress: Progress, blank_path: Path | None = None) -> dict[str, Any]:
-    """The dry check: walls, connections, channels, zones with their tools, and what stays out of reach.
+    """The dry check: walls, connections, channels, zones with their tools, and the remainder.
 
-    blank_path : as ``plan``
+    blank_path : as in ``plan``
 
     Raises
     ------
@@ -273,7 +99,7 @@ def zones_only(part_path: Path, setup: Setup, progress: Progress, blank_path: Pa
     """
     check_plannable(setup)
     ready = prepare(part_path, setup, progress, blank_path=blank_path)
-    ready = replace(ready, warnings=(*ready.warnings, *sentences([*limited(setup), *dry(setup), *thin_walls(ready)])))
+    ready = warned(ready, sentences(cautions_before_planning(ready)))
     out = reporting.dry_report(ready)
     progress("done", 1.0)
     return out
@@ -283,18 +109,18 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
                    access: str | None = None, out: Path | None = None, mesh: MeshWish | None = None,
                    spindle_tool: int = 0, blank_path: Path | None = None, dialect: str | None = None,
                    ending: str = "") -> dict[str, Any]:
-    """Prove any program, NC code or STEP-NC, against the part: gouges, contacts, rapids and limits, and what it leaves.
+    """Prove any program, NC code or STEP-NC, against the part: gouges, contacts, rapids, limits and uncut area.
 
-    No zone answers for a sample here, so uncut area is a figure (coverage), not a finding. The program is read in the
-    frame of one access; where ``access`` is None in that of the first, on a machine with rotary axes in the setup's.
-    ``spindle_tool`` is the T number that stands in the spindle, its length offset on, before its first line, 0 for
-    none.
+    No zone answers for a sample here, so uncut area is a figure (coverage), not a finding.
 
-    out  : folder for the deviation map, the mesh and the report; none is written where it is None
-    mesh : the machined part is wanted too; it is written into ``out``
-    blank_path : as ``plan``
-    dialect : whose words the program has; None: by its own marks, by ``ending`` of its file name or by the controls of
-        the machine (``verify.gcode.dialects.dialect_of``)
+    access       : in whose frame the program is read; None: the first access, or the setup frame on a machine with
+                   rotary axes
+    out          : folder for the deviation map, the mesh and the report; None: no file is written
+    mesh         : also write the machined part as a mesh into ``out``
+    spindle_tool : T number of the tool in the spindle before the first line, its length offset active; 0: none
+    blank_path   : as in ``plan``
+    dialect      : of the program; None: found by marks in its text, by ``ending`` of its file name, or by the dialects
+                   of the machine (``verify.gcode.dialects.dialect_of``)
 
     Raises
     ------
@@ -309,131 +135,25 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
     check_spindle_tool(setup, spindle_tool)
     ready = prepare(part_path, setup, progress, search=False, blank_path=blank_path)
     view = ready.view(access or known[0])
-    look = proof_frame(ready) if access is None else Look.of(view)
-    dense = look.into(score(ready).samples, ready.views[0])
-    spoken = dialect or dialect_of(program_text, ending, setup.machine.dialects)
-    given = [NcProgram("program", program_text, dialect=spoken)]
-    proof = prove(given, look.part, tool_bodies(setup), proof_setup(ready, look, foreign=True),
-                  ScoredSamples(dense, np.zeros(len(dense), np.int32)), [], lambda f: progress("prove", 0.3 + 0.5 * f),
+    frame = proof_frame(ready) if access is None else ProofFrame.of(view)
+    samples = frame.into(score(ready).samples, ready.views[0])
+    used_dialect = dialect or dialect_of(program_text, ending, setup.machine.dialects)
+    programs = [NcProgram("program", program_text, dialect=used_dialect)]
+    tools, conditions = ready.inputs.bodies, proof_setup(ready, frame, foreign=True)
+    no_zone = ScoredSamples(samples, np.zeros(len(samples), np.int32))
+    proof = prove(programs, frame.part, tools, conditions, no_zone, [], lambda f: progress("prove", 0.3 + 0.5 * f),
                   spindle_tool=spindle_tool)
-    report = reporting.verification_report(ready, in_setup_frame(look, proof), dense)
+    report = reporting.verification_report(ready, in_setup_frame(frame, proof), samples)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
-        files: Files = {}
-        _deviation(ready, look, dense, proof, report, out / MAP_NAME)
-        files[MAP_NAME] = ("deviation", "", view.id, (out / MAP_NAME).read_bytes())
+        files: Files = {MAP_NAME: ("deviation", "", view.id, deviation_map(ready, frame, samples, proof, conditions,
+                                                                           report, out / MAP_NAME))}
         if mesh is not None:
-            figures, data = machined_part(mesh, given, look.part, tool_bodies(setup),
-                                          proof_setup(ready, look, foreign=True),
+            figures, data = machined_part(mesh, programs, frame.part, tools, conditions,
                                           lambda f: progress("mesh", 0.8 + 0.2 * f), spindle_tool=spindle_tool)
             report["machined"] = {"file": MESH_NAME, "access": view.id, **figures}
             files[MESH_NAME] = ("machined", "", view.id, data)
-        files.update(verification_view(ready, look, dense, proof, given, proof_setup(ready, look, foreign=True), report,
-                                       spindle_tool))
+        files.update(verification_view(ready, frame, samples, proof, programs, conditions, report, spindle_tool))
         deliver(out, report, files)
     progress("done", 1.0)
     return report
-
-
-def cut_table(setup: Setup) -> dict[str, CutData]:
-    """Speeds, feeds and layer depths by tool id; layers are slots, as far as the engaged angle is not bounded."""
-    out = {}
-    for tool, body in zip(setup.tools, tool_bodies(setup), strict=True):
-        depth = STEP_DOWN[tool.kind] * tool.diameter_mm
-        link = min(LINK_FEED, setup.machine.max_feed_mm_min or LINK_FEED)
-        engaged = math.radians(180.0 if tool.max_engagement_deg is None else tool.max_engagement_deg)
-        rough, fine = (cutting_data(setup.material, tool, setup.machine, d) for d in (depth, None))
-        finish = CutData(fine.spindle_rpm, fine.feed, fine.plunge_feed, link, depth, engaged,
-                         bending=bending(setup, tool, body, fine, None))
-        layers = CutData(rough.spindle_rpm, rough.feed, rough.plunge_feed, link, depth, engaged, finish,
-                         bending(setup, tool, body, rough, depth))
-        slot = effective_diameter(body.diameter, body.corner_radius, depth)
-        out[tool.id] = layers.under(depth, 0.5 * slot * (1.0 - math.cos(engaged)))
-    return out
-
-
-def planning_stock(ready: Prepared, view: View) -> StockMap:
-    """The stock the planner starts from: the largest the setup allows."""
-    lo, hi = ready.blank.corners(view.rotation)
-    step = max(min(STOCK_STEP, _told_apart(ready.setup)), float(np.sqrt(np.prod(hi[:2] - lo[:2]) / STOCK_CELLS)))
-    return ready.blank.planned(view, step)
-
-
-def _told_apart(setup: Setup) -> float:
-    """mm between places of the stock at which engaged angles can be told; inf where no tool has a limit of them."""
-    return min((TOLD_APART * 0.5 * t.diameter_mm for t in setup.tools if (t.max_engagement_deg or 180.0) < 180.0),
-               default=math.inf)
-
-
-def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
-    """Tolerances and heights of the plan."""
-    q, ops = ready.setup.quality, ready.setup.operations
-    tops = [stock.highest, float(view.part.bounds[1, 2]) + q.stock_allowance_mm]
-    tops.extend(float(f[1, 2]) for f in fixture_boxes(ready, view))
-    floor = float(np.ceil(10.0 * (max(tops) + ready.setup.clearance_mm.rapid + 0.1)) / 10.0)
-    chord = q.chordal_tolerance_mm * (1.0 - (ARCS if ready.setup.machine.arcs else 0.0))
-    return PlanSettings(q.scallop_height_mm, chord, q.stock_allowance_mm, ready.lift, floor + ABOVE,
-                        floor, float(RAMP_ANGLE), ops.roughing, ops.finishing, CutDirection(ops.cut_direction),
-                        Pattern(ops.pattern), turning_of(ready, view),
-                        rates=rates_of(ready.setup), semi_finishing=ops.semi_finishing,
-                        leaned=_leaned(ops.lean))
-
-
-def _leaned(lean: Lean) -> ToolLean | None:
-    """How noses are asked to lean, in the words of the plan."""
-    if not lean.asked:
-        return None
-    walls = lean.walls_tilt_deg
-    return ToolLean(math.radians(lean.lead_deg), math.radians(lean.tilt_deg),
-                  None if walls is None else math.radians(walls))
-
-
-def proof_setup(ready: Prepared, view: View | Look, *, foreign: bool = False) -> ProofSetup:
-    """The setup in the plain words of the proof, in the frame of a view.
-
-    foreign : of programs that were not planned here: a table nobody told of is not held against them
-    """
-    s = ready.setup
-    c, q = s.clearance_mm, s.quality
-    # its height is one of the setup frame: a program read in the frame of an oblique access is not held against it
-    tabled = (s.machine.kind == "5-axis" and np.array_equal(view.rotation, np.eye(3))
-              and not (foreign and s.machine.table_z_mm is None))
-    cylinder, upwards = ready.blank.proof_cylinder(view.rotation)
-    return ProofSetup(
-        stock_kind=s.stock.kind, margin=s.stock.margin_mm, uncertainty=ready.blank.beyond,
-        stock_box=ready.blank.proof_box(view.rotation), stock_cylinder=cylinder, stock_axis=upwards,
-        stock_mesh=ready.blank.proof_mesh(view.rotation),
-        fixtures=fixture_boxes(ready, view), clearance_neck=c.neck,
-        clearance_shank=c.shank, clearance_holder=c.holder, clearance_rapid=c.rapid,
-        scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,
-        stock_allowance=q.stock_allowance_mm, ramp_angle=float(RAMP_ANGLE),
-        rapid_feed=rates_of(s).rapid, acceleration=rates_of(s).acceleration,
-        work_offset=access_of(ready, view).work_offset,
-        travel=None if s.machine.travel_mm is None else np.array(s.machine.travel_mm, dtype=np.float64),
-        gauge_length=gauge_lengths(s),
-        line_spacing=min(ProofSetup.line_spacing, _told_apart(s)),
-        dogleg=s.machine.rapid_motion == "dogleg", max_feed=s.machine.max_feed_mm_min,
-        max_engaged={body.number: math.radians(t.max_engagement_deg)
-                     for t, body in zip(s.tools, tool_bodies(s), strict=True) if t.max_engagement_deg is not None},
-        max_rpm={body.number: min(limits) for t, body in zip(s.tools, tool_bodies(s), strict=True)
-                 if (limits := [x for x in (t.max_rpm, s.machine.max_rpm) if x is not None])},
-        table=table_height(s, ready.blank) if tabled else None,
-        table_known=s.machine.table_z_mm is not None, free_ratio=FREE_RATIO, walls_in_turn=in_turn(ready),
-        kinematics=machine_kinematics(s.machine), rotary_limits=rotary_limits(s.machine),
-        rotary_rate=None if s.machine.rotary_rate_deg_min is None else float(np.radians(s.machine.rotary_rate_deg_min)))
-
-
-def _preview(ready: Prepared, view: bytes | Path, report: dict[str, Any], path: Path) -> None:
-    facts = {"state": report["state"], "coverage": f"{100 * report['coverage']:.1f} %",
-             "of what is in reach": f"{100 * report['reach_coverage']:.1f} %",
-             "machining time": f"{report['machining_time_s'] / 60:.0f} min"}
-    data = view if isinstance(view, bytes) else view.read_bytes()
-    draw_preview(data, path, ready.setup.labels.get("order") or "zonemill", facts)
-
-
-def _deviation(ready: Prepared, view: Look, samples: SurfaceSamples, proof: Proof, report: dict[str, Any],
-               path: Path) -> None:
-    """Draw the deviation map in the frame of a view; samples and findings of the proof are in that frame."""
-    order = ready.setup.labels.get("order")
-    draw_proof(view.part, samples, proof, proof_setup(ready, view), report["state"], report["coverage"] or 0.0, path,
-               f"Deviation from the part{f': {order}' if order else ''}")

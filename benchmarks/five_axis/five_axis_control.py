@@ -44,7 +44,7 @@ from geometry.mesh import F64  # noqa: E402
 from schemas.setup import Setup  # noqa: E402
 from service import pipeline  # noqa: E402
 from service.from_wire import machine_kinematics, parse_setup  # noqa: E402
-from service.stages.programs import gauge_lengths  # noqa: E402
+from service.stages.job_inputs import JobInputs  # noqa: E402
 from verify.gcode.reader import read_program  # noqa: E402
 from verify.program.program import Program  # noqa: E402
 
@@ -110,7 +110,7 @@ def reach_of(setup: Setup, text: str, faster: float) -> tuple[Reach, Program]:
 
     faster : feeds are run as many times as fast as they are written
     """
-    machine, gauges = machine_kinematics(setup.machine), gauge_lengths(setup)
+    machine, gauges = machine_kinematics(setup.machine), JobInputs.of(setup).gauge_lengths
     assert machine is not None
     p = read_program(text, kinematics=machine, gauge_length=gauges)
     assert p.poses is not None

@@ -35,7 +35,8 @@ from geometry.surfaces.foot_points import foot_points  # noqa: E402
 from geometry.surfaces.nurbs import NurbsSurface  # noqa: E402
 from geometry.trimming.trim import trim_faces  # noqa: E402
 from service.from_wire import parse_setup, tool_bodies  # noqa: E402
-from service.stages.preparation import clearances, placement_of, prepare  # noqa: E402
+from service.stages.job_inputs import JobInputs, placement_of  # noqa: E402
+from service.stages.preparation import prepare  # noqa: E402
 from toolpath.cutter.cutter import Cutter  # noqa: E402
 from toolpath.drop_cutter import drop_cutter  # noqa: E402
 from toolpath.five_axis.oriented_pass import enters, leaned, posed  # noqa: E402
@@ -353,7 +354,7 @@ def leaning_faces(parts: Path, lean: float) -> None:
     patches = read_patches(step, numbers, placement=placement_of(setup), solid=setup.part.solid)
     trimmed = trim_faces(part, numbers, lambda p, _n, _f: np.zeros(len(p), np.int64), 1e3)[0]
     tree, off = TriangleTree(part.mesh), max(0.1 * scallop, 1.5 * part.chord)
-    blocked = enters(tree, body, clearances(setup))
+    blocked = enters(tree, body, JobInputs.of(setup).clearances)
     print(f"\nblades of the wheel: ball of {body.radius} mm that leans, scallop {scallop}, chord {chord} mm")
     print(f"{'face':>5} {'lean':>5} {'passes':>6} {'mm':>7} {'walked':>7} {'p99':>8} {'most':>8} {'over h':>7} "
           f"{'gouge':>8} {'s':>6}")

@@ -33,7 +33,7 @@ from geometry.sampling import sample_surface  # noqa: E402
 from geometry.step_import.face_surfaces import read_patches  # noqa: E402
 from geometry.surfaces.foot_points import foot_points  # noqa: E402
 from service.from_wire import parse_setup  # noqa: E402
-from service.stages.preparation import Prepared, placement_of  # noqa: E402
+from service.stages.preparation import Prepared  # noqa: E402
 from toolpath.plan_settings import Pattern
 from toolpath.workingsteps import TrajectoryKind, Workingstep  # noqa: E402
 from verify.moves import Moves
@@ -49,9 +49,9 @@ class Measure:
     """The exact part in the frame of the first access, by samples."""
 
     def __init__(self, step: Path, ready: Prepared) -> None:
-        turn, setup, part = np.eye(4), ready.setup, ready.views[0].part
+        turn, inputs, part = np.eye(4), ready.inputs, ready.views[0].part
         turn[:3, :3] = ready.views[0].rotation
-        exact = read_patches(step, None, placement=placement_of(setup), solid=setup.part.solid)
+        exact = read_patches(step, None, placement=inputs.placement, solid=inputs.solid)
         s = sample_surface(part.mesh, 20.0, seed=3)
         self.points, self.normals = s.points.copy(), s.normals
         for number, patch in exact.items():

@@ -11,7 +11,7 @@ import json
 import math
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from examples.family.recipes import draw_layout, truth_of
@@ -21,7 +21,7 @@ from schemas.materials import MATERIALS
 from schemas.setup import Setup
 from service.cutting_data import DEFAULT_MAX_FEED_MM_MIN, DEFAULT_MAX_RPM
 from service.from_wire import parse_setup
-from service.pipeline import cut_table
+from service.stages.job_inputs import JobInputs
 from toolpath.plan_settings import CutData
 
 PARTS = 300
@@ -55,6 +55,11 @@ def varied(seed: int, raw: dict[str, Any]) -> Iterator[Setup]:
         for name in MATERIALS:
             yield parse_setup(json.dumps({**raw, "tools": tools, "material": name,
                                           "machine": {**raw["machine"], **limits}}))
+
+
+def cut_table(setup: Setup) -> Mapping[str, CutData]:
+    """Speeds, feeds and layer depths of the tools of a setup, by tool id."""
+    return JobInputs.of(setup).cut_table
 
 
 def faults(setup: Setup) -> list[str]:

@@ -396,7 +396,8 @@ def examine(path: Path, setup_path: Path, count: int = SAMPLES) -> dict[str, Any
     """Figures of one part: by tool and for the union of the tools, shares of the machinable area."""
     from geometry.mesh_queries.bvh import TriangleTree
     from service.from_wire import read_setup, tool_bodies
-    from service.stages.preparation import clearances, load
+    from service.stages.job_inputs import JobInputs
+    from service.stages.preparation import load
 
     setup = read_setup(setup_path)
     part = load(path, setup)
@@ -405,7 +406,7 @@ def examine(path: Path, setup_path: Path, count: int = SAMPLES) -> dict[str, Any
     points, triangles = scattered(part.mesh, machinable(part.mesh), count)
     normals = kernel_normals(part, path, setup)(points, triangles)
     planned = planned_normals(part.mesh, points, triangles)
-    tree, cloud, clear = TriangleTree(part.mesh), cloud_of(part.mesh), clearances(setup)
+    tree, cloud, clear = TriangleTree(part.mesh), cloud_of(part.mesh), JobInputs.of(setup).clearances
     out: dict[str, Any] = {"lift_mm": lift, "band_mm": band_of(lift),
                            "cloud": len(cloud.points), "tools": {}, "places": []}
     union = {k: np.zeros(len(points), bool) for k in ("said", "played", "yes", "fair")}

@@ -51,7 +51,7 @@ from output.clamping_sequence import BALL_CLEARANCE  # noqa: E402
 from schemas.setup import Setup  # noqa: E402
 from service import pipeline  # noqa: E402
 from service.from_wire import machine_kinematics, parse_setup  # noqa: E402
-from service.stages.programs import gauge_lengths  # noqa: E402
+from service.stages.job_inputs import JobInputs  # noqa: E402
 from verify.gcode.reader import RAPID, read_program  # noqa: E402
 
 JOBS = {"bar on a table A/C": ("bar", "table-AC", 4.0), "bar on a table B/C": ("bar", "table-BC", 4.0),
@@ -113,7 +113,7 @@ def job(name: str, folder: Path) -> tuple[Path, Setup]:
 
 def way_of(setup: Setup, text: str) -> Way:
     """A program as the proof reads it; ways to machine zero, which it has no words for, go by Z 0 of the joints."""
-    machine, gauges = machine_kinematics(setup.machine), gauge_lengths(setup)
+    machine, gauges = machine_kinematics(setup.machine), JobInputs.of(setup).gauge_lengths
     assert machine is not None
     p = read_program(text, kinematics=machine, gauge_length=gauges)
     level = np.zeros((len(p), 2))  # of the last steps alone, where the axes stay at 0

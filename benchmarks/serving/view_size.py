@@ -26,7 +26,7 @@ from service.commands.view_command import folder_app
 from service.viewer.view_data import tool_shape
 from service.viewer.view_file import Chunk, Column, write_view
 from service.viewer.view_mesh import GRID, JUDGED, LEFT_UNIT, Facets, mesh_chunks
-from service.viewer.view_paths import AXIS_UNIT, Way, path_chunks
+from service.viewer.view_paths import AXIS_UNIT, ToolTrack, path_chunks
 
 ROOT = Path(__file__).parents[1]
 WIDE = 120.0  # mm
@@ -49,7 +49,7 @@ def block(triangles: int) -> Facets:
     return Facets(place, normal, np.ones(len(x), np.int32), 0.01 * np.sin(x), np.full(len(x), JUDGED), corners, label)
 
 
-def way(points: int) -> Way:
+def way(points: int) -> ToolTrack:
     """Passes to and fro with a noise of 0.02 mm, a rapid in between every 500 points."""
     rng = np.random.default_rng(2)
     k = np.arange(points + 1)
@@ -60,9 +60,9 @@ def way(points: int) -> Way:
     seconds = np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1)) / 25.0
     steps = tuple({"id": f"S{i + 1:02d}", "zone": f"Z{i // 2 + 1}", "operation": "finishing" if i % 2 else "roughing",
                    "strategy": "zigzag", "program": "program.linuxcnc.ngc"} for i in range(STEPS))
-    return Way(place[:-1], place[1:], np.tile([0.0, 0.0, 1.0], (points, 1)), k[1:] % 500 != 0,
-               np.concatenate([[0.0], seconds[:-1]]), seconds, k[1:], np.ones(points, np.int64),
-               np.zeros(points, np.int64), step, steps, ("program.linuxcnc.ngc",))
+    return ToolTrack(place[:-1], place[1:], np.tile([0.0, 0.0, 1.0], (points, 1)), k[1:] % 500 != 0,
+                     np.concatenate([[0.0], seconds[:-1]]), seconds, k[1:], np.ones(points, np.int64),
+                     np.zeros(points, np.int64), step, steps, ("program.linuxcnc.ngc",))
 
 
 def folder(out: Path, triangles: int, points: int) -> dict[str, float]:

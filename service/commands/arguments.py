@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from schemas.setup import Setup
-    from service.stages.machined_mesh import MeshWish
+    from service.delivery.machined_mesh import MeshWish
 
 
 def requested_mesh(step: float | None, box: str | None) -> MeshWish | None:
@@ -22,7 +22,7 @@ def requested_mesh(step: float | None, box: str | None) -> MeshWish | None:
         ``bad_mesh_step``, ``bad_mesh_box``; ``box_without_step``.
     """
     from geometry.errors import InputError
-    from service.stages.machined_mesh import MeshWish
+    from service.delivery.machined_mesh import MeshWish
 
     if step is not None:
         return MeshWish.of(step, box)
@@ -41,7 +41,7 @@ def make_folder(out: Path, *, verification: bool = False) -> None:
         The folder cannot be made or written; ``out_holds_a_job`` as ``artifacts.clear_verification``.
     """
     from geometry.errors import InputError
-    from service.stages.result_files import clear_results, clear_verification
+    from service.delivery.result_files import clear_results, clear_verification
 
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -15,9 +15,9 @@ from typing import Any
 from geometry.errors import InternalError
 from service.api.server import background, settings_with, wait_for_interrupt
 from service.console import Progress, print_json, say
+from service.delivery.result_files import clear_results
 from service.errors import EXIT_BUG, EXIT_INPUT, EXIT_PROVED, EXIT_UNPROVED
 from service.logs import configure
-from service.stages.result_files import clear_results
 
 
 def run_demo(out: Path, *, keep: bool, chain: str = "service.pipeline") -> int:

@@ -1,4 +1,4 @@
-"""report.json and zones.json from what the chain found; plain dictionaries with the keys of the wire models."""
+"""report.json and zones.json of a job, as plain dictionaries with the keys of the wire models."""
 
 from __future__ import annotations
 
@@ -11,11 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
-from schemas.setup import setup_sha256
-from service.from_wire import rotary_machine
 from service.report import approach_cones, tool_offers
-from service.stages.cautions import Caution
-from service.stages.preparation import Prepared, clearances
+from service.stages.cautions import JobCaution
+from service.stages.preparation import Prepared
 from service.version import VERSION
 from toolpath.planning.job_plan import Plan
 from toolpath.planning.zone_finishing import ZonePlan
@@ -68,8 +66,8 @@ def _shape(ready: Prepared) -> dict[str, Any]:
 
 
 def accesses_of(ready: Prepared) -> list[dict[str, Any]]:
-    """The tool axes of a job, and how the rotary axes stand for them."""
-    machine, given = rotary_machine(ready.setup.machine), {a.id for a in ready.setup.access}
+    """The tool axes of a job, and the angles of the rotary axes for each."""
+    machine, given = ready.inputs.rotary, {a.id for a in ready.inputs.accesses}
     out = []
     for v in ready.views:
         turn = None if machine is None else [r(a) for a in np.degrees(
@@ -107,7 +105,7 @@ def _cone(ready: Prepared, zone: ZoneArea) -> dict[str, Any] | None:
 
 
 def _profiles(zone: ZoneArea) -> list[dict[str, Any]]:
-    """The sides a zone got its profile from, the most complex first."""
+    """The wall sides that give a zone its profile, the most complex first."""
     return [{"wall": s.wall, "profile": str(s.profile.type) if s.profile.type else None, "level": str(s.profile.level),
              "margin": r(s.profile.margin, 3), "closed": s.profile.closed, "bends": len(s.profile.bends)}
             for s in zone.category.sides]
@@ -125,7 +123,7 @@ def _remainder(ready: Prepared, items: list[RemainderEntry]) -> list[dict[str, A
 
 
 def _places(ready: Prepared, item: RemainderEntry) -> list[dict[str, Any]]:
-    """What an entry holds of each face, and the box in the setup frame where."""
+    """The area of an entry on each face, and its box in the setup frame."""
     s = item.samples
     if s is None:
         return []
@@ -139,46 +137,52 @@ def _places(ready: Prepared, item: RemainderEntry) -> list[dict[str, Any]]:
 
 
 def _areas(ready: Prepared) -> dict[str, Any]:
-    """Machinable area, whole and by the role of the faces, of the triangles the samples stand for."""
+    """Machinable area by the samples, in total and by the role of the faces."""
     face, area = ready.samples.face, ready.samples.area
     roles = np.array([ready.decomposition.face_role.get(int(f), "free") for f in range(int(face.max(initial=0)) + 1)])
     by_role = {str(k): r(float(area[roles[face] == k].sum()), 3) for k in sorted(set(roles[np.unique(face)].tolist()))}
     return {"machinable_area_mm2": r(float(area.sum()), 3), "machinable_by_role_mm2": by_role}
 
 
+def _proposal(ready: Prepared) -> dict[str, Any]:
+    return tool_offers.as_dict(ready.inputs, tool_offers.offers(ready))
+
+
 def dry_report(ready: Prepared) -> dict[str, Any]:
-    """zones.json without a plan: what the tools at hand reach and what they do not."""
+    """zones.json without a plan: the zones that the tools of the setup reach, and the remainder."""
     rest = ~ready.zoning.taken
     first = ready.views[0]
     items = explain(first.samples.subset(rest), first.labels.subset(rest), ready.views, ready.decomposition, ready.lift,
-                    clear=clearances(ready.setup))
+                    clear=ready.inputs.clearances)
     return {**_shape(ready), **_areas(ready), "zones": [_zone(ready, z) for z in ready.zones],
-            "remainder": _remainder(ready, items), "proposal": tool_offers.as_dict(ready.setup, tool_offers.offers(ready))}
+            "remainder": _remainder(ready, items), "proposal": _proposal(ready)}
 
 
 def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples, labels: Labels,
                zone: NDArray[np.int32], given_up: NDArray[np.bool_],
-               cautions: Sequence[Caution] = ()) -> tuple[dict[str, Any], NDArray[np.bool_], list[RemainderEntry]]:
-    """report.json without its files, which proof samples stay uncut, and why.
+               cautions: Sequence[JobCaution] = ()) -> tuple[dict[str, Any], NDArray[np.bool_], list[RemainderEntry]]:
+    """report.json without its files, the samples that stay uncut, and the remainder.
 
-    A sample is proved, or a zone answers for it (then it is a finding), or it stands in the remainder.
+    Each sample is proved, or a zone answers for it (then it is a finding), or it stands in the remainder.
 
-    dense    : SurfaceSamples of the proof, n of them, frame of the first view; labels : their regions
-    zone     : (n,) int32, row of the zone that answers for each sample, from 1; 0 for none
-    given_up : (n,) bool, the plan's own measure says that no pass touches the sample though a tool could
-    cautions : what a machinist is to be told
+    dense    : SurfaceSamples of the proof, n of them, frame of the first view
+    labels   : their regions
+    zone     : (n,) int32, index: zone that answers for each sample, from 1; 0 for none
+    given_up : (n,) bool: no pass touches the sample by the plan's own measure, although a tool could
+    cautions : for the machinist
 
     Returns
     -------
-    dict, (n,) bool: the samples that stay uncut, and these by region and reason, the smallest ones too
+    dict, (n,) bool, list
+        The report; whether each sample stays uncut; the remainder by region and reason, with its smallest entries
     """
     proved = np.asarray(proof.proved, dtype=np.bool_)
     rest = ~proved & (zone == 0)
     items = explain(dense.subset(rest), labels.subset(rest), ready.views, ready.decomposition, ready.lift,
-                    given_up[rest], clear=clearances(ready.setup))
+                    given_up[rest], clear=ready.inputs.clearances)
     area = dense.area
     total, done = float(area.sum()), float(area[proved].sum())
-    # what a tool of the setup could touch: proved, claimed, or left by the passes although a tool gets there
+    # area that a tool of the setup can touch: proved, with a zone, or left by the passes although a tool reaches it
     reach = float(area[proved | (zone > 0)].sum()) + sum(i.area for i in items if i.reason == "pass")
     coverage = done / total if total > 0 else 0.0
     remainder = _remainder(ready, items)
@@ -188,11 +192,11 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
     steps = {s.id: s for s in made.steps}
     report = {
         **_shape(ready), **_areas(ready), "state": "unproved" if findings else "proved", "complete": not remainder,
-        "labels": dict(ready.setup.labels),
+        "labels": dict(ready.inputs.labels),
         "inputs": _inputs(ready),
         "zones": [_planned(ready, z, plans.get(z.id), steps, proof) for z in ready.zones],
         "steps": [_step(s) for s in made.steps], "remainder": remainder,
-        "proposal": tool_offers.as_dict(ready.setup, tool_offers.offers(ready)), "findings": findings,
+        "proposal": _proposal(ready), "findings": findings,
         "finding_counts": _counted(proof, unmet), "coverage": r(coverage, 6),
         "reach_coverage": r(done / reach, 6) if reach > 0 else 0.0,
         "machining_time_s": r(proof.spent.seconds, 1), "time": _time(proof),
@@ -207,22 +211,22 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
 
 
 def _unmet(ready: Prepared, made: Plan, coverage: float, remainder: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Findings that no program can have: nothing could be cut, or less than the setup demands."""
+    """Findings about the job as a whole: nothing can be cut, or less than the setup demands."""
     if not made.steps:
         would: dict[str, Any] = next((x["would_need"] for x in remainder if x["would_need"].get("diameter_mm")), {})
-        return [_of_job("nothing_cut", "no tool of the setup can cut anything of what was asked for", would_need=would)]
-    return _too_little(coverage, ready.setup.quality.coverage_min)
+        return [_of_job("nothing_cut", "no tool of the setup can cut any of the requested area", would_need=would)]
+    return _too_little(coverage, ready.inputs.quality.coverage_min)
 
 
-def _too_little(coverage: float, least: float) -> list[dict[str, Any]]:
-    if coverage >= least:
+def _too_little(coverage: float, coverage_min: float) -> list[dict[str, Any]]:
+    if coverage >= coverage_min:
         return []
-    return [_of_job("coverage", f"coverage {coverage:.4f} is below coverage_min {least:g}",
-                    round(coverage, 6), least)]
+    return [_of_job("coverage", f"coverage {coverage:.4f} is below coverage_min {coverage_min:g}",
+                    round(coverage, 6), coverage_min)]
 
 
 def _counted(proof: Proof, unmet: list[dict[str, Any]]) -> dict[str, int]:
-    """How many findings there are of each kind, those beyond the list included."""
+    """Number of findings of each kind, including those beyond the list."""
     return dict(sorted((Counter(proof.counts) + Counter(f["kind"] for f in unmet)).items()))
 
 
@@ -237,12 +241,12 @@ def _planned(ready: Prepared, zone: ZoneArea, plan: ZonePlan | None, steps: dict
     out = _zone(ready, zone)
     result = proof.zones.get(zone.id)
     mine = [s for s in steps.values() if s.zone == zone.id]
-    out["scallop_mm"] = {"requested": ready.setup.quality.scallop_height_mm, "p50": None, "p99": None, "max": None}
+    out["scallop_mm"] = {"requested": ready.inputs.quality.scallop_height_mm, "p50": None, "p99": None, "max": None}
     out["passes"], out["cutting_length_mm"], out["machining_time_s"], out["steps"] = 0, 0.0, 0.0, []
     if plan is not None:
         out.update(strategy=plan.strategy, side_step_mm=r(plan.side_step), passes=plan.passes,
                    rejected=[*out["rejected"], *plan.rejected])
-        if plan.step is not None and not mine:  # what it has is done by the layers over it and others
+        if plan.step is not None and not mine:  # a step of other zones finishes it
             out.update(step=plan.step, steps=[plan.step])
     if mine:
         out.update(cutting_length_mm=r(sum(map(cutting_length, mine)), 1), step=mine[0].id,
@@ -271,7 +275,7 @@ def _step(step: Workingstep) -> dict[str, Any]:
 
 
 def _bend(bend: DeflectionEstimate | None) -> dict[str, Any]:
-    """How far a tool bends in a step, and the share of its feed at which it goes for that."""
+    """Deflection of a tool in a step, and the share of its feed that the plan keeps because of it."""
     if bend is None:
         return {"deflection_mm": None, "deflection_limit_mm": None, "feed_share": None}
     return {"deflection_mm": r(bend.deflection, 5), "deflection_limit_mm": r(bend.limit, 5),
@@ -279,7 +283,7 @@ def _bend(bend: DeflectionEstimate | None) -> dict[str, Any]:
 
 
 def _tools(ready: Prepared, proof: Proof, steps: Sequence[Workingstep]) -> list[dict[str, Any]]:
-    out, lives = [], {t.id: t.life_min for t in ready.setup.tools}
+    out, lives = [], {t.id: t.life_min for t in ready.inputs.tools}
     for f in ready.views[0].fields.values():
         t = f.tool
         mine = [s for s in steps if s.tool.id == t.id]
@@ -292,12 +296,12 @@ def _tools(ready: Prepared, proof: Proof, steps: Sequence[Workingstep]) -> list[
                     "slenderness": r(slender, 2), "deflection_mm": r(max(bent), 5) if bent else None,
                     "engagement_deg": None if engaged is None else
                     {"max": r(math.degrees(engaged.most), 2), "p99": r(math.degrees(engaged.p99), 2)},
-                    "neck_clearance_mm": r(t.neck_clearance(ready.setup.clearance_mm.neck))})
+                    "neck_clearance_mm": r(t.neck_clearance(ready.inputs.clearances.neck))})
     return out
 
 
 def _support(proof: Proof) -> dict[str, Any]:
-    """How far thin walls were free where they were finished, in times their thickness."""
+    """Free height of thin walls where they are finished, over their thickness."""
     s = proof.support
     return {"walls": s.walls, "places": s.places, "most_ratio": r(s.most, 2), "limit_ratio": r(s.limit, 2),
             "places_over": s.over, "at_mm": None if s.at is None else [r(v) for v in s.at]}
@@ -318,8 +322,8 @@ def deviation(proof: Proof) -> list[dict[str, Any]]:
 
 
 def _inputs(ready: Prepared) -> dict[str, str]:
-    """Hashes of what went in; of the blank where it is a file."""
-    out = {"part_sha256": ready.part.sha256, "setup_sha256": setup_sha256(ready.setup)}
+    """Hashes of part, setup and, where it is a file, blank."""
+    out = {"part_sha256": ready.part.sha256, "setup_sha256": ready.inputs.sha256}
     return out if ready.blank.solid is None else {**out, "stock_sha256": ready.blank.solid.sha256}
 
 
@@ -328,9 +332,9 @@ def verification_report(ready: Prepared, proof: Proof, dense: SurfaceSamples) ->
     total = float(dense.area.sum())
     done = float(dense.area[np.asarray(proof.proved, dtype=np.bool_)].sum())
     coverage = done / total if total else 0.0
-    unmet = _too_little(coverage, ready.setup.quality.coverage_min)
+    unmet = _too_little(coverage, ready.inputs.quality.coverage_min)
     if proof.cutting_length <= 0.0:
-        unmet.append(_of_job("nothing_cut", "the program takes no stock off"))
+        unmet.append(_of_job("nothing_cut", "the program removes no stock"))
     findings = [*(f.as_dict() for f in proof.findings), *unmet]
     return {"state": "unproved" if findings else "proved", "findings": findings,
             "finding_counts": _counted(proof, unmet),

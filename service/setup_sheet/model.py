@@ -1,4 +1,4 @@
-"""What stands on a setup sheet, as plain words, tables and pictures: the web page and the PDF are made of the same."""
+"""The contents of a setup sheet as words, tables and pictures. The web page and the PDF are both made of it."""
 
 from __future__ import annotations
 
@@ -19,9 +19,11 @@ class Facts:
 class Table:
     """A table whose first column names its rows.
 
-    title  : what it lists; heads : of the columns, units with them
-    widths : relative, one per column; right : columns of numbers
-    none   : what is said where there is no row
+    title  : what it lists
+    heads  : of the columns, with their units
+    widths : relative, one for each column
+    right  : columns of numbers, index
+    none   : text that stands in place of a table without rows
     """
 
     title: str
@@ -35,7 +37,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Lines:
-    """Sentences, one below the other, and what they are."""
+    """A title with sentences, one below the other."""
 
     title: str
     texts: tuple[str, ...]
@@ -44,7 +46,7 @@ class Lines:
 
 @dataclass(frozen=True)
 class Picture:
-    """A PNG, and in words what is to be seen on it."""
+    """A PNG with a text that describes it."""
 
     png: bytes
     alt: str
@@ -53,7 +55,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class ToolCard:
-    """The drawing of a tool with what does not fit on it, and what to mind."""
+    """The drawing of a tool with its facts and cautions."""
 
     heading: str
     drawing: ToolDrawing
@@ -66,8 +68,11 @@ Block = Facts | Table | Lines | Picture | ToolCard
 
 
 @dataclass(frozen=True)
-class Section:
-    """A heading with what stands below it. key : its anchor."""
+class SheetSection:
+    """A heading and the blocks below it.
+
+    key : its anchor
+    """
 
     key: str
     title: str
@@ -75,14 +80,19 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Sheet:
-    """A whole sheet. proved : the job is; verdict : that in a sentence; foot : at the end of every page."""
+class SetupSheet:
+    """A whole sheet.
+
+    proved  : whether the job is proved
+    verdict : the same in a sentence
+    foot    : line at the end of every page
+    """
 
     title: str
     proved: bool
     verdict: str
     foot: str
-    sections: tuple[Section, ...]
+    sections: tuple[SheetSection, ...]
 
 
-__all__ = ["Block", "Facts", "Lines", "Picture", "Section", "Sheet", "Table", "ToolCard"]
+__all__ = ["Block", "Facts", "Lines", "Picture", "SheetSection", "SetupSheet", "Table", "ToolCard"]

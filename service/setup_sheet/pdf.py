@@ -1,4 +1,4 @@
-"""The setup sheet on A4 pages, with what fpdf2 draws itself: text in a font every reader has, lines, areas and PNGs."""
+"""The setup sheet on A4 pages, drawn by fpdf2: text in a font that every reader has, lines, areas and PNGs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from PIL import Image
 from output.header_text import ascii_text
 from output.stepnc.part21 import time_stamp
 from service.pictures.tool_drawing import HEIGHT, LETTER, WIDTH, ToolDrawing
-from service.setup_sheet.model import Block, Facts, Lines, Picture, Section, Sheet, Table, ToolCard
+from service.setup_sheet.model import Block, Facts, Lines, Picture, SetupSheet, SheetSection, Table, ToolCard
 
 MARGIN, FOOT = 12.0, 14.0  # mm
 INK, QUIET, BAD, GOOD = (20, 24, 29), (74, 82, 92), (163, 13, 23), (11, 90, 42)
@@ -23,14 +23,14 @@ SOFT, LINE, PAPER = (238, 241, 245), (138, 146, 156), (255, 255, 255)
 FILLS = {"flutes": (106, 165, 221), "neck": (185, 195, 206), "shank": (213, 220, 228), "holder": (152, 161, 171)}
 STROKES = {"measure": 0.12, "axis": 0.08, "spindle": 0.35}
 POINTS_PER_MM = 72.0 / 25.4
-CELL = 240  # characters of a table cell; what is longer goes on in a row below, or it might not fit onto any page
-LEAST_BELOW = 34.0  # mm a heading needs below it, or it goes onto the next page with what follows
-PAGES = "\x7f\x7f"  # stands for how many pages there are; no text of the sheet has these letters (``latin``)
-BESIDE = 11  # facts beside the drawing of a tool; the rest stand below it
+CELL = 240  # characters of a table cell; a longer text goes on in a row below, since a row must fit onto a page
+MIN_BELOW_HEADING = 34.0  # mm that a heading needs below it on its page; else it goes onto the next page
+PAGES = "\x7f\x7f"  # placeholder for the number of pages; ``latin`` keeps these letters out of the sheet
+BESIDE = 11  # facts beside the drawing of a tool; the others stand below it
 
 
 def latin(text: str) -> str:
-    """Text in the letters the standard fonts of PDF have; others are spelt out or become '?'.
+    """Text in the letters of the standard PDF fonts; other letters are spelt out or become '?'.
 
     >>> latin("Ø8 ±0.1 → Łódź")
     'Ø8 ±0.1 ? Lódz'
@@ -40,9 +40,9 @@ def latin(text: str) -> str:
 
 
 class _Pages(FPDF):
-    """A4 pages that say on each of them what they belong to."""
+    """A4 pages, each with the title of the sheet and its number."""
 
-    def __init__(self, sheet: Sheet) -> None:
+    def __init__(self, sheet: SetupSheet) -> None:
         super().__init__("portrait", "mm", "A4")
         self.sheet = sheet
         self.set_margin(MARGIN)
@@ -55,12 +55,12 @@ class _Pages(FPDF):
         self.add_page()
 
     def write_as(self, size: float, style: str = "", colour: tuple[int, int, int] = INK) -> None:
-        """Helvetica of a size in points from here on."""
+        """Write in Helvetica from here on, size in points."""
         self.set_font("Helvetica", style, size)
         self.set_text_color(*colour)
 
     def header(self) -> None:
-        """From the second page on: the title, and that nothing may be run where that is so."""
+        """Title from the second page on, with a warning where the job is not proved."""
         if self.page_no() == 1:
             return
         self.write_as(8, "B", INK if self.sheet.proved else BAD)
@@ -69,32 +69,32 @@ class _Pages(FPDF):
         self.ln(1)
 
     def footer(self) -> None:
-        """What the sheet is of, and which page this is."""
+        """The foot line and the number of the page."""
         self.set_y(-FOOT)
         self.write_as(7, "", QUIET)
         self.cell(self.epw - 24.0, 5, self.fitted(self.sheet.foot, self.epw - 26.0))
         self.cell(24.0, 5, f"page {self.page_no()} of {PAGES}", align="R")
 
     def fitted(self, text: str, width: float) -> str:
-        """As much of a text as goes into ``width`` mm."""
+        """The beginning of a text that fits into ``width`` mm."""
         shown = latin(text)
         while self.get_string_width(shown) > width - 2.0:
             shown = shown.removesuffix("...")[:-1] + "..."
         return shown
 
     def need(self, height: float) -> None:
-        """A new page where less than ``height`` mm are left of this one."""
+        """Begin a new page where less than ``height`` mm are left on this one."""
         if self.will_page_break(height):
             self.add_page()
 
 
-def pdf_of(sheet: Sheet) -> bytes:
+def pdf_of(sheet: SetupSheet) -> bytes:
     """The sheet as a PDF; the same sheet gives the same bytes.
 
     Raises
     ------
     OutputError
-        ``bad_epoch``: SOURCE_DATE_EPOCH is no number.
+        Code 'bad_epoch': SOURCE_DATE_EPOCH is no number.
     """
     pages = _Pages(sheet)
     _head(pages)
@@ -115,9 +115,9 @@ def _head(p: _Pages) -> None:
     p.multi_cell(0, 6, latin(p.sheet.verdict), fill=True, align="L", new_x="LMARGIN", new_y="NEXT")
 
 
-def _section(p: _Pages, section: Section) -> None:
+def _section(p: _Pages, section: SheetSection) -> None:
     first = section.blocks[0]
-    p.need(_height(p, first) + 20.0 if isinstance(first, Picture) else LEAST_BELOW)
+    p.need(_height(p, first) + 20.0 if isinstance(first, Picture) else MIN_BELOW_HEADING)
     p.ln(4)
     p.start_section(latin(section.title))
     p.write_as(12, "B")
@@ -179,13 +179,13 @@ def _table(p: _Pages, table: Table) -> None:
 
 
 def _pieces(row: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-    """A row, in as many as its longest cell needs."""
+    """A row as several rows where its longest cell needs them."""
     for parts in zip_longest(*(list(_cut(cell)) for cell in row), fillvalue=""):
         yield tuple(parts)
 
 
 def _cut(text: str) -> Iterator[str]:
-    """Text in pieces of ``CELL`` characters at most, parted between words where there are any."""
+    """Text in pieces of at most ``CELL`` characters, split between words where possible."""
     while len(text) > CELL:
         at = text.rfind(" ", 1, CELL)
         at = CELL if at < 0 else at
@@ -195,7 +195,7 @@ def _cut(text: str) -> Iterator[str]:
 
 
 def _height(p: _Pages, picture: Picture) -> float:
-    """Of a picture as wide as the page, mm."""
+    """Height, mm, of a picture as wide as the page."""
     with Image.open(io.BytesIO(picture.png)) as image:
         return p.epw * image.height / image.width
 
@@ -209,7 +209,7 @@ def _picture(p: _Pages, picture: Picture) -> None:
 
 
 def _card(p: _Pages, card: ToolCard) -> None:
-    """The drawing with its facts beside it; what to mind, and facts there is no room for, below."""
+    """The drawing of a tool with its facts beside it; further facts and cautions below."""
     p.need(HEIGHT + 14.0)
     p.write_as(10, "B")
     p.cell(0, 6, latin(card.heading), new_x="LMARGIN", new_y="NEXT")

@@ -1,7 +1,8 @@
-"""Setup sheet of a job, as a web page and as a PDF: what planner and machinist have to know before the spindle turns.
+"""Setup sheet of a job, as a web page and as a PDF: what planner and machinist need before the spindle turns.
 
-Both are made of one ``service.setup_sheet.model.Sheet``, so that they say the same. It holds no line of a program, and of a
-job that is not proved it says so before all else. No clock and no random number: the same input gives the same bytes.
+Both are made of one ``service.setup_sheet.model.SetupSheet``, so their contents agree. The sheet holds no line of a
+program, and an unproved job is marked first of all. It has no clock and no random number: the same input gives the
+same bytes.
 """
 
 from __future__ import annotations
@@ -16,15 +17,15 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
 from geometry.mesh import F64, TriangleMesh
+from geometry.setup_frame import SetupFrame
 from geometry.tool_body import ToolBody
 from output.gcode.dialects import DIALECTS, Switches
 from output.gcode.program_writer import label_number, lowest_tip
 from output.workplan import Workplan
-from schemas.setup import Setup
-from service.from_wire import material_name, tool_bodies
+from service.delivery.result_files import Files, listed
 from service.pictures.clamping_picture import Clamped, bar_mesh, box_mesh, clamp_picture, corners_of
 from service.pictures.tool_drawing import draw_tool, svg_of
-from service.setup_sheet.model import Block, Facts, Lines, Picture, Section, Sheet, Table, ToolCard
+from service.setup_sheet.model import Block, Facts, Lines, Picture, SetupSheet, SheetSection, Table, ToolCard
 from service.setup_sheet.pdf import pdf_of
 from service.setup_sheet.tables import (
     NONE,
@@ -40,31 +41,31 @@ from service.setup_sheet.tables import (
     tools_table,
     zones_table,
 )
-from service.stages.access_plan import Look, Program
+from service.stages.access_plan import ProofFrame, WrittenProgram
+from service.stages.job_inputs import JobInputs
 from service.stages.preparation import Prepared
-from service.stages.programs import access_of, gauge_lengths, proof_frame
-from service.stages.result_files import Files, listed
+from service.stages.programs import access_of, proof_frame
 from toolpath.workingsteps import Workingstep
 
 ZONE_WORDS = (
-    "A zone is what one tool finishes along one tool axis. SCZI: on, over or under a connection of walls; SCZ: "
-    "elsewhere.",
-    "Scallop: what stands over the surface between two passes, mm; as asked for, what 99 % of the samples keep, and "
-    "the most.",
-    "Covered: share of the zone that the proof found within the budget.")
+    "A zone is the area that one tool finishes along one tool axis. SCZI: on, over or under a connection of walls; "
+    "SCZ: elsewhere.",
+    "Scallop: height of the material that stays between two passes, mm; as requested, the value that 99 % of the "
+    "samples keep, and the largest.",
+    "Covered: share of the zone that the proof measured within tolerance.")
 HTML_NAME, PDF_NAME = "sheet.html", "sheet.pdf"
 
 
-def sheet_files(ready: Prepared, written: Sequence[Program], report: Mapping[str, Any], files: Files) -> Files:
+def sheet_files(ready: Prepared, written: Sequence[WrittenProgram], report: Mapping[str, Any], files: Files) -> Files:
     """Both forms of the sheet of a job.
 
-    written : the programs, also those of an unproved job, of which nothing is told but heights
-    files   : what else is delivered; its map of the deviations goes onto the sheet
+    written : the programs; of an unproved job the sheet gives only their heights
+    files   : the other files of the job; the sheet shows its deviation map
 
     Raises
     ------
     OutputError
-        ``bad_epoch``: SOURCE_DATE_EPOCH is no number.
+        Code 'bad_epoch': SOURCE_DATE_EPOCH is no number.
     """
     sheet = sheet_of(ready, written, {**report, "files": listed(files)}, _bytes_of(files, "deviation"))
     return {HTML_NAME: ("sheet", "", None, html_of(sheet)), PDF_NAME: ("sheet", "", None, pdf_of(sheet))}
@@ -74,88 +75,88 @@ def _bytes_of(files: Files, kind: str) -> bytes | None:
     return next((data for of, _, _, data in files.values() if of == kind and isinstance(data, bytes)), None)
 
 
-def sheet_of(ready: Prepared, written: Sequence[Program], report: Mapping[str, Any],
-             deviation: bytes | None) -> Sheet:
-    """What stands on the sheet of a job.
+def sheet_of(ready: Prepared, written: Sequence[WrittenProgram], report: Mapping[str, Any],
+             deviation: bytes | None) -> SetupSheet:
+    """The sheet of a job.
 
-    deviation : PNG of the map of the deviations, or None
+    deviation : PNG of the deviation map, or None
     """
-    setup = ready.setup
+    inputs = ready.inputs
     proved = report["state"] == "proved"
     count = sum(report["finding_counts"].values())
-    verdict = ("The programs were simulated, and the proof found nothing." if proved else
+    verdict = ("The programs were simulated, and the proof has no finding." if proved else
                f"Nothing may be run: the proof has {count} finding{'' if count == 1 else 's'}, and no program was "
-               "written. What follows is what was planned.")
-    title = setup.labels.get("order") or "zonemill job"
+               "written. The sheet describes the plan.")
+    title = inputs.labels.get("order") or "zonemill job"
     findings = findings_section(report)
-    sections = [job_section(report, setup, material_name(setup)), *([] if proved else [findings]),
+    sections = [job_section(report, inputs), *([] if proved else [findings]),
                 cautions_section(report), *_clampings(ready, written, report),
-                _tools(setup, report), _steps(setup, written, report),
-                Section("zones", "Zones", (zones_table(report), Lines("How to read it", ZONE_WORDS))),
-                Section("remainder", "Remainder", (remainder_table(report),)), *([findings] if proved else []),
-                proof_section(report), Section("files", "Files", (files_table(report),))]
+                _tools(inputs, report), _steps(inputs, written, report),
+                SheetSection("zones", "Zones", (zones_table(report), Lines("How to read it", ZONE_WORDS))),
+                SheetSection("remainder", "Remainder", (remainder_table(report),)), *([findings] if proved else []),
+                proof_section(report), SheetSection("files", "Files", (files_table(report),))]
     if deviation is not None:
-        sections.append(Section("deviation", "Deviation from the part", (Picture(
-            deviation, "The part coloured by what the proof measured: red where it is cut too deep, green within the "
-            "budget, blue where stock is left, hatched where no tool got."),)))
+        sections.append(SheetSection("deviation", "Deviation from the part", (Picture(
+            deviation, "The part coloured by the measured deviation: red where it is cut too deep, green within "
+            "tolerance, blue where stock is left, hatched where no tool reached."),)))
     sha = report["inputs"]
     foot = f"{report['state']}; part {sha['part_sha256'][:16]}, setup {sha['setup_sha256'][:16]}; {title}"
-    return Sheet(f"Setup sheet: {title}", proved, verdict, foot, tuple(sections))
+    return SetupSheet(f"Setup sheet: {title}", proved, verdict, foot, tuple(sections))
 
 
-def _clampings(ready: Prepared, written: Sequence[Program], report: Mapping[str, Any]) -> list[Section]:
-    """A part that is turned by hand has a picture for each time it is clamped; where nothing is cut, for the first."""
+def _clampings(ready: Prepared, written: Sequence[WrittenProgram], report: Mapping[str, Any]) -> list[SheetSection]:
+    """One section for each clamping of the part, or for the first access where nothing is cut."""
     names = list(dict.fromkeys(p.access for p in written)) or [ready.views[0].id]
-    looks = [proof_frame(ready)] if ready.setup.machine.kind == "5-axis" else [Look.of(ready.view(n)) for n in names]
-    return [_clamping(ready, look, [p for p in written if len(looks) == 1 or p.access == look.id], report,
-                      len(looks) > 1) for look in looks]
+    frames = [proof_frame(ready)] if ready.inputs.turns else [ProofFrame.of(ready.view(n)) for n in names]
+    return [_clamping(ready, frame, [p for p in written if len(frames) == 1 or p.access == frame.id], report,
+                      len(frames) > 1) for frame in frames]
 
 
-def _clamping(ready: Prepared, look: Look, programs: Sequence[Program], report: Mapping[str, Any],
-              several: bool) -> Section:
-    setup, turns = ready.setup, ready.setup.machine.kind == "5-axis"
-    access = access_of(ready, look)
-    held = Clamped(look.part, _blank_mesh(ready, look.rotation), not ready.blank.stands_alone,
-                   tuple(corners_of(np.array(f.box_mm)) @ look.rotation.T for f in setup.fixtures),
+def _clamping(ready: Prepared, frame: ProofFrame, programs: Sequence[WrittenProgram], report: Mapping[str, Any],
+              several: bool) -> SheetSection:
+    inputs, turns = ready.inputs, ready.inputs.turns
+    access = access_of(ready, frame)
+    held = Clamped(frame.part, _blank_mesh(ready, frame.rotation), not ready.blank.stands_alone,
+                   tuple(corners_of(box) @ frame.rotation.T for box in inputs.fixtures),
                    access.work_offset,
-                   tuple((v.id, look.rotation @ v.direction) for v in ready.views if turns or v.id == look.id))
+                   tuple((v.id, frame.rotation @ v.direction) for v in ready.views if turns or v.id == frame.id))
     names, listed_names = [n for p in programs for _, n, _ in p.files()], {f["name"] for f in report["files"]}
-    blank = ready.blank.corners(look.rotation)
-    axes = look.rotation @ _setup_axes(setup)
-    frame = "the frame of the setup" if turns else f"the frame of access {look.id}"
+    blank = ready.blank.corners(frame.rotation)
+    axes = frame.rotation @ _setup_axes(inputs.placement)
+    frame_name = "the frame of the setup" if turns else f"the frame of access {frame.id}"
     pairs = [
         ("Programs", ", ".join(n for n in names if n in listed_names) or "none written"),
         ("Work offset", access.work_offset),
-        ("Program zero", f"{place(setup.placement.origin_mm)} in the coordinates of the part's file, in which X of the "
+        ("Program zero", f"{place(inputs.placement.origin)} in the coordinates of the part's file, in which X of the "
                          f"program is {_direction(axes[0].tolist())} and Z is {_direction(axes[2].tolist())}"),
-        *([] if turns else [("Tool axis", f"{look.id}: {_direction(look.rotation[2].tolist())} of the setup is Z of "
+        *([] if turns else [("Tool axis", f"{frame.id}: {_direction(frame.rotation[2].tolist())} of the setup is Z of "
                                           "the program")]),
-        ("Part", f"{_box(look.part.bounds)} in {frame}"),
-        (f"Blank, {setup.stock.kind.replace('_', ' ')}", _box(blank) + _round(ready, look.rotation) + (
+        ("Part", f"{_box(frame.part.bounds)} in {frame_name}"),
+        (f"Blank, {inputs.stock.kind.replace('_', ' ')}", _box(blank) + _round(ready, frame.rotation) + (
             "" if ready.blank.stands_alone else f": the part grown by {number(ready.blank.margin)}") + (
             f"; the real one may stand {number(ready.blank.uncertainty)} beyond" if ready.blank.uncertainty else "")),
         *_heights([p.work for p in programs])]
-    picture = clamp_picture(held, f"{look.id if several else 'Clamping'}: seen from the front right")
+    picture = clamp_picture(held, f"{frame.id if several else 'Clamping'}: seen from the front right")
     blocks: list[Block] = [Picture(picture, _seen(held, blank)), Facts(tuple(pairs))]
     if turns:
-        blocks.append(_turned(report, (setup.machine.kinematics or "")[-2:]))
+        blocks.append(_turned(report, (inputs.machine.kinematics or "")[-2:]))
     fixtures = tuple((f"fixture {k}", *(f"{number(a)} to {number(b)}" for a, b in zip(*box.tolist(), strict=True)))
                      for k, box in enumerate((np.array([c.min(axis=0), c.max(axis=0)]) for c in held.fixtures), 1))
     blocks.append(Table("Fixtures: boxes in the frame of the program that nothing may touch, mm",
                         ("fixture", "X", "Y", "Z"), fixtures, (1.0, 1.5, 1.5, 1.5),
-                        none="The setup names no fixture: none is kept clear of."))
-    title = f"Clamping and program zero, {look.id}" if several else "Clamping and program zero"
-    return Section(f"clamping-{look.id}", title, tuple(blocks))
+                        none="The setup names no fixture, so the programs keep clear of none."))
+    title = f"Clamping and program zero, {frame.id}" if several else "Clamping and program zero"
+    return SheetSection(f"clamping-{frame.id}", title, tuple(blocks))
 
 
-def _setup_axes(setup: Setup) -> F64:
-    """(3, 3), unit: X, Y and Z of the setup frame as rows, in the coordinates of the part's file."""
-    x, z = (np.array(v) / np.linalg.norm(v) for v in (setup.placement.x_axis, setup.placement.z_axis))
+def _setup_axes(placement: SetupFrame) -> F64:
+    """(3, 3) float64, dimensionless: unit axes of the setup frame as rows, in coordinates of the part's file."""
+    x, z = (np.array(v) / np.linalg.norm(v) for v in (placement.x_axis, placement.z_axis))
     return np.array([x, np.cross(z, x), z])
 
 
 def _round(ready: Prepared, rotation: F64) -> str:
-    """Of a round blank how thick it is, and where the middles of its ends lie in a frame."""
+    """Diameter of a round blank and the middles of its ends in a frame; '' for other blanks."""
     bar = ready.blank.bar
     if bar is None:
         return ""
@@ -166,16 +167,16 @@ def _round(ready: Prepared, rotation: F64) -> str:
 def _seen(held: Clamped, blank: F64) -> str:
     fixtures = f", {len(held.fixtures)} fixtures" if held.fixtures else ""
     return (f"Part in its blank{fixtures}, program zero {held.zero} with its axes, and tool axes "
-            f"{', '.join(name for name, _ in held.comings)}; slanting and from above. The blank reaches {_box(blank)}.")
+            f"{', '.join(name for name, _ in held.comings)}; oblique view and top view. The blank spans {_box(blank)}.")
 
 
 def _heights(works: Sequence[Workplan]) -> list[tuple[str, str]]:
-    """Where rapids are free and how deep the tip goes, as the headers of the programs of one clamping have them."""
+    """Heights of one clamping from the headers of its programs: where rapids are free, and how deep the tip goes."""
     if not works:
         return []
     low, work = min(map(lowest_tip, works)), works[0]
     below = float(work.stock.lower[2]) - low
-    deep = f"Z{number(low)}" + (f", {number(below)} below the blank: nothing may stand there" if below > 1e-3 else "")
+    deep = f"Z{number(low)}" + (f", {number(below)} below the blank: keep this room free" if below > 1e-3 else "")
     if work.clamping is None:
         return [("Clearance plane", f"Z{number(work.clearance_plane)}: above it rapids in X and Y are free"),
                 ("Lowest Z of the tip", deep)]
@@ -188,9 +189,9 @@ def _heights(works: Sequence[Workplan]) -> list[tuple[str, str]]:
 def _turned(report: Mapping[str, Any], letters: str) -> Table:
     rows = tuple((a["id"], _direction(a["axis"]), " ".join(
         letter + number(v) for letter, v in zip(letters, a["rotary_deg"] or (), strict=False)) or NONE,
-                  "found for what the others leave" if a["found"] else "of the setup") for a in report["accesses"])
-    return Table("Accesses: tool axes in the frame of the setup, and how the rotary axes stand for them",
-                 ("access", "tool axis", "rotary axes, deg", "where from"), rows,
+                  "found, for the area that the others leave" if a["found"] else "setup") for a in report["accesses"])
+    return Table("Accesses: tool axes in the frame of the setup, and the rotary axes for each",
+                 ("access", "tool axis", "rotary axes, deg", "origin"), rows,
                  (1.0, 2.5, 2.5, 2.0))
 
 
@@ -207,7 +208,7 @@ def _box(box: F64) -> str:
 
 
 def _blank_mesh(ready: Prepared, rotation: F64) -> TriangleMesh:
-    """The nominal blank in a frame; of one that is grown from the part the box round it."""
+    """The nominal blank in a frame; for a blank grown from the part the box around it."""
     blank = ready.blank
     solid = blank.proof_mesh(rotation)
     if solid is not None:
@@ -218,35 +219,35 @@ def _blank_mesh(ready: Prepared, rotation: F64) -> TriangleMesh:
     return box_mesh(corners_of(blank.bounds) @ rotation.T)
 
 
-def _tools(setup: Setup, report: Mapping[str, Any]) -> Section:
+def _tools(inputs: JobInputs, report: Mapping[str, Any]) -> SheetSection:
     used = list(dict.fromkeys(s["tool"] for s in report["steps"]))
-    bodies, gauges = {b.id: b for b in tool_bodies(setup)}, gauge_lengths(setup)
-    cards = [_card(setup, bodies[name], gauges[bodies[name].number], report) for name in used]
-    return Section("tools", "Tools", (tools_table(report, setup, used), *cards))
+    bodies, gauges = {b.id: b for b in inputs.bodies}, inputs.gauge_lengths
+    cards = [_card(inputs, bodies[name], gauges[bodies[name].number], report) for name in used]
+    return SheetSection("tools", "Tools", (tools_table(report, inputs, used), *cards))
 
 
-def _card(setup: Setup, body: ToolBody, gauge: float, report: Mapping[str, Any]) -> ToolCard:
-    tool = next(t for t in setup.tools if t.id == body.id)
+def _card(inputs: JobInputs, body: ToolBody, gauge: float, report: Mapping[str, Any]) -> ToolCard:
+    tool = next(t for t in inputs.tools if t.id == body.id)
     fact = next(t for t in report["tools"] if t["id"] == body.id)
     segments = tuple((f"Holder {k}", f"Ø{number(h.diameter)}" + (
         f" to {number(h.diameter_top)}" if h.diameter_top != h.diameter else "") + f", {number(h.length)} long")
-        for k, h in enumerate(body.holder, 1)) or (("Holder", "not named in the setup: none was kept clear"),)
+        for k, h in enumerate(body.holder, 1)) or (("Holder", "not given in the setup, so not kept clear of"),)
     bends = fact["deflection_mm"]
     pairs = (
         ("Teeth", f"{tool.flutes}, {'cuts' if tool.center_cutting else 'does not cut'} to the centre"), *segments,
-        ("Gauge length", f"{number(gauge)}" + ("" if tool.gauge_given else ": stickout and holder, as none was given")),
+        ("Gauge length", number(gauge) + ("" if tool.gauge_given else ": stickout and holder, none is given")),
         ("Slenderness", number(fact["slenderness"], 1)),
-        ("Bends", "not estimated" if bends is None else f"{number(bends)} mm at most, as estimated"),
+        ("Deflection", "not estimated" if bends is None else f"{number(bends)} mm at most, estimated"),
         ("In cut", f"{number(fact['minutes_in_cut'], 2)} min, {number(fact['metres_in_cut'], 2)} m"),
         ("Cutters", f"{fact['cutters']}" + (f", each lasts {number(fact['life_min'])} min in cut" if fact["life_min"]
-                                            else ", life not counted")))
+                                            else ", tool life not given")))
     mind = tuple(f"{c['message']}; {c['remedy']}" for c in report["warnings"] if body.id in c["subjects"])
     own = "" if body.id == f"T{body.number}" else f" {body.id}"
     heading = f"T{body.number}{own}: {tool.kind} Ø{number(tool.diameter_mm)}"
     return ToolCard(heading, draw_tool(body, gauge), Facts(pairs), mind)
 
 
-def _steps(setup: Setup, written: Sequence[Program], report: Mapping[str, Any]) -> Section:
+def _steps(inputs: JobInputs, written: Sequence[WrittenProgram], report: Mapping[str, Any]) -> SheetSection:
     planned, labels, programs = {}, {}, {}
     for p in written:
         for s in p.work.steps:
@@ -255,18 +256,18 @@ def _steps(setup: Setup, written: Sequence[Program], report: Mapping[str, Any]) 
             planned[s.id] = (s.access or p.access, s.top, s.bottom)
             if p.work.restart and report["state"] == "proved":
                 labels[s.id] = _label(p, s)
-    table = steps_table(report, planned, labels, programs, {b.id: b.number for b in tool_bodies(setup)})
-    note = "Heights are in the frame of the program; of a tool axis that leans they are along it."
-    words = "A program can be started at the label of any step, when all steps before it have been cut."
+    table = steps_table(report, planned, labels, programs, {b.id: b.number for b in inputs.bodies})
+    note = "Heights are in the frame of the program, or along the tool axis where it is tilted."
+    words = "A program can start at the label of any step when all steps before it have been cut."
     begun = (words,) if labels else ()
-    return Section("steps", "Steps", (table, Lines("How to read it", (note, *begun))))
+    return SheetSection("steps", "Steps", (table, Lines("How to read it", (note, *begun))))
 
 
-def _label(program: Program, step: Workingstep) -> str:
-    """The label of a step on each control, told once where several have the same."""
-    said = (DIALECTS[d](Switches()).label(step.id, label_number(program.work, step))[0].rstrip(":")
+def _label(program: WrittenProgram, step: Workingstep) -> str:
+    """The label of a step on each control; equal labels once."""
+    labels = (DIALECTS[d](Switches()).label(step.id, label_number(program.work, step))[0].rstrip(":")
             for d, _, _ in program.files())
-    return ", ".join(dict.fromkeys(said))
+    return ", ".join(dict.fromkeys(labels))
 
 
 @cache
@@ -278,8 +279,8 @@ def _template() -> Template:
     return env.get_template("template.html")
 
 
-def html_of(sheet: Sheet) -> bytes:
-    """The sheet as one page that asks for nothing from elsewhere; every word of the user's is escaped."""
+def html_of(sheet: SetupSheet) -> bytes:
+    """The sheet as one page that loads nothing else; every text of the user is escaped."""
     return (_template().render(sheet=sheet).rstrip() + "\n").encode()
 
 

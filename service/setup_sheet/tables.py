@@ -1,4 +1,4 @@
-"""The report of a job as the tables of its setup sheet; every figure is the report's own."""
+"""The tables of a setup sheet; every figure is one of the report."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from output.header_text import decimal
-from schemas.setup import Setup
-from service.setup_sheet.model import Facts, Lines, Section, Table
+from service.setup_sheet.model import Facts, Lines, SheetSection, Table
+from service.stages.job_inputs import JobInputs
 
 NONE = "-"
 SHORT_LABEL = 8  # characters of a label that fit into a narrow column
 SHORT_SHA = 16  # hex digits, as in the header of a program
 ZONE = re.compile(r"Z\d+\w*")
-OTHERS = {"other access": "another tool axis", "other process": "another process"}  # than milling along those at hand
+OTHERS = {"other access": "another tool axis", "other process": "another process"}  # than milling along the accesses
 KINDS = {
     "program": "program", "stepnc": "STEP-NC, AP238", "stepnc-arm": "STEP-NC, ISO 14649", "zones": "zones as data",
-    "preview": "picture of part and paths", "deviation": "map of the deviations", "machined": "machined part as a mesh"}
+    "preview": "picture of part and paths", "deviation": "deviation map", "machined": "machined part as a mesh"}
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -31,7 +31,7 @@ def minutes(seconds: float | None) -> str:
 
 
 def share(value: float | None) -> str:
-    """A share of 0..1 in percent, rounded down, so that 100 % is all of it."""
+    """A share, 0 to 1, in percent, rounded down, so that 100 % means all."""
     return NONE if value is None else f"{decimal(int(value * 10_000.0 + 1e-9) / 100.0, 2)} %"
 
 
@@ -49,25 +49,25 @@ def ranged(values: Sequence[float | None], digits: int = 0) -> str:
     return NONE if not words else words[0] if words[0] == words[-1] else f"{words[0]} to {words[-1]}"
 
 
-def job_section(report: Mapping[str, Any], setup: Setup, material: str) -> Section:
-    """What the job is and what it takes."""
+def job_section(report: Mapping[str, Any], inputs: JobInputs) -> SheetSection:
+    """Labels, machine, time and coverage of the job."""
     labels = [(f"Label {key}", value) for key, value in sorted(report["labels"].items())]
-    part, time, machine = report["part"], report["time"], setup.machine
+    part, time, machine = report["part"], report["time"], inputs.machine
     size = [b - a for a, b in zip(*part["bbox_mm"], strict=True)]
     programs = [f["name"] for f in report["files"] if f["kind"] == "program"]
     axes = machine.kind if machine.kinematics is None else f"{machine.kind}, {machine.kinematics}"
-    return Section("job", "Job", (Facts((
+    return SheetSection("job", "Job", (Facts((
         *labels,
-        ("Material", material),
+        ("Material", inputs.material_name),
         ("Machine", f"{axes}; {', '.join(machine.dialects)}"),
         ("Units", "mm, mm/min, 1/min, degrees"),
         ("Coolant", machine.coolant),
         ("Size of the part", " x ".join(number(v) for v in size)),
         ("Programs", f"{len(programs)}, for {', '.join(machine.dialects)}" if programs else "none written"),
-        ("Time", f"{minutes(report['machining_time_s'])} min as simulated, {minutes(time['in_cut_s'])} of them in cut; "
+        ("Time", f"{minutes(report['machining_time_s'])} min as simulated, of them {minutes(time['in_cut_s'])} in cut; "
                  f"{time['tool_changes']} tool changes within programs"),
-        ("Coverage", f"{share(report['coverage'])} of the area to be machined is proved, "
-                     f"{share(report['reach_coverage'])} of what the tools reach"),
+        ("Coverage", f"{share(report['coverage'])} of the machinable area is proved, "
+                     f"{share(report['reach_coverage'])} of the area that the tools reach"),
         ("Part sha256", report["inputs"]["part_sha256"][:SHORT_SHA]),
         ("Setup sha256", report["inputs"]["setup_sha256"][:SHORT_SHA]),
         *(("Blank sha256", sha[:SHORT_SHA]) for sha in [report["inputs"].get("stock_sha256")] if sha),
@@ -75,38 +75,38 @@ def job_section(report: Mapping[str, Any], setup: Setup, material: str) -> Secti
 
 
 def files_table(report: Mapping[str, Any]) -> Table:
-    """The files beside the sheet; nothing that drives a machine is among them where a job is not proved."""
+    """The files beside the sheet; an unproved job has no program and no STEP-NC among them."""
     rows = [(f["name"], KINDS.get(f["kind"], f["kind"]), f["access"] or NONE, f["sha256"][:SHORT_SHA])
             for f in report["files"]]
     return Table("Files", ("file", "what it is", "access", "sha256 begins"), tuple(rows), (3.0, 3.0, 1.0, 2.2))
 
 
-def cautions_section(report: Mapping[str, Any]) -> Section:
-    """What the machinist is to mind although it is no finding."""
-    told = [(c["kind"].replace("_", " "), ", ".join(c["subjects"]) or NONE, c["message"], c["remedy"])
+def cautions_section(report: Mapping[str, Any]) -> SheetSection:
+    """Cautions, warnings and notes."""
+    rows = [(c["kind"].replace("_", " "), ", ".join(c["subjects"]) or NONE, c["message"], c["remedy"])
             for c in report["warnings"]]
     known = {f"{c['message']}; {c['remedy']}" for c in report["warnings"]}
     others = tuple(w for w in report["part"]["warnings"] if w not in known)
     notes = tuple(report["proof"]["notes"])
-    table = Table("Cautions", ("kind", "of", "what", "what to do"), tuple(told), (1.2, 1.6, 4.0, 3.6),
+    table = Table("Cautions", ("kind", "of", "what", "remedy"), tuple(rows), (1.2, 1.6, 4.0, 3.6),
                   none="No caution.")
     lists = (("Of the part and the plan", others), ("Notes of the proof", notes))
     more = [Lines(title, lines) for title, lines in lists if lines]
-    return Section("mind", "To be minded", (table, *more))
+    return SheetSection("mind", "To be minded", (table, *more))
 
 
-def findings_section(report: Mapping[str, Any]) -> Section:
-    """What the proof found."""
+def findings_section(report: Mapping[str, Any]) -> SheetSection:
+    """The findings of the proof."""
     counts = report["finding_counts"]
     rows = tuple((f["kind"], f["message"], _where(f), place(f.get("point")), _many(f)) for f in report["findings"])
     more = sum(counts.values()) - len(rows)
-    told = tuple(f"{n} of kind {kind}" for kind, n in counts.items())
+    by_kind = tuple(f"{n} of kind {kind}" for kind, n in counts.items())
     blocks: list[Table | Lines] = [Table(
         "Findings of the proof", ("kind", "what", "where", "worst at, mm", "places"), rows, (1.3, 4.6, 2.2, 2.2, 0.8),
-        frozenset({4}), none="The proof found nothing.")]
+        frozenset({4}), none="The proof has no finding.")]
     if more > 0:
-        blocks.append(Lines("More", (f"{more} more are counted only: {', '.join(told)}",)))
-    return Section("findings", "Findings of the proof", tuple(blocks))
+        blocks.append(Lines("More", (f"{more} more are counted only: {', '.join(by_kind)}",)))
+    return SheetSection("findings", "Findings of the proof", tuple(blocks))
 
 
 def _where(f: Mapping[str, Any]) -> str:
@@ -119,9 +119,9 @@ def _many(f: Mapping[str, Any]) -> str:
     return str(f.get("count", 1))
 
 
-def tools_table(report: Mapping[str, Any], setup: Setup, used: Sequence[str]) -> Table:
-    """All tools of the setup: those in use in the order the programs take them, then the rest."""
-    facts, tools = {t["id"]: t for t in report["tools"]}, {t.id: t for t in setup.tools}
+def tools_table(report: Mapping[str, Any], inputs: JobInputs, used: Sequence[str]) -> Table:
+    """All tools of the setup: those in use in the order of the programs, then the others."""
+    facts, tools = {t["id"]: t for t in report["tools"]}, {t.id: t for t in inputs.tools}
     rows = []
     for name in [*used, *(t for t in tools if t not in used)]:
         tool, fact = tools[name], facts[name]
@@ -142,21 +142,23 @@ def tools_table(report: Mapping[str, Any], setup: Setup, used: Sequence[str]) ->
 
 def steps_table(report: Mapping[str, Any], planned: Mapping[str, tuple[str, float, float]],
                 labels: Mapping[str, str], programs: Mapping[str, str], numbers: Mapping[str, int]) -> Table:
-    """The steps in the order they are run.
+    """The steps in the order of the programs.
 
-    planned : by id, the access in whose frame a step is, and its upper and lower end there, mm
-    labels  : by id, the label a program can be started at; numbers : T numbers by id of the tool
-    programs : by id, how the names of its programs begin, where there are several of a control
+    planned  : by id, access of the step, and its upper and lower end in the frame of that access, mm
+    labels   : by id, label that a program can start at
+    programs : by id, beginning of the names of its programs, where a control has several
+    numbers  : T numbers by id of the tool
     """
     rows = []
     for s in report["steps"]:
         access, top, bottom = planned.get(s["id"], ("", None, None))
         zones = s["zone"] or " ".join(w for w in s["name"].split() if ZONE.fullmatch(w)) or NONE
-        rows.append((s["id"], *(told.get(s["id"], NONE) for told in (programs, labels) if told), zones, access or NONE,
-                     f"{s['operation']}, {s['strategy']}", f"T{numbers[s['tool']]}" + (", fresh cutter" if
-                     s["fresh_cutter"] else ""), number(s["spindle_rpm"], 0), number(s["feed_mm_min"], 0),
-                     number(top), number(bottom), minutes(s["machining_time_s"])))
-    more = [name for name, told in (("program", programs), ("label", labels)) if told]
+        change = ", fresh cutter" if s["fresh_cutter"] else ""
+        rows.append((s["id"], *(texts.get(s["id"], NONE) for texts in (programs, labels) if texts), zones,
+                     access or NONE, f"{s['operation']}, {s['strategy']}", f"T{numbers[s['tool']]}{change}",
+                     number(s["spindle_rpm"], 0), number(s["feed_mm_min"], 0), number(top), number(bottom),
+                     minutes(s["machining_time_s"])))
+    more = [name for name, texts in (("program", programs), ("label", labels)) if texts]
     heads = ("step", *more, "zones", "access", "what", "tool", "S 1/min", "F mm/min", "top Z", "bottom Z", "min")
     longest = max(map(len, labels.values()), default=0)
     wide = {"program": 2.6, "label": 1.0 if longest <= SHORT_LABEL else 2.0}
@@ -166,30 +168,31 @@ def steps_table(report: Mapping[str, Any], planned: Mapping[str, tuple[str, floa
 
 
 def zones_table(report: Mapping[str, Any]) -> Table:
-    """What each zone is and what the proof measured on it."""
+    """Each zone and the figures that the proof measured on it."""
     rows = tuple((
         z["id"], z["kind"], " ".join(w for w in (z["profile"], z["level"]) if w) or NONE, z["access"], z["tool"],
         f"{z['form']}, {z['strategy']}", " ".join(z["faces"]), number(z["area_mm2"], 1),
         number(z["scallop_mm"]["requested"], 4), number(z["scallop_mm"]["p99"], 4), number(z["scallop_mm"]["max"], 4),
         share(z.get("coverage")), " ".join(z["steps"]) or NONE, minutes(z["machining_time_s"]))
         for z in report["zones"])
-    return Table("Zones, with what the proof measured on them",
-                 ("zone", "kind", "profile, level", "access", "tool", "what", "faces", "mm²", "scallop asked", "p99",
-                  "most", "covered", "steps", "min"), rows,
+    return Table("Zones, with the figures measured by the proof",
+                 ("zone", "kind", "profile, level", "access", "tool", "what", "faces", "mm²", "scallop set", "p99",
+                  "max", "covered", "steps", "min"), rows,
                  (1.0, 1.0, 1.3, 1.1, 0.9, 1.9, 1.9, 1.1, 1.2, 1.0, 1.0, 1.3, 1.1, 0.9),
-                 frozenset({7, 8, 9, 10, 11, 13}), none="No zone: no tool reaches anything of what was asked for.")
+                 frozenset({7, 8, 9, 10, 11, 13}), none="No zone: no tool reaches any of the requested area.")
 
 
 def remainder_table(report: Mapping[str, Any]) -> Table:
-    """What stays, why, and what would do."""
+    """The remainder: where material stays, why, and what would reach it."""
     rows = tuple((x["reason"], number(x["area_mm2"], 2), " ".join(x["faces"]), place(x["at_mm"]), needed(x))
                  for x in report["remainder"])
-    return Table("Remainder: what stays uncut", ("why", "mm²", "faces", "about at, mm", "what would do"), rows,
-                 (1.9, 0.8, 2.2, 1.9, 4.2), frozenset({1}), none="Nothing stays: all area asked for is machined.")
+    heads = ("reason", "mm²", "faces", "near, mm", "what would reach it")
+    return Table("Remainder: area that stays uncut", heads, rows,
+                 (1.9, 0.8, 2.2, 1.9, 4.2), frozenset({1}), none="No remainder: all of the requested area is machined.")
 
 
 def needed(item: Mapping[str, Any]) -> str:
-    """What would reach an entry of the remainder, in words."""
+    """The tool, access or process that would reach an entry of the remainder, in words."""
     need = item["would_need"]
     words = [item["why_left"] or ""]
     if item["tool_at_hand"]:
@@ -207,20 +210,20 @@ def needed(item: Mapping[str, Any]) -> str:
             words.append(f"as a tool would be {number(need['slenderness'], 1)} times as long as thick")
     if "access" in need:
         words.append(f"along {need['access']}")
-    return ", ".join(w for w in words if w) or "no tool would"
+    return ", ".join(w for w in words if w) or "no tool would reach it"
 
 
-def proof_section(report: Mapping[str, Any]) -> Section:
-    """How well it was looked."""
+def proof_section(report: Mapping[str, Any]) -> SheetSection:
+    """Number of samples, error and lengths of the proof."""
     proof, time = report["proof"], report["time"]
     facts = Facts((
         ("Samples measured", str(proof["samples"])),
-        ("Error of the measure", f"{number(proof['error_bound_mm'], 4)} mm at most"),
+        ("Error of the measurement", f"{number(proof['error_bound_mm'], 4)} mm at most"),
         ("Deepest cut into the part", f"{number(report['gouge_max_mm'], 4)} mm"),
-        ("Length in cut", f"{number(proof['cutting_length_mm'], 0)} mm"),
-        ("Time in air", f"{minutes(time['in_air_s'])} min, {minutes(time['rapid_s'])} of them rapids; "
-                        f"{time['retracts']} times up")))
-    return Section("proof", "The proof", (facts,))
+        ("Cutting length", f"{number(proof['cutting_length_mm'], 0)} mm"),
+        ("Time in air", f"{minutes(time['in_air_s'])} min, of them {minutes(time['rapid_s'])} in rapids; "
+                        f"{time['retracts']} retracts")))
+    return SheetSection("proof", "The proof", (facts,))
 
 
 __all__ = ["NONE", "SHORT_SHA", "cautions_section", "files_table", "findings_section", "job_section", "minutes",

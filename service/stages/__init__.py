@@ -1,4 +1,4 @@
-"""The stages of the pipeline: from the converted setup to the files of a finished job.
+"""The stages of a job: setup converted, part prepared, accesses planned, programs written and proved.
 
-No HTTP and no job table is known here.
+No HTTP and no job table is known here. The files of a job are made in ``service.delivery``.
 """

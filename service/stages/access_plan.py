@@ -1,4 +1,4 @@
-"""What was planned along each access direction, and the names of its files."""
+"""The plan of an access, the frame of a proof, and a written program with the names of its files."""
 
 from __future__ import annotations
 
@@ -19,26 +19,27 @@ from zones.reach.access_view import View, turned_samples
 
 
 @dataclass(frozen=True, eq=False)
-class Side:
-    """What was planned along one access, in its frame, with its clearance plane there, mm.
+class AccessPlan:
+    """The plan of one access, in its frame.
 
-    left : the stock as it leaves it, for what is planned after it; None where every access begins with the whole blank
-    name : of it among what is kept for another attempt at the job (``service.stages.resume``), '' where nothing is
+    clearance : mm, height of the clearance plane
+    left      : the stock after it, for the accesses that follow; None where every access begins with the whole blank
+    name      : under which it is kept for another attempt (``service.stages.resume``); '' where it is not kept
     """
 
     view: View
-    made: Plan
+    plan: Plan
     clearance: float
     left: StockMap | None
     name: str = ""
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
-    """The frame a proof is carried out in.
+class ProofFrame:
+    """The frame of a proof.
 
-    id       : of the access whose frame it is, or of the first where it is the setup's
-    rotation : (3, 3) float64, setup frame -> this one
+    id       : access whose frame it is; the first access where it is the setup frame
+    rotation : (3, 3) float64, dimensionless, from the setup frame to this one
     part     : Part in this frame
     """
 
@@ -47,25 +48,27 @@ class Look:
     part: Part
 
     @classmethod
-    def of(cls, view: View) -> Look:
+    def of(cls, view: View) -> ProofFrame:
         """The frame of an access."""
         return cls(view.id, view.rotation, view.part)
 
     def into(self, samples: SurfaceSamples, view: View) -> SurfaceSamples:
-        """Samples of the frame of a view in this one."""
+        """Samples that are given in the frame of a view, in this frame."""
         if np.array_equal(self.rotation, view.rotation):
             return samples
         return turned_samples(samples, self.rotation @ view.rotation.T)
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
-    """One finished program with the plan it was written from.
+class WrittenProgram:
+    """A program in all its dialects, with the workplan it was written from.
 
-    access : id of its access where it is the program of one of several, else of the first
-    text   : of the dialect that is simulated; others : texts of the further ones, by dialect
-    end    : put into the names of its files, '' for the first
-    turn   : (3, 3) float64, from the frame of the proof into its own; None: the same
+    access  : its access; the first one where a program holds all accesses
+    text    : in the dialect that the proof simulates
+    end     : part of the names of its files, '' for the first program
+    turn    : (3, 3) float64, dimensionless, from the frame of the proof to that of the program; None: the same
+    dialect : that the proof simulates
+    others  : texts in further dialects
     """
 
     access: str
@@ -82,7 +85,7 @@ class Program:
         return self._named(self.dialect)
 
     def files(self) -> list[tuple[str, str, str]]:
-        """Dialect, file name and text of all, the one that is simulated first."""
+        """Dialect, file name and text of each dialect, the simulated one first."""
         texts = {self.dialect: self.text, **self.others}
         return [(dialect, self._named(dialect), text) for dialect, text in texts.items()]
 
@@ -98,17 +101,17 @@ class Program:
         return NcProgram(self.name, self.text, self.turn, self.work.work_offset, self.dialect)
 
     def twins(self) -> list[NcProgram]:
-        """The further ones, which are held against it."""
+        """The same program in the further dialects, which are compared with it."""
         return [NcProgram(self._named(d), t, self.turn, self.work.work_offset, d) for d, t in self.others.items()]
 
 
-def in_setup_frame(look: Look, proof: Proof) -> Proof:
-    """The proof with the places of its findings, and of what walls lacked support, in the setup frame."""
-    if np.array_equal(look.rotation, np.eye(3)):
+def in_setup_frame(frame: ProofFrame, proof: Proof) -> Proof:
+    """The proof with the places of its findings, and of walls without support, in the setup frame."""
+    if np.array_equal(frame.rotation, np.eye(3)):
         return proof
-    support = replace(proof.support, at=_turned(proof.support.at, look.rotation))
+    support = replace(proof.support, at=_turned(proof.support.at, frame.rotation))
     return replace(proof, support=support, findings=tuple(
-        replace(f, point=_turned(f.point, look.rotation), tip=_turned(f.tip, look.rotation)) for f in proof.findings))
+        replace(f, point=_turned(f.point, frame.rotation), tip=_turned(f.tip, frame.rotation)) for f in proof.findings))
 
 
 Place = tuple[float, float, float]
@@ -121,4 +124,4 @@ def _turned(place: Place | None, rotation: F64) -> Place | None:
     return x, y, z
 
 
-__all__ = ["Look", "Program", "Side", "in_setup_frame"]
+__all__ = ["ProofFrame", "WrittenProgram", "AccessPlan", "in_setup_frame"]

@@ -1,7 +1,7 @@
-"""The blank a setup describes, in the words of planner and proof.
+"""The blank of a setup as planner and proof take it.
 
-Shapes are those of the nominal blank unless it says otherwise; the real one may stand ``uncertainty`` beyond it on all
-sides. A blank grown from the part has no shape of its own: box and cylinder are None.
+Shapes are those of the nominal blank where nothing else is stated. The real blank may stand ``uncertainty`` beyond it
+on all sides. A blank grown from the part has no shape of its own: box, bar and solid are None.
 """
 
 from __future__ import annotations
@@ -39,7 +39,10 @@ class Bar:
         return float(np.pi * self.radius**2 * self.height)
 
     def ends(self, rotation: F64) -> F64:
-        """(2, 3) float64, mm: middles of lower and upper end in a frame that rotation (3, 3) leads to."""
+        """(2, 3) float64, mm: middles of lower and upper end in a turned frame.
+
+        rotation : (3, 3) float64, dimensionless, from the setup frame to the turned frame
+        """
         return np.array([[self.x, self.y, self.bottom], [self.x, self.y, self.bottom + self.height]]) @ rotation.T
 
 
@@ -64,7 +67,7 @@ class Blank:
 
     @property
     def bounds(self) -> F64:
-        """(2, 3) float64, mm: the smallest box that holds the blank; one grown from the part ends at its underside."""
+        """(2, 3) float64, mm, setup frame: a box around the blank; a grown blank ends at the underside of the part."""
         if self.box is not None:
             return self.box
         if self.bar is not None:
@@ -79,23 +82,23 @@ class Blank:
 
     @property
     def seat(self) -> float:
-        """Height of what the blank stands on, mm: its lowest place."""
+        """Lowest height of the blank, mm, setup frame."""
         return float(self.bounds[0, 2])
 
     @property
     def stands_alone(self) -> bool:
-        """Whether the blank has a shape of its own, so that more than its margin may stand beside the part."""
+        """Whether the blank has a shape of its own, so that more than the margin may stand beside the part."""
         return self.box is not None or self.bar is not None or self.solid is not None
 
     @property
     def beyond(self) -> float:
-        """How far the real blank may stand beyond the shapes here, mm: a mesh is off its solid as well."""
+        """How far the real blank may stand beyond these shapes, mm, with the deviation of a mesh from its solid."""
         return self.uncertainty + (0.0 if self.solid is None else max(self.solid.chord, self.solid.deviation))
 
     def corners(self, rotation: F64) -> F64:
-        """(2, 3) float64, mm: a box that holds the blank in a frame that rotation (3, 3) leads to.
+        """(2, 3) float64, mm: the smallest box around box, cylinder, solid, or part with its margin, in a turned frame.
 
-        The smallest that holds the box, the cylinder or the solid, or the box round the part and its margin.
+        rotation : (3, 3) float64, dimensionless, from the setup frame to the turned frame
         """
         if self.solid is not None:
             return turned(self.solid, rotation).bounds
@@ -106,7 +109,7 @@ class Blank:
         return np.array([ends.min(axis=0) - aside, ends.max(axis=0) + aside])
 
     def planned(self, view: View, step: float) -> StockMap:
-        """The stock the planner of an access starts from: the largest there may be, at nodes ``step`` mm apart."""
+        """The stock that the planner of an access starts from: the largest possible one, at nodes ``step`` mm apart."""
         u = self.uncertainty
         if self.box is not None:
             return StockMap.block(view.tree, np.array([self.box[0] - u, self.box[1] + u]), view.rotation, step)
@@ -119,7 +122,10 @@ class Blank:
         return StockMap.around(view.tree, view.part.bounds, self.margin + u, step)
 
     def proof_box(self, rotation: F64) -> F64 | None:
-        """(2, 3) float64, mm: a box round the largest box blank in a frame that rotation (3, 3) leads to, or None."""
+        """(2, 3) float64, mm: a box around the largest box blank in a turned frame, or None.
+
+        rotation : (3, 3) float64, dimensionless, from the setup frame to the turned frame
+        """
         if self.box is None:
             return None
         box = turned_box(self.box, rotation)
@@ -127,10 +133,12 @@ class Blank:
 
     def proof_cylinder(self, rotation: F64) -> tuple[tuple[float, float, float, float, float] | None,
                                                      tuple[float, float, float]]:
-        """The largest cylinder blank in a frame that rotation (3, 3) leads to, and the way it stands there.
+        """The largest cylinder blank in a turned frame, and the direction of its axis there.
 
-        Returns x, y, z of the middle of its lower end, radius and height, mm, or None where the blank is no cylinder,
-        and the unit vector from that end to the other.
+        rotation : (3, 3) float64, dimensionless, from the setup frame to the turned frame
+
+        Returns x, y, z of the middle of the lower end, radius and height, mm, or None where the blank is no cylinder,
+        and the unit vector from the lower to the upper end.
         """
         if self.bar is None:
             return None, (0.0, 0.0, 1.0)
@@ -140,19 +148,22 @@ class Blank:
         return (low[0], low[1], low[2], bar.radius, bar.height), (ax, ay, az)
 
     def proof_mesh(self, rotation: F64) -> TriangleMesh | None:
-        """The mesh of a solid blank in a frame that rotation (3, 3) leads to; None where there is none."""
+        """The mesh of a solid blank in a turned frame; None where the blank is no solid.
+
+        rotation : (3, 3) float64, dimensionless, from the setup frame to the turned frame
+        """
         return None if self.solid is None else turned(self.solid, rotation).mesh
 
 
 def blank_of(setup: Setup, part: Part, solid: Part | None = None) -> Blank:
     """The blank of a setup for a part in the setup frame.
 
-    solid : what was read from the file of a step blank, in the setup frame
+    solid : the part read from the STEP file of the blank, setup frame
 
     Raises
     ------
     SetupError
-        Code 'no_stock_file': the blank is of kind step, and there is none.
+        Code 'no_stock_file': the blank is of kind 'step' and ``solid`` is None.
     """
     stock, bounds = setup.stock, part.bounds
     if stock.kind == "step":
@@ -169,7 +180,7 @@ def blank_of(setup: Setup, part: Part, solid: Part | None = None) -> Blank:
 
 
 def _bar(setup: Setup, part: Part) -> Bar:
-    """The cylinder of a setup: as given, or round the part, its margin aside and on top."""
+    """The cylinder of a setup: as given, or around the part with the margin at its side and on top."""
     stock, (lower, upper) = setup.stock, part.bounds
     if (given := stock.cylinder_mm) is not None:
         return Bar(given.x, given.y, given.bottom, 0.5 * given.diameter, given.height)
@@ -179,6 +190,10 @@ def _bar(setup: Setup, part: Part) -> Bar:
 
 
 def turned_box(box: F64, rotation: F64) -> F64:
-    """(2, 3) float64, mm: the smallest box along the turned axes that holds a box (2, 3); rotation (3, 3)."""
+    """The smallest box along turned axes that holds a box, (2, 3) float64, mm, turned frame.
+
+    box      : (2, 3) float64, mm, setup frame, lower and upper corner
+    rotation : (3, 3) float64, dimensionless, from the setup frame to the turned frame
+    """
     corners = np.array([[box[i >> k & 1][k] for k in range(3)] for i in range(8)]) @ rotation.T
     return np.array([corners.min(axis=0), corners.max(axis=0)])

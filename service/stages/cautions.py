@@ -1,8 +1,8 @@
-"""What a machinist is to be told of a job although it is no fault of the program: figures that were cut back.
+"""Cautions: what a machinist has to know of a job although the program has no fault.
 
-A caution has the form of an error (``geometry.errors.CamError``): what, where, measured, limit, remedy. It stands in
-the report under ``warnings``, as a sentence in ``part.warnings``, and those known before the paths in the header of
-the program too.
+A caution has the form of an error (``geometry.errors.CamError``): what, where, measured, limit, remedy. The report
+lists it under ``warnings`` and as a sentence in ``part.warnings``. Cautions that are known before the paths are laid
+also stand in the header of the program.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from schemas.setup import Setup
 from service.cutting_data import cutting_data
+from service.stages.job_inputs import JobInputs
 from service.stages.preparation import Prepared
 from toolpath.feeds.tool_life import minutes_in_cut
 from toolpath.linking.ramp_entry import MIN_RUN
@@ -28,20 +28,20 @@ from verify.model import Support
 from zones.features.wall_slenderness import slender_walls
 from zones.model import Wall
 
-MOST_REASONS = 3  # a caution says
-MOSTLY = 0.5  # of what a tool that is asked to lean cuts in a zone: where more is upright it is told of
-MOST_RATIO = 10.0
-"""Height of a wall over its thickness, above which it is told of."""
+MAX_REASONS = 3  # of one caution
+MAX_UPRIGHT_SHARE = 0.5  # of the cutting length of a zone; above it a zone that should lean gets a caution
+MAX_HEIGHT_RATIO = 10.0
+"""Height of a wall over its thickness, dimensionless. A higher wall gets a caution."""
 
 
 @dataclass(frozen=True)
-class Caution:
-    """One of them.
+class JobCaution:
+    """One caution of a job.
 
     kind      : 'limited', 'dry', 'thin_wall', 'support', 'deflection', 'tool_life', 'center_cutting' or 'upright'
     subjects  : ids of tools, steps, walls
-    measured, limit : in the unit the message says
-    at        : mm, setup frame, where it is of a place
+    measured, limit : in the unit of the message; limit is nan where there is none
+    at        : mm, setup frame; None where the caution has no place
     """
 
     kind: str
@@ -68,101 +68,110 @@ def _rounded(value: float) -> float | None:
     return round(value, 5) + 0.0 if math.isfinite(value) else None
 
 
-def limited(setup: Setup) -> list[Caution]:
-    """Speeds and feeds of tools that tool or machine do not allow, in the order of the tools."""
+def limited(inputs: JobInputs) -> list[JobCaution]:
+    """One caution for each speed and feed of the setup over a limit of tool or machine, in the order of the tools."""
     out = []
-    for tool in setup.tools:
-        for field, asked, limit in cutting_data(setup.material, tool, setup.machine).cut_back:
-            whose = "machine.max_feed_mm_min"
+    for tool in inputs.tools:
+        for field, requested, limit in cutting_data(inputs.material, tool, inputs.machine).cut_back:
+            source = "machine.max_feed_mm_min"
             if field == "spindle_rpm":
-                whose = "its max_rpm" if limit == tool.max_rpm else "machine.max_rpm"
-            message = f"tool {tool.id}: {field} {asked:g} is more than {whose} {limit:g}"
-            out.append(Caution("limited", (tool.id,), message, asked, limit,
-                               f"it runs at {limit:g}; ask for no more, or correct the limit"))
+                source = "its max_rpm" if limit == tool.max_rpm else "machine.max_rpm"
+            message = f"tool {tool.id}: {field} {requested:g} is more than {source} {limit:g}"
+            out.append(JobCaution("limited", (tool.id,), message, requested, limit,
+                                  f"it runs at {limit:g}; lower the figure, or correct the limit"))
     return out
 
 
-def dry(setup: Setup) -> list[Caution]:
-    """Tools that cut without coolant at figures that are meant for it."""
+def dry(inputs: JobInputs) -> list[JobCaution]:
+    """One caution for each tool that cuts dry at speeds or feeds meant for coolant."""
     out = []
-    for tool in setup.tools if setup.machine.coolant == "off" else ():
+    for tool in inputs.tools if inputs.machine.coolant == "off" else ():
         if tool.spindle_rpm is None or tool.feed_mm_min is None:
-            speed = cutting_data(setup.material, tool, setup.machine).cutting_speed
-            out.append(Caution("dry", (tool.id,),
-                               f"tool {tool.id} cuts dry, at {speed:.0f} m/min, and its speed or feed is a figure for "
-                               "coolant", speed, math.nan, "give its spindle_rpm and feed_mm_min for dry cutting"))
+            speed = cutting_data(inputs.material, tool, inputs.machine).cutting_speed
+            message = (f"tool {tool.id} cuts dry at {speed:.0f} m/min; its speed or feed is meant for cutting with "
+                       "coolant")
+            out.append(JobCaution("dry", (tool.id,), message, speed, math.nan,
+                                  "give spindle_rpm and feed_mm_min for dry cutting"))
     return out
 
 
-def uncut_centres(setup: Setup, steps: Sequence[Workingstep]) -> list[Caution]:
-    """Tools that do not cut to the centre and go down into stock: nothing here knows how wide their core is."""
+def uncut_centres(inputs: JobInputs, steps: Sequence[Workingstep]) -> list[JobCaution]:
+    """One caution for each tool that ramps into stock and does not cut to its centre; its core diameter is unknown."""
     used = {s.tool.id: s.tool for s in steps if s.operation != "finishing"}
-    return [Caution("center_cutting", (tool.id,),
-                    f"tool {tool.id} does not cut to its centre, and its ways down into stock, of 3 degrees at most, "
-                    f"may be {MIN_RUN * used[tool.id].radius:.2f} mm long where there is no more room",
-                    MIN_RUN * used[tool.id].radius, tool.diameter_mm,
-                    "look at its first cuts in closed pockets, drill them first, or take one that cuts to the centre")
-            for tool in setup.tools if not tool.center_cutting and tool.id in used]
+    out = []
+    for tool in inputs.tools:
+        if tool.center_cutting or tool.id not in used:
+            continue
+        shortest = MIN_RUN * used[tool.id].radius
+        message = (f"tool {tool.id} does not cut to its centre; its ramps into stock, of 3 degrees at most, may be as "
+                   f"short as {shortest:.2f} mm where there is no more room")
+        remedy = "watch its first cuts in closed pockets, drill them first, or use a centre-cutting tool"
+        out.append(JobCaution("center_cutting", (tool.id,), message, shortest, tool.diameter_mm, remedy))
+    return out
 
 
-def upright(asked: ToolLean | None, zones: Sequence[ZonePlan], steps: Sequence[Workingstep]) -> list[Caution]:
-    """Zones finished by an upright tool, or mostly so, although it is asked to lean there, each with the reasons."""
+def upright(requested: ToolLean | None, zones: Sequence[ZonePlan], steps: Sequence[Workingstep]) -> list[JobCaution]:
+    """One caution for each zone that an upright tool finishes, wholly or mostly, although the setup lets it lean there.
+
+    requested : the tilt that the setup gives; None: none, so there is no caution
+    """
     out = []
     for z in zones:
         mine = [s for s in steps if s.zone == z.zone.id]
-        if inclined_axis.requested_lean(asked, z.zone.form, z.zone.tool) is None or not mine:  # layers left nothing
+        if inclined_axis.requested_lean(requested, z.zone.form, z.zone.tool) is None or not mine:  # roughing may leave nothing
             continue
         way, whole = upright_way(mine), sum(t.length for s in mine for t in s.trajectories if t.motion is TrajectoryKind.CUT)
-        told = [str(r["reason"]) for r in z.rejected if r["strategy"] == inclined_axis.NAME]
+        reasons = [str(r["reason"]) for r in z.rejected if r["strategy"] == inclined_axis.NAME]
         if z.strategy not in LEANING:
-            found, without = "stays upright", "it is finished in bands, or no pass lies on it"
-        elif way > MOSTLY * whole:
-            found, without = f"is upright along {way:.0f} of {whole:.0f} mm it cuts", "no axis near is free there"
+            state, default_reason = "stays upright", "it is finished in bands, or no pass lies on it"
+        elif way > MAX_UPRIGHT_SHARE * whole:
+            state = f"is upright along {way:.0f} of {whole:.0f} mm of cut"
+            default_reason = "no tilt near the requested one is free of collision"
         else:
             continue
-        why = "; ".join(told[:MOST_REASONS]) or without
-        out.append(Caution("upright", (z.zone.id, z.zone.tool.id),
-                           f"zone {z.zone.id}: tool {z.zone.tool.id} is asked to lean and {found} ({why})",
-                           way, MOSTLY * whole,
-                           "give it a slimmer or longer tool, another lean, or leave it as it is"))
+        why = "; ".join(reasons[:MAX_REASONS]) or default_reason
+        out.append(JobCaution("upright", (z.zone.id, z.zone.tool.id),
+                              f"zone {z.zone.id}: the setup asks tool {z.zone.tool.id} to lean, but it {state} ({why})",
+                              way, MAX_UPRIGHT_SHARE * whole,
+                              "use a slimmer or longer tool, change the lean, or accept the upright tool"))
     return out
 
 
 def walls_to_cut(ready: Prepared) -> list[Wall]:
-    """Walls of which anything is to be cut."""
+    """Walls with at least one sample on a face to be cut."""
     cut = set(np.unique(ready.samples.face).tolist())
     return [w for w in ready.decomposition.walls if cut & set(w.faces)]
 
 
-def thin_walls(ready: Prepared) -> list[Caution]:
-    """Walls to be cut that are more than ``MOST_RATIO`` times as high as thick, each once, where it is worst."""
+def thin_walls(ready: Prepared) -> list[JobCaution]:
+    """One caution, at the worst place, for each wall to be cut with a height over ``MAX_HEIGHT_RATIO`` thicknesses."""
     view = ready.views[0]
     out = []
-    for s in slender_walls(view.part, view.tree, walls_to_cut(ready), MOST_RATIO):
+    for s in slender_walls(view.part, view.tree, walls_to_cut(ready), MAX_HEIGHT_RATIO):
         x, y, z = view.back(np.array(s.at)).tolist()
         message = (f"wall {s.wall} is {s.thickness:.2f} mm thick and {s.height:.2f} high near X{x:.2f} Y{y:.2f} "
-                   f"Z{z:.2f}: {s.ratio:.1f} to 1 (limit {MOST_RATIO:g} to 1), so it gives way and swings")
-        out.append(Caution("thin_wall", (s.wall,), message, s.ratio, MOST_RATIO,
-                           "hold it or fill the room beside it, cut both its sides down in turn, or make it thicker",
-                           (x, y, z)))
+                   f"Z{z:.2f}: {s.ratio:.1f} to 1 (limit {MAX_HEIGHT_RATIO:g} to 1), so it deflects and vibrates")
+        out.append(JobCaution("thin_wall", (s.wall,), message, s.ratio, MAX_HEIGHT_RATIO,
+                              "support it or fill the room beside it, cut both its sides in turn, or make it thicker",
+                              (x, y, z)))
     return out
 
 
-def unheld(support: Support) -> list[Caution]:
-    """That thin walls are finished without support, where the proof of a job does not hold that against it.
+def unheld(support: Support) -> list[JobCaution]:
+    """A caution that thin walls are finished without support, where the proof makes no finding of it.
 
     support : of the proof, its place in the setup frame
     """
     if not support.over or support.found:
         return []
-    message = (f"thin walls are finished where they are free for up to {support.most:.1f} times their thickness "
+    message = (f"thin walls are finished where they stand free over up to {support.most:.1f} times their thickness "
                f"(limit {support.limit:g} times), at {support.over} of {support.places} places")
-    return [Caution("support", (), message, support.most, support.limit,
-                    "hold them or fill the room beside them, or cut their two sides down in turn", support.at)]
+    return [JobCaution("support", (), message, support.most, support.limit,
+                       "support them or fill the room beside them, or cut their two sides in turn", support.at)]
 
 
-def bent(steps: Sequence[Workingstep]) -> list[Caution]:
-    """Tools that would bend too far, in layers and in finishing, each with the worst of its steps."""
+def bent(steps: Sequence[Workingstep]) -> list[JobCaution]:
+    """One caution for each tool that would bend over its limit, in roughing and in finishing, with its worst step."""
     groups: dict[tuple[str, str], list[tuple[Workingstep, DeflectionEstimate]]] = {}
     for s in steps:
         if s.bend is not None and s.bend.full > s.bend.limit:
@@ -174,40 +183,40 @@ def bent(steps: Sequence[Workingstep]) -> list[Caution]:
         message = (f"tool {tool} in {worst.id} {worst.strategy}{more}, {operation}: its tip would bend "
                    f"{bend.full:.3f} mm (limit {bend.limit:.3f} mm)")
         if bend.fixed:
-            remedy = "its feed is the setup's own and stays; take a shorter or thicker tool"
+            remedy = "its feed is given by the setup and stays; use a shorter or thicker tool"
         else:
-            remedy = f"its feed is eased to {100.0 * bend.share:.0f} %, with {bend.deflection:.3f} mm; a shorter or " \
-                     "thicker tool needs no easing"
-        out.append(Caution("deflection", (tool, *(s.id for s, _ in group)), message, bend.full, bend.limit, remedy))
+            remedy = (f"the plan lowers its feed to {100.0 * bend.share:.0f} %, where it bends "
+                      f"{bend.deflection:.3f} mm; a shorter or thicker tool keeps its feed")
+        out.append(JobCaution("deflection", (tool, *(s.id for s, _ in group)), message, bend.full, bend.limit, remedy))
     return out
 
 
-def lives_ended(setup: Setup, steps: Sequence[Workingstep]) -> list[Caution]:
-    """Tools that take more than one cutter, and steps that one cutter does not last for, in the order of the tools."""
+def lives_ended(inputs: JobInputs, steps: Sequence[Workingstep]) -> list[JobCaution]:
+    """One caution for each tool that needs several cutters and for each step longer than a cutter lasts."""
     out = []
-    for tool in setup.tools:
+    for tool in inputs.tools:
         mine = [s for s in steps if s.tool.id == tool.id]
         if tool.life_min is None or not mine:
             continue
-        asked = [s.id for s in mine if s.fresh]
-        if asked:
+        fresh = [s.id for s in mine if s.fresh]
+        if fresh:
             total = float(sum(minutes_in_cut(s).sum() for s in mine))
-            message = (f"tool {tool.id} is in cut for {total:.3g} min and lasts for {tool.life_min:g}: the program "
-                       f"stops for a fresh cutter before {', '.join(asked)}")
-            out.append(Caution("tool_life", (tool.id, *asked), message, total, tool.life_min,
-                               f"have {len(asked) + 1} cutters at hand"))
+            message = (f"tool {tool.id} is in cut for {total:.3g} min and lasts for {tool.life_min:g} min: the program "
+                       f"stops for a fresh cutter before {', '.join(fresh)}")
+            out.append(JobCaution("tool_life", (tool.id, *fresh), message, total, tool.life_min,
+                                  f"have {len(fresh) + 1} cutters ready"))
         for step, minutes in [(s.id, float(minutes_in_cut(s).sum())) for s in mine]:
             if minutes > tool.life_min * (1.0 + 1e-9):
                 message = f"{step} keeps tool {tool.id} in cut for {minutes:.3g} min (limit {tool.life_min:g} min)"
-                out.append(Caution("tool_life", (tool.id, step), message, minutes, tool.life_min,
-                                   "the tool never goes up in it, so no cutter is changed; take one that lasts longer"))
+                remedy = "the tool never retracts in this step, so no cutter is changed; use one that lasts longer"
+                out.append(JobCaution("tool_life", (tool.id, step), message, minutes, tool.life_min, remedy))
     return out
 
 
-def sentences(cautions: Sequence[Caution]) -> tuple[str, ...]:
-    """The sentences of cautions."""
+def sentences(cautions: Sequence[JobCaution]) -> tuple[str, ...]:
+    """Message and remedy of each caution, as one sentence each."""
     return tuple(c.sentence for c in cautions)
 
 
-__all__ = ["Caution", "bent", "limited", "lives_ended", "sentences", "thin_walls", "uncut_centres", "unheld",
+__all__ = ["JobCaution", "bent", "limited", "lives_ended", "sentences", "thin_walls", "uncut_centres", "unheld",
            "walls_to_cut"]

@@ -15,14 +15,14 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples, joined, sample_borders, sample_surface, with_surface_normals
-from geometry.setup_frame import SetupFrame
 from geometry.step_import.reader import read_part
 from geometry.tool_body import ToolBody
 from geometry.trimming.trim import FacePatch
 from schemas.setup import Access, Setup
-from service.from_wire import blank_error, face_numbers, no_stock_file, rotary_machine, tool_bodies
+from service.from_wire import blank_error, face_numbers, no_stock_file
 from service.stages.blank_checks import check_against_part
 from service.stages.blank_model import Blank, blank_of
+from service.stages.job_inputs import JobInputs, mesh_chord, placement_of
 from zones.features.decomposition import decompose
 from zones.lattice import lattice_step
 from zones.machinable_area import machinable_faces
@@ -33,7 +33,6 @@ from zones.plan_view.regions import RegionLocator
 from zones.reach.access_reach import Reach
 from zones.reach.access_view import View, access_rotation, turned, turned_samples
 from zones.reach.approach_cones import directions_over_hemisphere
-from zones.reach.assembly import Clearances
 from zones.reach.index_orientations import DIRECTIONS, AxisCoverage, orientations
 from zones.reach.tip_field import DiscHeights, TipField
 from zones.remainder.obstructions import AIR
@@ -41,35 +40,37 @@ from zones.zoning.zone_patches import zone_patches
 from zones.zoning.zones import ZoneArea, Zoning, build_zones
 
 PLANNING_DENSITY = 25.0  # samples a mm²
-MOST_SAMPLES = 1_500_000
-LEAST_SAMPLES = 1200.0  # of a face, as far as MOST_DENSITY allows
-MOST_DENSITY = 150.0
+MAX_SAMPLES = 1_500_000
+MIN_FACE_SAMPLES = 1200.0  # on a face, as far as MAX_DENSITY allows
+MAX_DENSITY = 150.0
 BORDER_SPACING = 0.2  # mm
 BORDER_INSET = 0.0  # mm: on the border itself
-LEAST_TURN_MM2, LEAST_TURN_SHARE = 10.0, 0.002  # of Ma, what a further tool axis has to win
-TABLE, TABLE_SPARE = 1000.0, 0.01  # mm, what a table reaches from the part, and what planning keeps more to it
-UPRIGHT = 1.0 - 1e-12  # of an axis that does not lean
-MOST_ROOM = 60.0  # mm beyond the cutter's radius that the planning lattice covers beside a large block
+MIN_ACCESS_GAIN_MM2, MIN_ACCESS_GAIN_SHARE = 10.0, 0.002  # area, and share of Ma, that a further tool axis must win
+TABLE, TABLE_SPARE = 1000.0, 0.01  # mm: half width of the table, and clearance that planning adds above it
+UPRIGHT = 1.0 - 1e-12  # Z of a unit tool axis, from which on it counts as upright
+MAX_ROOM = 60.0  # mm beyond the cutter's radius that the planning lattice covers beside a large block
 
 Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A part with everything known before the first pass is laid.
+    """A part with everything that is known before the first pass is laid.
 
+    inputs        : JobInputs, the converted setup
     part          : Part in the setup frame
     blank         : Blank, the stock before the first cut
-    accesses      : of the setup, and after them those that were found on a machine with rotary axes
+    accesses      : of the setup, then those found for a machine with rotary axes
     views         : one per access, each in its own frame
-    decomposition : in the frame of the first view, as the samples
+    decomposition : in the frame of the first view, like the samples
     samples       : of the machinable area, planning density
     zoning        : zones, each in the frame of its view
-    seen_from     : (d, 3) float64, unit, setup frame: the directions that the machinable area is seen from
-    lift          : mm, distance along the normal within which a touch counts
+    seen_from     : (d, 3) float64, dimensionless, setup frame: unit directions that the machinable area is seen from
+    lift          : mm, distance along the normal within which a tool touches a sample
+    warnings      : sentences for the report and the headers of programs
     """
 
-    setup: Setup
+    inputs: JobInputs
     part: Part
     blank: Blank
     accesses: tuple[Access, ...]
@@ -100,21 +101,9 @@ class Prepared:
         return next(v for v in self.views if v.id == access)
 
 
-def mesh_chord(setup: Setup) -> float:
-    """Chord of the mesh, mm: its share of the scallop and of the gouge tolerance."""
-    q = setup.quality
-    return float(np.clip(0.15 * q.scallop_height_mm, 0.001, min(0.005, 0.4 * q.gouge_tolerance_mm)))
-
-
-def clearances(setup: Setup) -> Clearances:
-    """The radial clearances of a setup, mm."""
-    c = setup.clearance_mm
-    return Clearances(c.neck, c.shank, c.holder, c.rapid)
-
-
 def load(path: Path, setup: Setup) -> Part:
     """The part of a STEP file in the setup frame."""
-    return read_part(path, placement=placement_of(setup), solid=setup.part.solid, chord=mesh_chord(setup))
+    return read_part(path, placement=placement_of(setup), solid=setup.part.solid, chord=mesh_chord(setup.quality))
 
 
 def load_blank(path: Path, setup: Setup) -> Part:
@@ -123,39 +112,33 @@ def load_blank(path: Path, setup: Setup) -> Part:
     Raises
     ------
     CamError
-        As ``geometry.step_import.reader.read_part``, of the same class and code; it says that the blank is meant.
+        As ``geometry.step_import.reader.read_part``, of the same class and code; the message names the blank.
     """
     try:
-        return read_part(path, placement=placement_of(setup), chord=mesh_chord(setup))
+        return read_part(path, placement=placement_of(setup), chord=mesh_chord(setup.quality))
     except CamError as error:
         raise blank_error(error) from None
 
 
-def placement_of(setup: Setup) -> SetupFrame:
-    """The setup frame in the coordinates of the file."""
-    p = setup.placement
-    return SetupFrame(origin=tuple(p.origin_mm), z_axis=tuple(p.z_axis), x_axis=tuple(p.x_axis))
+def table_height(inputs: JobInputs, blank: Blank) -> float:
+    """Height that a tilted tool stays above, mm, setup frame: the table, or the bottom of the blank if unknown."""
+    return blank.seat if inputs.machine.table_z_mm is None else inputs.machine.table_z_mm
 
 
-def table_height(setup: Setup, blank: Blank) -> float:
-    """mm, setup frame: what a leaning tool stays above: the table, where that is not known the bottom of the blank."""
-    return blank.seat if setup.machine.table_z_mm is None else setup.machine.table_z_mm
-
-
-def obstacle_mesh(part: Part, setup: Setup, *, table: float | None = None) -> TriangleMesh:
+def obstacle_mesh(part: Part, inputs: JobInputs, *, table: float | None = None) -> TriangleMesh:
     """The part and the fixture boxes, these grown by the rapid clearance, as one mesh.
 
-    table : mm, setup frame, its height where the tool leans, so that it is in its way as well
+    table : mm, setup frame, height of the machine table, which a tilted tool must avoid; None: no table
     """
     vertices, faces, ids = [part.mesh.vertices], [part.mesh.faces], [part.mesh.face_ids]
     n = len(part.mesh.vertices)
-    boxes = [np.array(f.box_mm, dtype=np.float64) for f in setup.fixtures]
+    boxes = [*inputs.fixtures]
     if table is not None:
         middle = part.bounds.mean(axis=0)
         boxes.append(np.array([[middle[0] - TABLE, middle[1] - TABLE, table - TABLE],
                                [middle[0] + TABLE, middle[1] + TABLE, table + TABLE_SPARE]]))
     for box in boxes:
-        lo, hi = box[0] - setup.clearance_mm.rapid, box[1] + setup.clearance_mm.rapid
+        lo, hi = box[0] - inputs.clearances.rapid, box[1] + inputs.clearances.rapid
         v, f = _box(lo, hi)
         vertices.append(v)
         faces.append((f + n).astype(np.int32))
@@ -171,29 +154,30 @@ def _box(lo: F64, hi: F64) -> tuple[F64, np.ndarray]:
 
 
 def _room(body: ToolBody, bounds: F64, blank: Blank, rotation: F64) -> float:
-    """How far round the part a tool is planned, mm; beside a large blank it has to get round what stands there.
+    """How far around the part a tool is planned, mm. Beside a large blank it has to pass around the stock there.
 
-    bounds : (2, 3) float64, mm, of the part in the access frame, into which rotation (3, 3) leads
+    bounds   : (2, 3) float64, mm, of the part in the access frame
+    rotation : (3, 3) float64, dimensionless, from the setup frame to the access frame
     """
-    beside = 0.0
+    around = 0.0
     if blank.stands_alone:
         stock = blank.corners(rotation)
         spare = float(np.max([bounds[0, :2] - stock[0, :2], stock[1, :2] - bounds[1, :2]]))
-        beside = min(spare + blank.uncertainty + body.radius, MOST_ROOM)
-    return body.radius + max(AIR, beside)
+        around = min(spare + blank.uncertainty + body.radius, MAX_ROOM)
+    return body.radius + max(AIR, around)
 
 
 def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True,
             blank_path: Path | None = None) -> Prepared:
-    """Read, decompose, measure reach, build zones.
+    """Read the part, decompose it, measure the reach of the tools and build zones.
 
-    search : on a machine with rotary axes look for further tool axes; else the accesses of the setup are all
-    blank_path : STEP file of a blank of kind step
+    search     : look for further tool axes on a machine with rotary axes; False: the accesses of the setup only
+    blank_path : STEP file of a blank of kind 'step'
 
     Raises
     ------
     CamError
-        The part or the setup is wrong, or the reader ran out of its limits.
+        The part or the setup is wrong, or the reader exceeds its limits.
     """
     progress("read", 0.0)
     if setup.stock.kind == "step" and blank_path is None:
@@ -202,111 +186,115 @@ def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True
     blank = blank_of(setup, part, None if blank_path is None else load_blank(blank_path, setup))
     check_against_part(setup, part, blank)
     progress("zones", 0.12)
-    accesses = list(setup.access)
+    inputs = JobInputs.of(setup)
+    accesses = list(inputs.accesses)
     rotations = [access_rotation(a.direction) for a in accesses]
     first = turned(part, rotations[0])
     decomposition = decompose(first)
-    seen_from = _seen_from(setup, rotations, search)
-    samples = planning_samples(first, decomposition, setup, seen_from @ rotations[0].T)
+    seen_from = _seen_from(inputs, rotations, search)
+    samples = planning_samples(first, decomposition, inputs, seen_from @ rotations[0].T)
     channels = ChannelPlan.of(first, decomposition)
-    lift = max(0.1 * setup.quality.scallop_height_mm, 1.5 * part.chord)
+    lift = max(0.1 * inputs.quality.scallop_height_mm, 1.5 * part.chord)
     views: list[View] = []
 
-    def look(access: Access) -> None:
+    def add_view(access: Access) -> None:
         rotation = access_rotation(access.direction)
-        views.append(_view(setup, access.id, part, blank, rotation, rotations[0], samples, decomposition, channels))
+        views.append(_view(inputs, access.id, part, blank, rotation, rotations[0], samples, decomposition, channels))
 
     def zoned(known: Sequence[Mapping[str, Reach]] = ()) -> Zoning:
-        return build_zones(views, decomposition, setup.quality.scallop_height_mm, lift, Categories(channels), known)
+        return build_zones(views, decomposition, inputs.quality.scallop_height_mm, lift, Categories(channels), known)
 
     for k, access in enumerate(accesses):
-        look(access)
+        add_view(access)
         progress("zones", 0.14 + 0.08 * (k + 1) / len(accesses))
     zoning = zoned()
     progress("zones", 0.24)
-    for access in _further(setup, part, blank, views, zoning, lift) if search else ():
+    for access in _further(inputs, part, blank, views, zoning, lift) if search else ():
         accesses.append(access)
-        look(access)
+        add_view(access)
         progress("zones", 0.25)
     if len(views) > len(zoning.reach):
         zoning = zoned([*zoning.reach, *({} for _ in range(len(views) - len(zoning.reach)))])
     progress("zones", 0.27)
-    blank_error = () if blank.solid is None else (f"the blank: {w}" for w in blank.solid.warnings)
-    warnings = (*part.warnings, *blank_error, *decomposition.warnings, *_stood_askew(setup, part, decomposition))
-    return Prepared(setup, part, blank, tuple(accesses), tuple(views), decomposition, zoning, seen_from, lift, warnings)
+    solid_warnings = () if blank.solid is None else (f"the blank: {w}" for w in blank.solid.warnings)
+    warnings = (*part.warnings, *solid_warnings, *decomposition.warnings, *_stood_askew(inputs, part, decomposition))
+    return Prepared(inputs, part, blank, tuple(accesses), tuple(views), decomposition, zoning, seen_from, lift,
+                    warnings)
 
 
-def _seen_from(setup: Setup, rotations: list[F64], search: bool) -> F64:
-    """(d, 3) unit, setup frame: the accesses, and on a machine with rotary axes all it can turn to from above."""
+def _seen_from(inputs: JobInputs, rotations: list[F64], search: bool) -> F64:
+    """(d, 3) float64, dimensionless, setup frame: unit vectors of the accesses and of all axes the machine turns to."""
     given = np.array([r[2] for r in rotations])
-    machine = rotary_machine(setup.machine)
-    if machine is None or not search or setup.machine.orientations == "given":
+    machine = inputs.rotary
+    if machine is None or not search or inputs.machine.orientations == "given":
         return given
     axes = directions_over_hemisphere(DIRECTIONS)
     return np.vstack([given, axes[machine.stands(axes)]])
 
 
-def _further(setup: Setup, part: Part, blank: Blank, views: list[View], zoning: Zoning, lift: float) -> list[Access]:
-    """Accesses a machine with rotary axes turns to beyond those of the setup, for what these leave."""
-    machine = rotary_machine(setup.machine)
-    if machine is None or setup.machine.orientations == "given":
+def _further(inputs: JobInputs, part: Part, blank: Blank, views: list[View], zoning: Zoning,
+             lift: float) -> list[Access]:
+    """Further accesses of a machine with rotary axes, for the area that those of the setup leave."""
+    machine = inputs.rotary
+    if machine is None or inputs.machine.orientations == "given":
         return []
     samples = views[0].samples
     turn = views[0].rotation
     here = turned_samples(samples, turn.T)
-    tree = TriangleTree(obstacle_mesh(part, setup, table=table_height(setup, blank)))
-    coverage = AxisCoverage(tree, tool_bodies(setup), clearances(setup), setup.quality.scallop_height_mm, lift,
-                            setup.quality.stock_allowance_mm)
-    worth = max(LEAST_TURN_MM2, LEAST_TURN_SHARE * float(samples.area.sum()))
+    coverage = AxisCoverage(TriangleTree(obstacle_mesh(part, inputs, table=table_height(inputs, blank))), inputs.bodies,
+                        inputs.clearances, inputs.quality.scallop_height_mm, lift, inputs.quality.stock_allowance_mm)
+    worth = max(MIN_ACCESS_GAIN_MM2, MIN_ACCESS_GAIN_SHARE * float(samples.area.sum()))
     known = np.array([v.direction for v in views])
     axes = orientations(here.subset(np.flatnonzero(~zoning.taken)), coverage, machine.stands, machine.even, known,
                         worth)
-    names = (f"I{k}" for k in count(1) if f"I{k}" not in {a.id for a in setup.access})
-    offset = setup.access[0].work_offset
+    names = (f"I{k}" for k in count(1) if f"I{k}" not in {a.id for a in inputs.accesses})
+    offset = inputs.accesses[0].work_offset
     return [Access(id=next(names), direction=[round(v, 12) + 0.0 for v in axis], work_offset=offset)
             for axis in axes.tolist()]
 
 
-def _stood_askew(setup: Setup, part: Part, decomposition: Decomposition) -> tuple[str, ...]:
-    """A sentence where the first access, which walls are found along, shows none but another one does."""
+def _stood_askew(inputs: JobInputs, part: Part, decomposition: Decomposition) -> tuple[str, ...]:
+    """A warning where no wall stands along the first access, although walls stand along another one."""
     if decomposition.walls:
         return ()
-    for access in setup.access[1:]:
+    for access in inputs.accesses[1:]:
         count = len(decompose(turned(part, access_rotation(access.direction))).walls)
         if count:
-            return (f"walls are found along the first access, {setup.access[0].id}, and none stands along it; along "
-                    f"{access.id} {count} do: name {access.id} first",)
+            first = inputs.accesses[0].id
+            return (f"no wall stands along the first access, {first}, and {count} stand along {access.id}; walls are "
+                    f"found along the first access only: name {access.id} first",)
     return ()
 
 
-def tip_field(setup: Setup, blank: Blank, rotation: F64, standing: DiscHeights, bounds: F64,
+def tip_field(inputs: JobInputs, blank: Blank, rotation: F64, standing: DiscHeights, bounds: F64,
               body: ToolBody) -> TipField:
     """Tip limits of a tool along an access, over the part, the room beside it and the blank.
 
-    blank                 : Blank in the setup frame
-    rotation              : (3, 3) from there into the access frame
-    standing, bounds      : DiscHeights of part and fixtures; (2, 3) float64 of the part, mm; in the access frame
+    blank    : Blank in the setup frame
+    rotation : (3, 3) float64, dimensionless, from the setup frame to the access frame
+    standing : DiscHeights of part and fixtures, access frame
+    bounds   : (2, 3) float64, mm, of the part in the access frame
     """
     room = _room(body, bounds, blank, rotation)
-    return TipField(standing.tree, body, clearances(setup), bounds, room, lattice_step(body),
-                    setup.quality.stock_allowance_mm, setup.quality.scallop_height_mm, standing)
+    return TipField(standing.tree, body, inputs.clearances, bounds, room, lattice_step(body),
+                    inputs.quality.stock_allowance_mm, inputs.quality.scallop_height_mm, standing)
 
 
-def _view(setup: Setup, name: str, part: Part, blank: Blank, rotation: F64, first: F64, samples: SurfaceSamples,
+def _view(inputs: JobInputs, name: str, part: Part, blank: Blank, rotation: F64, first: F64, samples: SurfaceSamples,
           decomposition: Decomposition, channels: ChannelPlan) -> View:
     """An access: the part turned into its frame, tip limits of all tools, regions of the samples."""
     is_first = rotation is first or np.array_equal(rotation, first)
     here = turned(part, rotation)
     tree = TriangleTree(here.mesh)
-    told = setup.machine.table_z_mm is not None
-    obstacles, leaning = tree, setup.machine.kind == "5-axis" and (told or rotation[2, 2] < UPRIGHT)
-    if setup.fixtures or leaning:
+    table_known = inputs.machine.table_z_mm is not None
+    obstacles, leaning = tree, inputs.turns and (table_known or rotation[2, 2] < UPRIGHT)
+    if inputs.fixtures or leaning:
         matrix = np.eye(4)
         matrix[:3, :3] = rotation
-        table = table_height(setup, blank) if leaning else None
-        obstacles = TriangleTree(obstacle_mesh(part, setup, table=table).transformed(matrix))
+        table = table_height(inputs, blank) if leaning else None
+        obstacles = TriangleTree(obstacle_mesh(part, inputs, table=table).transformed(matrix))
     standing = DiscHeights(obstacles)
-    fields = {b.id: tip_field(setup, blank, rotation, standing, here.bounds, b) for b in tool_bodies(setup)}
+    fields = {b.id: tip_field(inputs, blank, rotation, standing, here.bounds, b) for b in inputs.bodies}
     seen = turned_samples(samples, rotation @ first.T)
     locator = RegionLocator(here, decomposition, channels, first=is_first)
     there = None if is_first else (samples.points, samples.normals)
@@ -314,40 +302,41 @@ def _view(setup: Setup, name: str, part: Part, blank: Blank, rotation: F64, firs
     return View(name, rotation, here, tree, obstacles, seen, labels, fields, locator, first)
 
 
-def planning_samples(part: Part, decomposition: Decomposition, setup: Setup, directions: F64) -> SurfaceSamples:
-    """What zones are built of and passes are measured at.
+def planning_samples(part: Part, decomposition: Decomposition, inputs: JobInputs, directions: F64) -> SurfaceSamples:
+    """The samples that zones are built of and passes are measured at, in the frame of the part.
 
-    Every face gets ``PLANNING_DENSITY`` samples a mm², a small one ``LEAST_SAMPLES``, and its borders a sample
-    every ``BORDER_SPACING`` mm, so that the deepest and the outermost place of a zone are among them. Normals are those
-    of the exact surface: beside those of facets a tool would stand so far aside that it does not fit into a round.
+    Every face gets ``PLANNING_DENSITY`` samples a mm², a small one more: ``MIN_FACE_SAMPLES`` or ``MAX_DENSITY``. Its
+    borders get a sample every ``BORDER_SPACING`` mm, so that the deepest and the outermost place of a zone are among
+    them. Normals are those of the exact surface: with the normals of facets a tool would stand too far aside to fit
+    into a fillet.
 
-    directions : (d, 3) float64, unit, that it is seen from, in the frame of the part
+    directions : (d, 3) float64, dimensionless, frame of the part: unit vectors the area is seen from
     """
-    triangles = machinable_triangles(part, decomposition, setup, directions)
+    triangles = machinable_triangles(part, decomposition, inputs, directions)
     ids, areas = part.mesh.face_ids[triangles], part.mesh.areas[triangles]
-    thin = min(1.0, MOST_SAMPLES / max(PLANNING_DENSITY * float(areas.sum()), 1e-9))
+    thin = min(1.0, MAX_SAMPLES / max(PLANNING_DENSITY * float(areas.sum()), 1e-9))
     sets = []
     for face in np.unique(ids):
         mine = triangles[ids == face]
         area = float(part.mesh.areas[mine].sum())
-        density = max(PLANNING_DENSITY * thin, min(LEAST_SAMPLES / max(area, 1e-9), MOST_DENSITY))
+        density = max(PLANNING_DENSITY * thin, min(MIN_FACE_SAMPLES / max(area, 1e-9), MAX_DENSITY))
         sets.append(sample_surface(part.mesh, density, seed=int(face), triangles=mine))
     sets.append(sample_borders(part.mesh, BORDER_SPACING, BORDER_INSET, triangles))
     return with_surface_normals(joined(sets), part.mesh)
 
 
-def machinable_triangles(part: Part, decomposition: Decomposition, setup: Setup, directions: F64) -> np.ndarray:
-    """Indices of the mesh triangles of the machinable area Ma.
+def machinable_triangles(part: Part, decomposition: Decomposition, inputs: JobInputs, directions: F64) -> np.ndarray:
+    """The mesh triangles of the machinable area Ma, (n,) int64, index.
 
-    directions : (d, 3) float64, unit, that it is seen from, in the frame of the part
+    directions : (d, 3) float64, dimensionless, frame of the part: unit vectors the area is seen from
 
     Raises
     ------
     SetupError
         The setup names faces the part does not have.
     """
-    wanted = None if setup.operations.faces is None else set(face_numbers(setup.operations.faces))
-    excluded = set(face_numbers(setup.operations.exclude_faces))
+    wanted = None if inputs.operations.faces is None else set(face_numbers(inputs.operations.faces))
+    excluded = set(face_numbers(inputs.operations.exclude_faces))
     known = {f.number for f in part.faces}
     if unknown := sorted(((wanted or set()) | excluded) - known):
         raise SetupError(f"faces {', '.join(f'F{f}' for f in unknown)} do not exist; the part has F1 to "

@@ -21,10 +21,8 @@ from output.gcode.program_writer import write_program
 from output.gcode.proof_header import AWAITED, filled
 from output.header_text import decimal
 from output.workplan import FIRST_NUMBER, AccessFrame, Ap238, Assembly, Clamping, StockBox, StockCylinder, Workplan
-from schemas.setup import Access, Setup, setup_sha256
-from service.cutting_data import rates_of
-from service.from_wire import material_name, rotary_machine, tool_bodies
-from service.stages.access_plan import Look, Program, Side
+from schemas.setup import Access
+from service.stages.access_plan import AccessPlan, ProofFrame, WrittenProgram
 from service.stages.blank_model import turned_box
 from service.stages.preparation import TABLE_SPARE, Prepared, table_height
 from service.stages.trimmed_faces import exact_faces
@@ -34,41 +32,41 @@ from toolpath.plan_settings import RotaryAxes
 from toolpath.workingsteps import Workingstep
 from zones.reach.access_view import View
 
-BOW, SPARE = 1.0 / 800.0, 0.01  # of the distance from the tip; mm, for rounding
+BOW, SPARE = 1.0 / 800.0, 0.01  # chord error of a swing over the distance from the tip; mm, for rounding
 RATE_SPARE = 1.05  # of the time the axes take at their fastest: words are rounded
 PARTS, LAST_NUMBER = 100, 7000  # from 8000 on numbers may be locked
-NO_HOLDER = 200.0  # mm by which a shank is taken to go on where the setup names no holder
+NO_HOLDER = 200.0  # mm of shank above the stickout that are assumed where the setup names no holder
 
 
-def fixture_boxes(ready: Prepared, view: View | Look) -> tuple[np.ndarray, ...]:
-    """Boxes (2, 3) that hold the fixtures in the frame of a view, mm."""
-    return tuple(turned_box(np.array(f.box_mm, dtype=np.float64), view.rotation) for f in ready.setup.fixtures)
+def fixture_boxes(ready: Prepared, view: View | ProofFrame) -> tuple[np.ndarray, ...]:
+    """Boxes around the fixtures, each (2, 3) float64, mm, in the frame of a view."""
+    return tuple(turned_box(box, view.rotation) for box in ready.inputs.fixtures)
 
 
-def access_of(ready: Prepared, view: View | Look) -> Access:
-    """The access a view or a frame belongs to."""
+def access_of(ready: Prepared, view: View | ProofFrame) -> Access:
+    """The access that a view or a frame of a proof belongs to."""
     return next(a for a in ready.accesses if a.id == view.id)
 
 
-def proof_frame(ready: Prepared) -> Look:
-    """The frame programs are proved in: of the first access, on a machine with rotary axes that of the setup."""
-    first = Look.of(ready.views[0])
-    if ready.setup.machine.kind != "5-axis":
+def proof_frame(ready: Prepared) -> ProofFrame:
+    """The frame programs are proved in: that of the first access, or the setup frame on a machine with rotary axes."""
+    first = ProofFrame.of(ready.views[0])
+    if not ready.inputs.turns:
         return first
     turn = np.eye(3)
-    return first if np.array_equal(first.rotation, turn) else Look(first.id, turn, ready.part)
+    return first if np.array_equal(first.rotation, turn) else ProofFrame(first.id, turn, ready.part)
 
 
-def programs_of(ready: Prepared, sides: Sequence[Side],
-                trimmed: Mapping[str, Sequence[Faces]] | None = None) -> list[Program]:
-    """The programs: one of each access that has steps, on a machine with rotary axes one of them all.
+def programs_of(ready: Prepared, access_plans: Sequence[AccessPlan],
+                trimmed: Mapping[str, Sequence[Faces]] | None = None) -> list[WrittenProgram]:
+    """The programs: one for each access that has steps, or one for all accesses on a machine with rotary axes.
 
-    trimmed : exact faces by zone, in the frame of its access, which the features of STEP-NC are made of
+    trimmed : exact faces by zone, in the frame of its access; the features of STEP-NC are made of them
     """
-    cutting = [s for s in sides if s.made.steps]
+    cutting = [s for s in access_plans if s.plan.steps]
     if not cutting:
         return []
-    if ready.setup.machine.kind == "5-axis":
+    if ready.inputs.turns:
         work = replace(clamped_workplan(ready, cutting), surfaces=_surfaces(ready, cutting, trimmed or {}))
         return _written(ready, ready.views[0].id, work)
     out = []
@@ -80,15 +78,16 @@ def programs_of(ready: Prepared, sides: Sequence[Side],
     return out
 
 
-def _written(ready: Prepared, access: str, work: Workplan, end: str = "", turn: F64 | None = None) -> list[Program]:
-    """The program of a plan for every control of the machine; several in order where one would be too large.
+def _written(ready: Prepared, access: str, work: Workplan, end: str = "",
+             turn: F64 | None = None) -> list[WrittenProgram]:
+    """The program of a plan in every dialect of the machine, or several in order where one would be too large.
 
-    The one that is simulated is the first that says how far the path may be left: that is in the error bound then.
+    The proof simulates the first dialect that states how far the control may leave the path; its error bound counts it.
     """
-    machine = ready.setup.machine
+    machine = ready.inputs.machine
     switches = Switches(machine.high_speed, machine.haas_tcp, machine.heidenhain_plane, machine.siemens_cycle800)
     if machine.arcs:
-        work = fitted(work, ARCS * ready.setup.quality.chordal_tolerance_mm)
+        work = fitted(work, ARCS * ready.inputs.quality.chordal_tolerance_mm)
     dialects = {d: DIALECTS[d](switches) for d in machine.dialects}
     first = next((d for d, control in dialects.items() if control.bounds_path), machine.dialects[0])
     index = [view.id for view in ready.views].index(access)
@@ -98,25 +97,26 @@ def _written(ready: Prepared, access: str, work: Workplan, end: str = "", turn: 
     for k, part in enumerate([work] if limit is None else parts_of(work, list(dialects.values()), int(1000 * limit))):
         part = replace(part, number=program_number(index, k), number_words=f"access {access} part {k + 1}")
         texts = {d: write_program(part, control) for d, control in dialects.items()}
-        out.append(Program(access, part, texts.pop(first), f"{end}.part{k + 1}" if k else end, turn, first, texts))
+        part_end = f"{end}.part{k + 1}" if k else end
+        out.append(WrittenProgram(access, part, texts.pop(first), part_end, turn, first, texts))
     return out
 
 
-def with_figures(written: Sequence[Program], report: Mapping[str, Any]) -> list[Program]:
-    """Proved programs with the figures of their proof in the headers, to be read once more before they count.
+def with_figures(written: Sequence[WrittenProgram], report: Mapping[str, Any]) -> list[WrittenProgram]:
+    """Proved programs with the figures of their proof in the headers. They are read once more before delivery.
 
     report : of the job
     """
-    told = figures_of(report)
+    figures = figures_of(report)
     out = []
     for p in written:
-        texts = {d: filled(text, DIALECTS[d](Switches()), told) for d, _, text in p.files()}
-        out.append(replace(p, work=replace(p.work, figures=told), text=texts.pop(p.dialect), others=texts))
+        texts = {d: filled(text, DIALECTS[d](Switches()), figures) for d, _, text in p.files()}
+        out.append(replace(p, work=replace(p.work, figures=figures), text=texts.pop(p.dialect), others=texts))
     return out
 
 
 def figures_of(report: Mapping[str, Any]) -> tuple[str, ...]:
-    """What the header of a program says of the proof of its job."""
+    """The lines about the proof of the job in the header of a program."""
     scallops = [z["scallop_mm"]["p99"] for z in report["zones"] if z["scallop_mm"]["p99"] is not None]
     scallop = f"scallop p99 at most {decimal(max(scallops))} mm" if scallops else "no scallop to measure"
     rest, time, proof = report["remainder"], report["time"], report["proof"]
@@ -131,7 +131,7 @@ def figures_of(report: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def program_number(access: int, part: int) -> int:
-    """Four digits at most, from 1000 on, another for each part of each access; both count from 0.
+    """Number of a program, four digits at most, from 1000 on; ``access`` and ``part`` count from 0.
 
     >>> program_number(0, 0), program_number(2, 1), program_number(5, 99)
     (1000, 1201, 1599)
@@ -139,80 +139,89 @@ def program_number(access: int, part: int) -> int:
     return FIRST_NUMBER + (PARTS * access + part) % LAST_NUMBER
 
 
-def workplan(ready: Prepared, side: Side) -> Workplan:
-    """The plan of one access as the writers want it."""
-    view = side.view
+def workplan(ready: Prepared, access_plan: AccessPlan) -> Workplan:
+    """The workplan of one access, for the writers."""
+    view = access_plan.view
     comments: tuple[str, ...] = ()
     if len(ready.views) > 1:
         d = " ".join(f"{v:.6g}" for v in view.direction)
         comments = (f"access {view.id}, tool axis {d} in the setup frame; stock of the whole blank",)
-    return _workplan(ready, side.made.steps, Look.of(view), side.clearance, access_of(ready, view), comments)
+    return _workplan(ready, access_plan.plan.steps, ProofFrame.of(view), access_plan.clearance, access_of(ready, view),
+                     comments)
 
 
-def clamped_workplan(ready: Prepared, sides: Sequence[Side]) -> Workplan:
-    """The plans of all accesses one after the other, as the writers want it on a machine with rotary axes."""
-    setup, first = ready.setup, ready.views[0]
-    look = Look(first.id, np.eye(3), ready.part)
-    machine = rotary_machine(setup.machine)
+def clamped_workplan(ready: Prepared, access_plans: Sequence[AccessPlan]) -> Workplan:
+    """The workplan of all accesses one after the other, for the writers, on a machine with rotary axes.
+
+    Raises
+    ------
+    InternalError
+        The machine has no rotary axes.
+    """
+    inputs, first = ready.inputs, ready.views[0]
+    frame = ProofFrame(first.id, np.eye(3), ready.part)
+    machine = inputs.rotary
     if machine is None:
         raise InternalError("a machine without rotary axes has no clamping")
     spare = ready.blank.beyond
-    boxes = [ready.blank.corners(look.rotation) + [[-spare], [spare]], ready.part.bounds, *fixture_boxes(ready, look)]
+    boxes = [ready.blank.corners(frame.rotation) + [[-spare], [spare]], ready.part.bounds, *fixture_boxes(ready, frame)]
     low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
-    radius = 0.5 * float(np.linalg.norm(high - low)) + setup.clearance_mm.rapid
-    frames = {s.view.id: AccessFrame(s.view.rotation, s.clearance) for s in sides}
-    rises = [float(s.view.rotation[2, 2]) for s in sides]
-    rises += [float((t.axes @ s.view.rotation)[:, 2].min()) for s in sides for step in s.made.steps
+    radius = 0.5 * float(np.linalg.norm(high - low)) + inputs.clearances.rapid
+    frames = {s.view.id: AccessFrame(s.view.rotation, s.clearance) for s in access_plans}
+    rises = [float(s.view.rotation[2, 2]) for s in access_plans]
+    rises += [float((t.axes @ s.view.rotation)[:, 2].min()) for s in access_plans for step in s.plan.steps
               for t in step.trajectories if t.axes is not None]
     leans = float(np.arccos(np.clip(min(rises), -1.0, 1.0)))
     centre = 0.5 * (low + high)
-    lift = room_to_turn(centre[2], radius, leans, tool_bodies(setup),
-                        table_height(setup, ready.blank) + setup.clearance_mm.rapid)
-    clamping = Clamping(machine, frames, centre + [0.0, 0.0, lift], radius + lift, gauge_lengths(setup))
+    lift = room_to_turn(centre[2], radius, leans, inputs.bodies,
+                        table_height(inputs, ready.blank) + inputs.clearances.rapid)
+    clamping = Clamping(machine, frames, centre + [0.0, 0.0, lift], radius + lift, inputs.gauge_lengths)
     words = ("fixed tool axes, one after the other, each from what those before leave",)
-    steps = tuple(t for s in sides for t in s.made.steps)
-    work = _workplan(ready, steps, look, float(home_of(clamping)[2]), access_of(ready, first), words)
+    steps = tuple(t for s in access_plans for t in s.plan.steps)
+    work = _workplan(ready, steps, frame, float(home_of(clamping)[2]), access_of(ready, first), words)
     return replace(work, clamping=clamping)
 
 
 def turning_of(ready: Prepared, view: View) -> RotaryAxes | None:
-    """What the rotary axes can do in the frame of a view; None on a machine without, or where they only index."""
-    setup, turn = ready.setup, view.rotation
-    machine = rotary_machine(setup.machine)
-    if machine is None or not setup.machine.simultaneous:
+    """TrajectoryKind of the rotary axes in the frame of a view; None on a machine without, or where they only index."""
+    inputs, turn = ready.inputs, view.rotation
+    machine = inputs.rotary
+    if machine is None or not inputs.machine.simultaneous:
         return None
-    longest, tolerance = max(gauge_lengths(setup).values()), 0.5 * setup.quality.chordal_tolerance_mm
+    longest, tolerance = max(inputs.gauge_lengths.values()), 0.5 * inputs.quality.chordal_tolerance_mm
 
-    rate, fastest = setup.machine.rotary_rate_deg_min, rates_of(setup).rapid
+    rate, fastest = inputs.machine.rotary_rate_deg_min, inputs.rates.rapid
 
     def along(tips: F64, axes: F64) -> tuple[F64, F64, F64] | None:
         try:
             way, turns = machine.course(tips @ turn, axes @ turn, tolerance, MAX_AXIS_DEVIATION, longest)
         except OutputError:
             return None
-        least = np.zeros(len(way) - 1)
+        min_minutes = np.zeros(len(way) - 1)
         if rate is not None:
-            least = np.degrees(np.abs(np.diff(turns, axis=0)).max(axis=1)) / rate
+            min_minutes = np.degrees(np.abs(np.diff(turns, axis=0)).max(axis=1)) / rate
         if machine.pivots is not None:
-            for gauge in {*gauge_lengths(setup).values()}:
+            for gauge in {*inputs.gauge_lengths.values()}:
                 gone = np.abs(np.diff(machine.joints(way, turns, gauge), axis=0)).max(axis=1)
-                least = np.maximum(least, gone / fastest)
-        return way @ turn.T, machine.axes(turns) @ turn.T, RATE_SPARE * least
+                min_minutes = np.maximum(min_minutes, gone / fastest)
+        return way @ turn.T, machine.axes(turns) @ turn.T, RATE_SPARE * min_minutes
 
-    table = table_height(setup, ready.blank) + setup.clearance_mm.rapid + TABLE_SPARE
+    table = table_height(inputs, ready.blank) + inputs.clearances.rapid + TABLE_SPARE
     return RotaryAxes(lambda axes: machine.stands(axes @ turn), along, turn[:, 2], table)
 
 
 def room_to_turn(height: float, radius: float, leans: float, tools: Sequence[ToolBody], table: float) -> float:
-    """By how much the ball that tools turn outside of is moved up, and made greater, so that they clear the table.
+    """How far the ball that tools turn outside of moves up and grows, mm, so that tilted tools clear the table.
 
-    height, radius : mm, of its centre and its size
-    leans  : rad, the most a tool leans, well below a half turn (``service.from_wire.check_plannable``)
-    table  : mm, Z that no tool may come down to
+    height, radius : mm, of the centre of the ball and its size
+    leans : rad, the largest tilt of a tool, well below a half turn (``service.from_wire.check_plannable``)
+    table : mm, Z that no tool may come down to
 
-    Returns mm; what lay in the ball still does. A rim r wide at the height h above the tip hangs r sin(lean) below its
-    place, h cos(lean) above the tip; that is radius cos(lean) above the centre. While an axis swings the proof takes
-    1/800 of the distance from the tip off that (``verify.checks.table_clearance``), and so it is here.
+    Notes
+    -----
+    The grown ball still holds the first one. The tip stands radius cos(tilt) above the centre. A rim of radius r at the
+    height h above the tip stands h cos(tilt) - r sin(tilt) above it. While an axis swings, the proof subtracts 1/800 of
+    the distance from the tip (``verify.checks.table_clearance``), and so does this function.
     """
     angles = np.linspace(0.0, leans, max(2, int(np.ceil(np.degrees(leans))) + 1))
     up, aside = np.cos(angles), np.sin(angles)
@@ -231,30 +240,30 @@ def room_to_turn(height: float, radius: float, leans: float, tools: Sequence[Too
     return float(np.max(np.maximum(short, 0.0) / (1.0 + up)))
 
 
-def _workplan(ready: Prepared, steps: tuple[Workingstep, ...], look: Look, clearance: float, access: Access,
+def _workplan(ready: Prepared, steps: tuple[Workingstep, ...], frame: ProofFrame, clearance: float, access: Access,
               words: tuple[str, ...]) -> Workplan:
-    """What both kinds of plan say; clearance is the height of the clearance plane, mm."""
-    setup = ready.setup
+    """The workplan of steps in a frame; clearance : mm, height of the clearance plane."""
+    inputs = ready.inputs
     used = {s.tool.id for s in steps}
     if ready.blank.solid is not None:
         words = (*words, f"stock sha256 {ready.blank.solid.sha256}")
-    lo, hi = ready.blank.corners(look.rotation)
-    shapes = Ap238(setup.machine.ap238) is Ap238.CC2
-    gauges = gauge_lengths(setup)
-    return Workplan(setup.labels.get("order") or "zonemill job", steps,
-                    tuple(t for t in tool_bodies(setup) if t.id in used), clearance, access.work_offset,
-                    StockBox(lo, hi), material_name(setup), ready.part.sha256, setup_sha256(setup), VERSION,
-                    dict(setup.labels), (*words, *(f"warning: {w}" for w in ready.warnings)),
-                    stock_words=_stock_words(ready), cylinder=_cylinder(ready, look),
-                    stock_mesh=ready.blank.proof_mesh(look.rotation) if shapes else None,
-                    part_mesh=look.part.mesh if shapes else None, ap238=Ap238(setup.machine.ap238),
-                    coolant=setup.machine.coolant == "flood",
+    lo, hi = ready.blank.corners(frame.rotation)
+    shapes = Ap238(inputs.machine.ap238) is Ap238.CC2
+    gauges = inputs.gauge_lengths
+    return Workplan(inputs.labels.get("order") or "zonemill job", steps,
+                    tuple(t for t in inputs.bodies if t.id in used), clearance, access.work_offset,
+                    StockBox(lo, hi), inputs.material_name, ready.part.sha256, inputs.sha256, VERSION,
+                    dict(inputs.labels), (*words, *(f"warning: {w}" for w in ready.warnings)),
+                    stock_words=_stock_words(ready), cylinder=_cylinder(ready, frame),
+                    stock_mesh=ready.blank.proof_mesh(frame.rotation) if shapes else None,
+                    part_mesh=frame.part.mesh if shapes else None, ap238=Ap238(inputs.machine.ap238),
+                    coolant=inputs.machine.coolant == "flood",
                     assemblies={b.number: Assembly(gauges[b.number], t.flutes, t.life_min)
-                                for t, b in zip(setup.tools, tool_bodies(setup), strict=True)})
+                                for t, b in zip(inputs.tools, inputs.bodies, strict=True)})
 
 
 def _stock_words(ready: Prepared) -> str:
-    """What kind of blank it is, where a box does not say it all."""
+    """The kind of the blank for the header; '' where the box in the header is the whole blank."""
     blank = ready.blank
     if blank.bar is not None:
         return f"cylinder of diameter {2.0 * blank.bar.radius:g} mm and height {blank.bar.height:g} mm"
@@ -263,31 +272,24 @@ def _stock_words(ready: Prepared) -> str:
     return "" if blank.box is not None else f"part grown by {blank.margin:g} mm"
 
 
-def _cylinder(ready: Prepared, look: Look) -> StockCylinder | None:
-    """The blank in a frame, where it is a cylinder."""
+def _cylinder(ready: Prepared, frame: ProofFrame) -> StockCylinder | None:
+    """The blank as a cylinder in a frame; None where it is none."""
     bar = ready.blank.bar
     if bar is None:
         return None
-    low, high = bar.ends(look.rotation)
+    low, high = bar.ends(frame.rotation)
     return StockCylinder(low, (high - low) / bar.height, bar.radius, bar.height)
 
 
-def _surfaces(ready: Prepared, sides: Sequence[Side],
+def _surfaces(ready: Prepared, access_plans: Sequence[AccessPlan],
               trimmed: Mapping[str, Sequence[Faces]]) -> dict[int, NurbsSurface]:
-    """Exact faces by number: of one side in its frame, on a machine that turns of all of them in the setup's."""
+    """Exact faces by number: of one access in its frame, or of all in the setup frame on a machine with rotary axes."""
     out: dict[int, NurbsSurface] = {}
-    for side in sides:
+    for access_plan in access_plans:
         turn = np.eye(4)
-        if ready.setup.machine.kind == "5-axis":
-            turn[:3, :3] = side.view.rotation.T
+        if ready.inputs.turns:
+            turn[:3, :3] = access_plan.view.rotation.T
         for zone in ready.zones:
-            for face in trimmed.get(zone.id, ()) if zone.access == side.view.id else ():
+            for face in trimmed.get(zone.id, ()) if zone.access == access_plan.view.id else ():
                 out.update({one.face: one.surface.moved(turn) for one in exact_faces(face)})
     return out
-
-
-def gauge_lengths(setup: Setup) -> dict[int, float]:
-    """mm from the spindle face to the tip, by T number."""
-    return {body.number: t.gauge_length_mm if t.gauge_length_mm is not None else
-            body.stickout + sum(h.length for h in body.holder)
-            for t, body in zip(setup.tools, tool_bodies(setup), strict=True)}

@@ -1,9 +1,9 @@
-"""Which samples of the proof a zone answers for.
+"""The samples of the proof, and the zone that answers for each of them.
 
-The proof has samples of its own, four times as dense as those zones are built of. Each is handed to the zone of a
-planning sample of the same face and form near it, if that zone's tool can touch it: judged by the exact reach of
-the tool before any pass is laid. The planner then measures its passes at the same places, by a formula of its own
-(``toolpath.stock.residual_map``); the proof measures there what the program it reads back leaves (``verify.surface.removal``).
+The proof has samples of its own, four times as dense as those that zones are built of. A sample goes to the zone of a
+nearby planning sample of the same face and form, if the tool of that zone can touch it by its exact reach. The planner
+measures its passes at the same places by its own formula (``toolpath.stock.residual_map``). The proof measures there
+what the program leaves that it reads back (``verify.surface.removal``).
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ NEIGHBOURS = 4
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """The samples of the proof and who answers for them.
+    """The samples of the proof and the zones that answer for them.
 
     samples : SurfaceSamples of the machinable area, frame of the first view
     labels  : their regions there
-    zone    : (n,) int32, 0 for none, else the place of the zone in ``ready.zones`` from 1
-    tips    : (n, 3) float64, mm, an admissible tip that touches each claimed sample, frame of the zone's view
+    zone    : (n,) int32, index: place of the zone in ``ready.zones``, from 1; 0 for none
+    tips    : (n, 3) float64, mm, frame of the zone's view: an admissible tip that touches each claimed sample
     """
 
     samples: SurfaceSamples
@@ -46,7 +46,7 @@ class Score:
     tips: NDArray[np.float64]
 
     def checks(self, ready: Prepared) -> list[FinishTarget]:
-        """Per zone, what its passes are measured at: its samples here, and the borders of its faces."""
+        """For each zone, the places its passes are measured at: its samples, and the borders of its faces."""
         out = []
         for k, z in enumerate(ready.zones, start=1):
             mine, view = self.zone == k, ready.view(z.access)
@@ -59,12 +59,14 @@ class Score:
         return out
 
     def without(self, plan: Plan, zones: Sequence[ZoneArea]) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-        """Zone of every sample less those the plan gave up, and which these are.
+        """Zone of every sample without those that the plan gave up, and a mark of these.
 
-        A sample is given up where a tool could touch it but the plan's own measure says that no pass does, or
-        where its zone was not finished at all. It then stands in the remainder, reason 'pass'.
+        The plan gives up a sample where a tool could touch it but no pass does by the plan's own measure, or where the
+        zone was not finished at all. The sample then stands in the remainder, reason 'pass'.
 
         zones : as in ``Prepared``
+
+        Returns (n,) int32, index: zone from 1, 0 for none; and (n,) bool, whether the plan gave the sample up.
         """
         zone, lost = self.zone.copy(), np.zeros(len(self.zone), np.bool_)
         plans = {p.zone.id: p for p in plan.zones}
@@ -79,7 +81,7 @@ class Score:
 def score(ready: Prepared) -> Score:
     """Sample the machinable area for the proof and hand every sample to the zone whose tool can touch it."""
     first = ready.views[0]
-    triangles = machinable_triangles(first.part, ready.decomposition, ready.setup, ready.seen_from @ first.rotation.T)
+    triangles = machinable_triangles(first.part, ready.decomposition, ready.inputs, ready.seen_from @ first.rotation.T)
     mesh = first.part.mesh
     dense = with_surface_normals(sample_surface(mesh, PROOF_DENSITY, seed=PROOF_SEED, triangles=triangles), mesh)
     zone, tips = np.zeros(len(dense), np.int32), np.zeros((len(dense), 3))
@@ -104,9 +106,10 @@ def score(ready: Prepared) -> Score:
 
 
 def _neighbours(view: View, owner: NDArray[np.int32], dense: SurfaceSamples, labels: Labels) -> NDArray[np.int32]:
-    """Zone of the nearest owned of a few planning samples of the same face and form.
+    """Zone of the nearest planning sample of the same face and form that has a zone.
 
-    owner : (m,) zone of the planning samples, 0 for none; dense, labels : in the frame of the view
+    owner         : (m,) int32, index: zone of the planning samples, from 1; 0 for none
+    dense, labels : in the frame of the view
     """
     codes = {"level": 0, "shallow": 1, "steep": 2}
     key = view.samples.face.astype(np.int64) * 3 + np.array([codes[f] for f in forms_of(view.samples.normals)])

@@ -1,15 +1,15 @@
-"""What a second attempt at a job takes over from the first: accesses that were planned, acts of a plan, and proofs.
+"""What a second attempt at a job takes over from the first: plans of accesses, acts of an unfinished plan, and proofs.
 
-Reading, zones and the samples of the proof are made again, and so are programs, for they follow from the plans. What
-is taken over is named by a digest of all it came from:
+The second attempt reads the part, builds zones and samples, and writes programs again. A value that it takes over is
+named by a digest of everything it depends on:
 
-    plan    the job as prepared here, the access, the plans before it, what proofs found along it
-    acts    the same; what a plan has come to that is still under way, the newest of it alone
-    proof   the job as prepared here, the very texts that were proved, who answers for each sample
+    plan    the prepared job, the access, the plans before it, the counterexamples along it
+    acts    the same; the newest state of a plan that is not finished
+    proof   the prepared job, the texts that were proved, the zone of each sample
 
-The job as prepared has its setup, our sources, the versions of the libraries that compute and the kind of processor in
-it, and part, zones and samples bit by bit: a worker on which any of them is another finds no plan of the other's. So a
-job that was taken up again ends with the bytes of one that nothing happened to.
+The prepared job covers the setup, the sources of this program, the versions of the computing libraries, the kind of
+processor, and part, zones and samples bit by bit. A worker where any of them differs takes over nothing. So a job that
+was interrupted ends with the same bytes as one that was not.
 """
 
 from __future__ import annotations
@@ -30,10 +30,9 @@ import structlog
 from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
-from schemas.setup import setup_sha256
 from service.checkpoint_store import Kept
 from service.serialization import Known, pack, unpack
-from service.stages.access_plan import Side
+from service.stages.access_plan import AccessPlan
 from service.stages.preparation import Prepared
 from service.version import code_version
 from toolpath.counterexamples import Counterexamples
@@ -47,47 +46,49 @@ from zones.reach.access_view import View
 log = structlog.get_logger(__name__)
 
 KERNEL_WHEELS = ("cadquery-ocp", "cadquery-ocp-novtk")  # an environment holds one of them
-COMPUTING = ("numpy", "scipy", "numba", "shapely", "trimesh", *KERNEL_WHEELS)  # whose versions a plan depends on
+COMPUTING = ("numpy", "scipy", "numba", "shapely", "trimesh", *KERNEL_WHEELS)  # libraries that change a plan
 PLAN, ACTS, PROOF = "plan", "acts", "proof"
-ACTS_EVERY_S = 15.0  # how often a plan under way is kept at most
-ACTS_PAUSE = 60.0  # and not for so many times as long as that took the last time
+ACTS_EVERY_S = 15.0  # least time between two states of an unfinished plan that are kept
+ACTS_PAUSE = 60.0  # the same, in times of how long keeping the last state took
 T = TypeVar("T")
 
 
 class Resumed:
-    """A job on its way, with what is kept of it.
+    """A job with the plans and proofs that are kept of it.
 
-    kept    : Kept
+    kept    : Kept, the store
     ready   : Prepared
-    checks  : of each zone
-    samples : SurfaceSamples of the proof
+    checks  : for each zone the places its passes are measured at
+    samples : SurfaceSamples of the proof, in its frame
     """
 
     def __init__(self, kept: Kept, ready: Prepared, checks: Sequence[FinishTarget], samples: SurfaceSamples) -> None:
         self.kept, self.ready, self.checks, self.samples = kept, ready, checks, samples
 
-    def side(self, view: View, before: Sequence[Side], found: Counterexamples,
-             make: Callable[[CheckpointKeeper], Side]) -> Side:
-        """The plan of an access: the one that is kept, else what ``make`` plans, which is kept then.
+    def access_plan(self, view: View, before: Sequence[AccessPlan], found: Counterexamples,
+                    make: Callable[[CheckpointKeeper], AccessPlan]) -> AccessPlan:
+        """The plan of an access: the kept one, else the one that ``make`` returns, which is then kept.
 
-        before : the sides planned before it; found : what proofs found along it
-        make   : given who keeps the plan while it is under way
+        before : plans of the accesses before it
+        found  : counterexamples along it
+        make   : plans the access, given the keeper of the unfinished plan
         """
         if not self.kept:
             return make(NOTHING)
         name = _digest(self._prepared, view.id, *(s.name for s in before), pack(found))
-        side = self.taken(PLAN, name, partial(_side, view))
-        if side is None:
-            side = make(_UnderWay(self, name))
-            left = None if side.left is None else (side.left.lattice, side.left.top, side.left.cover)
-            if self.keep(PLAN, name, (side.made, side.clearance, left)):
+        planned = self.taken(PLAN, name, partial(_access_plan, view))
+        if planned is None:
+            planned = make(_UnderWay(self, name))
+            stock = planned.left
+            left = None if stock is None else (stock.lattice, stock.top, stock.cover)
+            if self.keep(PLAN, name, (planned.plan, planned.clearance, left)):
                 self.kept.drop(ACTS, name)
-        return replace(side, name=name)
+        return replace(planned, name=name)
 
     def proof(self, programs: Sequence[NcProgram], zone: NDArray[np.int32], make: Callable[[], Proof]) -> Proof:
-        """The proof of programs: the one that is kept, else what ``make`` finds, which is kept then.
+        """The proof of programs: the kept one, else the one that ``make`` returns, which is then kept.
 
-        zone : (n,) int32, who answers for each sample
+        zone : (n,) int32, index: zone that answers for each sample, from 1; 0 for none
         """
         if not self.kept:
             return make()
@@ -101,9 +102,9 @@ class Resumed:
 
     def taken(self, kind: str, name: str, build: Callable[[Any], T],
               count: Callable[[T], int] = lambda _: 1) -> T | None:
-        """What ``build`` makes of the value that is kept; None where none is, or one that it makes nothing of.
+        """What ``build`` makes of a kept value; None where none is kept or ``build`` cannot read it.
 
-        count : as how many that is told
+        count : how many values the result counts as in the log of the job
         """
         data = self.kept.get(kind, name)
         if data is None:
@@ -111,21 +112,21 @@ class Resumed:
         try:
             found = build(unpack(data, self._known))
         except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
-            log.warning("what was kept cannot be read", kind=kind, error=f"{type(error).__name__}: {error}")
+            log.warning("a kept value cannot be read", kind=kind, error=f"{type(error).__name__}: {error}")
             self.kept.drop(kind, name)
             return None
         self.kept.took(kind, count(found))
         return found
 
     def keep(self, kind: str, name: str, value: object) -> bool:
-        """Keep a value for another attempt; False where that could not be done."""
+        """Keep a value for another attempt; returns whether it is stored."""
         try:
             done = self.kept.put(kind, name, pack(value, self._known))
         except TypeError as error:  # a class that ``service.serialization`` does not know: no reason for a job to fail
-            log.warning("cannot be kept for another attempt", kind=kind, error=str(error))
+            log.warning("a value cannot be kept for another attempt", kind=kind, error=str(error))
             return False
         if not done:
-            log.warning("could not be kept for another attempt", kind=kind)
+            log.warning("a value could not be stored for another attempt", kind=kind)
         return done
 
     @cached_property
@@ -135,32 +136,31 @@ class Resumed:
 
     @cached_property
     def _prepared(self) -> str:
-        """Digest of the job as prepared here."""
+        """Digest of the prepared job."""
         mesh, first = self.ready.part.mesh, self.ready.samples
-        told: list[str | NDArray[Any]] = [code_version(), _computing(), setup_sha256(self.ready.setup)]
-        told += [mesh.vertices, mesh.faces, first.points, first.normals]
+        parts: list[str | NDArray[Any]] = [code_version(), _computing(), self.ready.inputs.sha256]
+        parts += [mesh.vertices, mesh.faces, first.points, first.normals]
         for v in self.ready.views:
-            told += [v.id, v.rotation]
+            parts += [v.id, v.rotation]
         for z, c in zip(self.ready.zones, self.checks, strict=True):
-            told += [z.id, z.access, z.tool.id, z.tips, z.samples, c.points, c.normals, c.tips]
-        return _digest(*told, self.samples.points, self.samples.normals)
+            parts += [z.id, z.access, z.tool.id, z.tips, z.samples, c.points, c.normals, c.tips]
+        return _digest(*parts, self.samples.points, self.samples.normals)
 
 
 class _UnderWay(CheckpointKeeper):
-    """Keeps a plan of an access while it is made, now and then, each time instead of the time before."""
+    """Keeps the newest state of a plan of an access from time to time while it is made."""
 
     def __init__(self, resumed: Resumed, name: str) -> None:
         self.resumed, self.name = resumed, name
         self.next = time.monotonic() + ACTS_EVERY_S
 
     def taken(self, use: Callable[[PlanSnapshot], T]) -> T | None:
-        """See ``CheckpointKeeper``; told is how many workingsteps were made."""
-        found = self.resumed.taken(ACTS, self.name, lambda v: (use(_checked(PlanSnapshot, v)), len(v.steps)),
-                                   itemgetter(1))
+        """See ``CheckpointKeeper``; the result counts as the number of its workingsteps."""
+        found = self.resumed.taken(ACTS, self.name, lambda v: (use(_checked(PlanSnapshot, v)), len(v.steps)), itemgetter(1))
         return None if found is None else found[0]
 
     def done(self, now: Callable[[], PlanSnapshot]) -> None:
-        """Keep it where the time for that has come."""
+        """Keep the state of the plan if it is time to."""
         begun = time.monotonic()
         if begun >= self.next:
             self.resumed.keep(ACTS, self.name, now())
@@ -168,9 +168,9 @@ class _UnderWay(CheckpointKeeper):
             self.next = ended + max(ACTS_EVERY_S, ACTS_PAUSE * (ended - begun))
 
 
-def _side(view: View, value: Any) -> Side:
-    made, clearance, left = value
-    return Side(view, _checked(Plan, made), clearance, None if left is None else StockMap(*left))
+def _access_plan(view: View, value: Any) -> AccessPlan:
+    plan, clearance, left = value
+    return AccessPlan(view, _checked(Plan, plan), clearance, None if left is None else StockMap(*left))
 
 
 def _checked(kind: type[T], value: Any) -> T:
@@ -179,10 +179,10 @@ def _checked(kind: type[T], value: Any) -> T:
     return value
 
 
-def _digest(*told: str | bytearray | NDArray[Any]) -> str:
+def _digest(*parts: str | bytearray | NDArray[Any]) -> str:
     """SHA-256 over texts, bytes and arrays, each with its length before it, hex."""
     digest = hashlib.sha256()
-    for one in told:
+    for one in parts:
         data: Any = one.encode() if isinstance(one, str) else one
         if isinstance(one, np.ndarray):
             data = np.ascontiguousarray(one).reshape(-1).view(np.uint8).data
@@ -192,7 +192,7 @@ def _digest(*told: str | bytearray | NDArray[Any]) -> str:
 
 
 def _computing() -> str:
-    """What computes: interpreter, processor as kernels are compiled for it, versions of libraries."""
+    """Interpreter, processor features that kernels are compiled for, and versions of the computing libraries."""
     found = [sys.version, llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()]
     for name in COMPUTING:
         try:

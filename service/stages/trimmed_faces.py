@@ -12,33 +12,31 @@ from geometry.mesh import F64, I32
 from geometry.part import EdgeKind
 from geometry.step_import.face_surfaces import read_patches
 from geometry.trimming.trim import trim_faces
-from service.stages.preparation import Prepared, placement_of
+from service.stages.preparation import Prepared
 from toolpath.passes.trimmed_faces import Faces, TangentFaces, TrimmedFace
 from toolpath.strategies.isoparametric import suits
 from zones.machinable_area import AreaForm
 
-TURN = 1e-3  # rad: faces whose normals differ by more where they join are not gone over as one
-WIDE = 1e3  # mm between places a face is looked at for a change of label, of which there is none
+TURN = 1e-3  # rad between normals at a joint; beyond it two faces are not one sheet
+WIDE = 1e3  # mm between the places where a face is searched for a change of label; there is none
 
 
 def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
-    """The faces that every steep or shallow zone is part of, by its id, in the frame of its access.
+    """The exact faces of every steep or shallow zone, by id of the zone, in the frame of its access.
 
-    Those of a zone that join smoothly are one. Planes are left out, but on steep zones where tools may lean; there each
-    is alone. Tools without a corner have passes on faces only there, by their flank.
+    Faces of a zone that join smoothly form one sheet. Planes are left out, except on steep zones where tools may tilt;
+    there each plane is a sheet of its own. Tools without a corner radius get passes only there, by their flank.
 
-    path : the STEP file ``ready`` was read from
+    path : the STEP file that ``ready`` was read from
     """
     curved = {f.number for f in ready.part.faces if f.surface != "plane"}
-    leans = ready.setup.machine.kind == "5-axis" and ready.setup.machine.simultaneous
-    wanted = [z for z in ready.zones
-              if z.form is not AreaForm.LEVEL and suits(z.tool) or leans and z.form is AreaForm.STEEP]
+    leans = ready.inputs.turns and ready.inputs.machine.simultaneous
+    wanted = [z for z in ready.zones if z.form is not AreaForm.LEVEL and suits(z.tool) or leans and z.form is AreaForm.STEEP]
     flat = {f for z in wanted if leans and z.form is AreaForm.STEEP for f in z.faces} - curved
     numbers = sorted({f for z in wanted for f in z.faces} & curved | flat)
     if not numbers:
         return {}
-    setup = ready.setup
-    exact = read_patches(path, numbers, placement=placement_of(setup), solid=setup.part.solid)
+    exact = read_patches(path, numbers, placement=ready.inputs.placement, solid=ready.inputs.solid)
     pieces = trim_faces(ready.part, numbers, _whole, WIDE)[0]
     uv = np.array(ready.part.uv)
     for f, patch in exact.items():
@@ -75,12 +73,12 @@ def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
 
 
 def exact_faces(faces: Faces) -> tuple[TrimmedFace, ...]:
-    """The faces that are gone over as one, each by itself."""
+    """The single faces of a sheet."""
     return faces.alone if isinstance(faces, TangentFaces) else (faces,) if isinstance(faces, TrimmedFace) else ()
 
 
 def _together(faces: list[int], smooth: list[tuple[int, int]]) -> list[tuple[int, ...]]:
-    """Faces in groups that smooth edges join, in order."""
+    """Groups of faces that smooth edges join, in the order of the faces."""
     place = {f: k for k, f in enumerate(faces)}
     pairs = np.array([(place[a], place[b]) for a, b in smooth if a in place and b in place and a != b]).reshape(-1, 2)
     graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(faces), len(faces)))

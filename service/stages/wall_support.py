@@ -1,4 +1,4 @@
-"""Thin walls that are to keep their support: whether a job is held to it, and the bands its plan goes down by."""
+"""Support of thin walls: whether the proof requires it, and the depth bands in which the plan goes down."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from service.from_wire import rotary_machine
-from service.stages.cautions import MOST_RATIO, walls_to_cut
+from service.stages.cautions import MAX_HEIGHT_RATIO, walls_to_cut
 from service.stages.preparation import Prepared
 from toolpath.counterexamples import HighWall
 from toolpath.planning.depth_bands import largest_corner, planes
@@ -16,29 +15,29 @@ from zones.features.wall_slenderness import slender_walls
 from zones.model import Wall
 from zones.reach.access_view import View
 
-FREE_RATIO = MOST_RATIO
-"""Times its thickness that a wall may be free for where it is finished: what is not told of when it stands alone."""
+FREE_RATIO = MAX_HEIGHT_RATIO
+"""Free height of a wall where it is finished, over its thickness, dimensionless: lower walls need no support."""
 PLANNED_RATIO = 8.0
-"""The same in a plan: the layer under a band and how well a wall is measured take the rest."""
+"""The same in a plan. The difference covers the layer under a band and the error of the measured wall."""
 
 
 def in_turn(ready: Prepared) -> bool:
-    """Whether a wall that is cut without support is a finding, and the plan goes down by bands for it.
+    """Whether a wall that is finished without support is a finding, so that the plan goes down in bands.
 
-    Only where all is cut along one axis: what several accesses leave each other no plan knows.
+    Only where everything is cut along one axis: with several accesses no plan knows what the others leave.
     """
-    one_way = len(ready.views) == 1 and rotary_machine(ready.setup.machine) is None
-    return ready.setup.operations.walls_in_turn and one_way
+    one_way = len(ready.views) == 1 and ready.inputs.rotary is None
+    return ready.inputs.operations.walls_in_turn and one_way
 
 
 def band_planes(ready: Prepared, view: View, unheld: Sequence[HighWall] = ()) -> tuple[float, ...]:
-    """Heights, mm, descending, that all tools of a job finish down to before any goes below (``toolpath.planning.depth_bands``).
+    """Lower ends of the depth bands, mm, descending, access frame. All tools finish a band before any goes below it.
 
-    They are for walls over ``FREE_RATIO`` by their profile, from the highest place that neither foot nor connection nor
-    bend holds near by, as the proof asks it (``verify.surface.slender_walls``), down to what holds the lowest; what has single places
-    over it the proof finds.
+    Bands are for walls whose profile exceeds ``FREE_RATIO``. They begin at the highest place that no foot, connection
+    or bend holds nearby, by the measure of the proof (``verify.surface.slender_walls``), and end at the support of the
+    lowest such place. The proof finds single places beyond that. See ``toolpath.planning.depth_bands``.
 
-    unheld : walls that a proof found without support, known as walls or not
+    unheld : walls that a proof found without support, whether the decomposition has them as walls or not
     """
     if not in_turn(ready):
         return ()
@@ -48,7 +47,10 @@ def band_planes(ready: Prepared, view: View, unheld: Sequence[HighWall] = ()) ->
 
 
 def _free(view: View, walls: Sequence[Wall], thickness: Mapping[str, float]) -> list[HighWall]:
-    """Heights between which nothing of the finished part holds walls near by; thickness : mm, by id."""
+    """Heights between which no part of the finished part holds a wall nearby.
+
+    thickness : mm, by id of the wall
+    """
     faces = view.samples.face
     places = thin_walls(view.tree, view.samples, FREE_RATIO)
     out = []

@@ -1,8 +1,8 @@
-"""preview.png: zones, what stays and why, and the tool paths, drawn from ``view.bin``, so that picture and page agree.
+"""preview.png: zones, remainder and tool paths, drawn from ``view.bin``, so that picture and page agree.
 
-Left the part: every zone its own colour, hatched red what stays, ids of walls and connections at their places. Right
-the same view with the ways of the finishing steps in the colours of their tools and rapids dashed. Below a legend. No
-clock, no random number, no graphics library: the same file gives the same bytes.
+The left picture shows the part: each zone in its own colour, the remainder hatched red, ids at walls and connections.
+The right one shows the paths of the finishing steps in the colours of their tools, with dashed rapids. A legend stands
+below. There is no clock, no random number and no graphics library: the same file gives the same bytes.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from service.viewer.view_paths import CUT, RAPID
 
 SIZE = (1760, 960)
 HEADER, LEGEND, GUTTER = 56, 132, 8
-# those of the page, web/src/scene/colours.ts
+# the same colours as on the page, web/src/scene/colours.ts
 CONNECTION: RGB = (1.0, 0.52, 0.0)
 REMAINDER: RGB = (0.86, 0.10, 0.14)
 HATCHED: RGB = (0.98, 0.86, 0.84)
@@ -50,23 +50,24 @@ TOOLS: tuple[RGB, ...] = (
     (0.0, 0.33, 0.8), (0.0, 0.5, 0.22), (0.58, 0.1, 0.68), (0.0, 0.48, 0.56), (0.62, 0.36, 0.0),
     (0.8, 0.16, 0.5), (0.25, 0.25, 0.3), (0.36, 0.48, 0.0),
 )
-FIRST = 2  # what label 0 is on the canvas: 0 is nothing, 1 a face that no sample lies on
+FIRST = 2  # label 0 on the canvas; 0 is the background, 1 a face without samples
 ROUGH, FINE = 0, 1  # levels of detail
-MOST_LABELS, MOST_ZONES, MOST_REASONS = 40, 10, 5
-STEEP = 0.7  # of a feed move along the tool: it is a way up or down
-HATCH, INKED = 14, 5  # pixels from stripe to stripe, and of a stripe
-_TRIAL = (240, 180)  # pixels of the pictures that views are chosen with
+MAX_LABELS, MAX_ZONES, MAX_REASONS = 40, 10, 5
+STEEP = 0.7  # share of a feed move along the tool axis, from which on it counts as a move up or down
+HATCH, INKED = 14, 5  # px from stripe to stripe, and width of a stripe
+_TRIAL = (240, 180)  # px, size of the trial pictures that choose the view
 Table = dict[str, NDArray[np.int64]]
 
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """What a view file holds of the part and the ways, in mm.
+    """Part and tool paths of a view file, in the setup frame.
 
     mesh  : facets; their face ids are labels, from ``FIRST``
-    face  : (t,) int64, number of the face each is of
-    edges : polylines (k, 3)
-    ways  : of each step (n, 3) places, (n,) kinds as ``service.viewer.view_paths`` has them, and (n, 3) or (3,) tool axes
+    face  : (t,) int64, index: face number of each facet
+    edges : polylines (k, 3) float64, mm
+    ways  : for each step places (n, 3) float64, mm; kinds (n,) int64, index, as in ``service.viewer.view_paths``; and
+            tool axes (n, 3) or (3,) float64, dimensionless
     """
 
     head: Mapping[str, Any]
@@ -76,10 +77,10 @@ class Drawn:
     ways: Mapping[int, tuple[F64, NDArray[np.int64], F64]]
 
     @classmethod
-    def of(cls, head: Mapping[str, Any], tables: Sequence[Table], most: int) -> Drawn:
-        """From what a view file holds, its levels up to ``most``."""
+    def of(cls, head: Mapping[str, Any], tables: Sequence[Table], finest: int) -> Drawn:
+        """From head and chunks of a view file, with levels of detail up to ``finest``."""
         low, chunks = np.array(head["low_mm"]), list(zip(head["chunks"], tables, strict=True))
-        level = max((c["lod"] for c, _ in chunks if c["kind"] == "mesh" and c["lod"] <= most), default=0)
+        level = max((c["lod"] for c, _ in chunks if c["kind"] == "mesh" and c["lod"] <= finest), default=0)
         parts = [(c["label"], t) for c, t in chunks if c["kind"] == "mesh" and c["lod"] == level]
         begins = np.cumsum([0, *(len(t["place"]) for _, t in parts)])
         vertices = np.concatenate([np.zeros((0, 3)), *(low + head["mesh_grid_mm"] * t["place"] for _, t in parts)])
@@ -91,20 +92,23 @@ class Drawn:
                  for a, b in zip(t["begins"][:-1, 0], t["begins"][1:, 0], strict=True)]
         ways = {}
         for c, t in chunks:  # the finer level of a step comes later
-            if c["kind"] == "path" and c["lod"] <= most:
+            if c["kind"] == "path" and c["lod"] <= finest:
                 axis = np.array(t["axis"] / head["axis_unit"] if "axis" in t else head["steps"][c["step"]]["axis"])
                 ways[c["step"]] = (low + head["path_grid_mm"] * t["place"], t["kind"][:, 0], axis)
         mesh = TriangleMesh(np.ascontiguousarray(vertices), corners.astype(np.int32), label.astype(np.int32))
         return cls(head, mesh, face[corners[:, 0]] if len(corners) else face, edges, ways)
 
     def labels(self, kind: str) -> list[int]:
-        """The face ids of ``mesh`` that are of a kind, 'zone' or 'remainder', in the order of the head's list."""
+        """Labels of all zones or of all entries of the remainder, in the order of the head.
+
+        kind : 'zone' or 'remainder'
+        """
         named = {v[kind]: k + FIRST for k, v in enumerate(self.head["labelled"]) if kind in v}
         wanted = [z["id"] for z in self.head["zones"]] if kind == "zone" else range(len(self.head["remainder"]))
         return [named[w] for w in wanted]
 
     def finishing(self) -> list[int]:
-        """The steps whose ways are drawn: those of finishing, or all where there are none."""
+        """The steps whose paths are drawn: those of finishing, or all where there are none."""
         steps = [k for k, s in enumerate(self.head["steps"]) if s["operation"] == "finishing" and k in self.ways]
         return steps or sorted(self.ways)
 
@@ -133,7 +137,7 @@ def draw_preview(view: bytes, out_path: str | Path, title: str, facts: Mapping[s
     pen.text((20, 14), ascii_text(title), font=font(26), fill=bytes_of(INK))
     _labels(pen, drawn, camera, left.depth)
     partly = len(drawn.finishing()) < len(drawn.ways)
-    for x, caption in ((0, "Zones, and hatched what stays" if drawn.head["zones"] else "Part"),
+    for x, caption in ((0, "Zones; hatched: the remainder" if drawn.head["zones"] else "Part"),
                        (width + GUTTER, "Tool paths" + (" of finishing" if partly else ""))):
         pen.text((x + 20, HEADER + 12), caption, font=font(17), fill=bytes_of(GREY))
     draw_triad(pen, camera, (54, SIZE[1] - LEGEND - 54))
@@ -144,9 +148,9 @@ def draw_preview(view: bytes, out_path: str | Path, title: str, facts: Mapping[s
 
 
 def _camera(drawn: Drawn, size: tuple[int, int]) -> Camera:
-    """Where the viewer stands: of twelve slanting azimuths and two heights, where most is seen of what matters.
+    """The camera: of twelve azimuths and two elevations the one that shows most of connections and remainder.
 
-    That are connections and what stays. Ties, and parts without both, go to the first, the usual isometric view.
+    Ties, and parts without both, take the first one, the usual isometric view.
     """
     faces = [f for c in drawn.head["connections"] for f in c["faces"]]
     matters = np.isin(drawn.face, faces) | np.isin(drawn.mesh.face_ids, drawn.labels("remainder"))
@@ -192,14 +196,14 @@ def zone_colour(index: int) -> RGB:
 
 
 def _tool_colours(drawn: Drawn) -> dict[int, RGB]:
-    """Colours by T number, of the tools of the steps that are drawn."""
+    """Colours of the tools of the drawn steps, by T number."""
     used = {drawn.head["steps"][k]["tool"] for k in drawn.finishing()}
     colours = {t["number"]: TOOLS[k % len(TOOLS)] for k, t in enumerate(drawn.head["tools"]) if t["number"] in used}
     return colours | dict.fromkeys(used - set(colours), GREY)
 
 
 def _draw_ways(canvas: Canvas, camera: Camera, drawn: Drawn, tools: Mapping[int, RGB]) -> None:
-    """Rapids and ways up and down first and faint, the cuts over them; what the part hides stays hidden."""
+    """Draw rapids and moves up and down faintly, then the cuts over them; the part hides paths behind it."""
     moves: dict[str, list[tuple[F64, RGB]]] = {"rapid": [], "aside": [], "cut": []}
     for step in drawn.finishing():
         place, kinds, axis = drawn.ways[step]
@@ -221,10 +225,10 @@ def _draw_ways(canvas: Canvas, camera: Camera, drawn: Drawn, tools: Mapping[int,
 
 
 def _labels(pen: ImageDraw.ImageDraw, drawn: Drawn, camera: Camera, depth: F64) -> None:
-    """Ids of walls and connections on the left picture, where the page has them; faint what is hidden."""
+    """Draw ids of walls and connections on the left picture, where the page has them; hidden ones are faint."""
     named = [x for x in [*drawn.head["connections"], *drawn.head["walls"]] if x["at_mm"]]
     taken: list[tuple[float, float]] = []
-    for item in named[:MOST_LABELS]:
+    for item in named[:MAX_LABELS]:
         x, y, z = camera.screen(np.array(item["at_mm"])).tolist()
         at = (0.5 * x, HEADER + 0.5 * y)
         if any(abs(at[0] - u) < 28 and abs(at[1] - v) < 18 for u, v in taken):
@@ -237,14 +241,14 @@ def _labels(pen: ImageDraw.ImageDraw, drawn: Drawn, camera: Camera, depth: F64) 
 
 
 def _legend(pen: ImageDraw.ImageDraw, drawn: Drawn, tools: Mapping[int, RGB], facts: Mapping[str, str]) -> None:
-    """Below the pictures: facts, zones, why what stays stays, tools and lines."""
+    """Draw the legend: facts, zones, reasons of the remainder, tools and lines."""
     top, head = SIZE[1] - LEGEND + 12, drawn.head
     counts = {"walls": len(head["walls"]), "connections": len(head["connections"]), "zones": len(head["zones"]),
               "steps": len(head["steps"])}
     draw_pairs(pen, [(k, str(v)) for k, v in facts.items()][:5], 20, top, wide=250)
     draw_pairs(pen, [(k, str(v)) for k, v in counts.items()], 265, top, indent=100)
     zones: list[tuple[str, RGB | None]] = [(z["id"], zone_colour(k)) for k, z in enumerate(head["zones"])]
-    shown = zones if len(zones) <= MOST_ZONES else zones[:MOST_ZONES - 1]
+    shown = zones if len(zones) <= MAX_ZONES else zones[:MAX_ZONES - 1]
     if len(shown) < len(zones):
         shown = [*shown, (f"and {len(zones) - len(shown)} more", None)]
     draw_swatches(pen, shown, 420, top, columns=2, step=95)
@@ -262,16 +266,16 @@ def _legend(pen: ImageDraw.ImageDraw, drawn: Drawn, tools: Mapping[int, RGB], fa
 
 
 def _reasons(remainder: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What stays in words, entries of one reason together, the largest first; five lines at most."""
+    """The remainder in words, one line for each reason, the largest first; at most ``MAX_REASONS`` lines."""
     area: dict[str, list[float]] = {}
     for entry in remainder:
         area.setdefault(entry["reason"], []).append(entry["area_mm2"])
     rows = sorted(area.items(), key=lambda item: -sum(item[1]))
     lines = [f"{sum(each):.{0 if sum(each) >= 10 else 1}f} mm2 stay: {reason}"
              + (f" ({len(each)} places)" if len(each) > 1 else "") for reason, each in rows]
-    if len(lines) > MOST_REASONS:
-        left = sum(sum(each) for _, each in rows[MOST_REASONS - 1:])
-        lines = [*lines[:MOST_REASONS - 1], f"{left:.1f} mm2 for {len(lines) - MOST_REASONS + 1} more reasons"]
+    if len(lines) > MAX_REASONS:
+        left = sum(sum(each) for _, each in rows[MAX_REASONS - 1:])
+        lines = [*lines[:MAX_REASONS - 1], f"{left:.1f} mm2 for {len(lines) - MAX_REASONS + 1} more reasons"]
     return [line if len(line) <= 84 else line[:81] + "..." for line in lines]
 
 

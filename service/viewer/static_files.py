@@ -1,6 +1,6 @@
-"""The built page as files: read from ``service/page``, which ``make web`` fills; and what is said where nobody did.
+"""The files of the page, from ``service/page``, which ``make web`` fills, and a message where they are missing.
 
-The page is one document for every path; its script looks at the path. It loads nothing from any other host and runs
+The page is one document for every path; its script reads the path. It loads nothing from any other host and runs
 no script that does not come as a file of its own, and the headers hold the browser to that.
 """
 
@@ -33,7 +33,7 @@ NOT_BUILT = """<!DOCTYPE html>
 
 
 def page(folder: Path = FOLDER) -> Response:
-    """The document of the page; 503 with the remedy where it was not built."""
+    """The document of the page; status 503 with the remedy where it is not built."""
     index = folder / "index.html"
     headers = {**HEADERS, "Cache-Control": "no-cache"}
     if not index.is_file():
@@ -42,10 +42,10 @@ def page(folder: Path = FOLDER) -> Response:
 
 
 def asset(request: Request, name: str, folder: Path = FOLDER) -> Response:
-    """A file the page loads, packed where the browser takes it; its name holds its hash, so it may be kept for good."""
+    """A file of the page, packed where the browser accepts it. Its name holds its hash, so browsers may keep it."""
     path = folder / "assets" / name
     if not NAME.fullmatch(name) or not path.is_file():
-        return Response("there is no such file of the page\n", 404, HEADERS, "text/plain; charset=utf-8")
+        return Response("the page has no such file\n", 404, HEADERS, "text/plain; charset=utf-8")
     headers = {**HEADERS, "Cache-Control": "public, max-age=31536000, immutable", "Vary": "Accept-Encoding"}
     data = path.read_bytes()
     if "gzip" in request.headers.get("accept-encoding", ""):

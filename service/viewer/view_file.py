@@ -1,4 +1,4 @@
-"""view.bin: one immutable file with what a page needs to show a job, in the order in which it is needed.
+"""view.bin: one immutable file with the data that a page needs to show a job, in the order in which it needs them.
 
     8 bytes    ZMVIEW1 and a line break
     4 bytes    length of the head, little endian
@@ -6,9 +6,9 @@
     chunks     deflated, one behind the other; 'at' and 'size' count bytes from the end of the head
 
 A chunk is a table of whole numbers, column after column. A column of n rows and k values of w bytes is stored as k * w
-planes of n bytes, value by value, the lowest byte first; equal high bytes deflate to nothing. Where a column is of
-differences each row is stored as its difference from the row before (the first from 0), and 0, -1, 1, -2 as 0, 1, 2, 3;
-so are columns that may be negative. The page reads it in web/src/shared/view-file.ts.
+planes of n bytes, value by value, the lowest byte first; equal high bytes deflate to nothing. A column of the form
+'steps' stores each row as its difference from the row before, the first from 0. The forms 'steps' and 'signed' store
+0, -1, 1, -2 as 0, 1, 2, 3. The page reads the file in web/src/shared/view-file.ts.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Column:
 
     values : (n,) or (n, k) whole numbers
     width  : bytes of each as stored, 1 to 4
-    form   : 'plain' (not negative), 'signed', or 'steps': differences from row to row
+    form   : 'plain' (not negative), 'signed', or 'steps' (differences from row to row)
     """
 
     values: NDArray[Any]
@@ -44,7 +44,7 @@ class Column:
     form: str = "plain"
 
     def rows(self) -> I64:
-        """(n, k) int64."""
+        """The values as a table, (n, k) int64."""
         values = np.asarray(self.values, dtype=np.int64)
         return values[:, None] if values.ndim == 1 else values
 
@@ -54,7 +54,7 @@ class Column:
         Raises
         ------
         InternalError
-            A value does not fit its width (``view_width``).
+            Code 'view_width': a value does not fit its width.
         """
         rows = self.rows()
         if self.form == "steps":
@@ -70,11 +70,11 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """A table with words about it.
+    """A table with its description.
 
     kind    : 'mesh', 'edges', 'path' or 'field'
-    about   : what else the head says of it, for example {'label': 3, 'lod': 0}
-    columns : by name, in the order they are stored
+    about   : further keys of its entry in the head, for example {'label': 3, 'lod': 0}
+    columns : by name, in the order of the file
     """
 
     kind: str
@@ -98,12 +98,12 @@ def write_view(head: Mapping[str, Any], chunks: Sequence[Chunk]) -> bytes:
     """The bytes of a view file.
 
     head   : plain data without the key 'chunks'
-    chunks : in the order they are to arrive
+    chunks : in the order in which the page needs them
 
     Raises
     ------
     InternalError
-        A value does not fit its column (``view_width``).
+        Code 'view_width': a value does not fit its column.
     """
     parts: list[bytes] = []
     listed: list[dict[str, Any]] = []
@@ -120,12 +120,12 @@ def write_view(head: Mapping[str, Any], chunks: Sequence[Chunk]) -> bytes:
 
 
 def read_view(data: bytes) -> tuple[dict[str, Any], list[dict[str, I64]]]:
-    """Head and chunks of a view file; of each chunk (n, k) int64 by the name of its column.
+    """Head and chunks of a view file; each chunk holds its columns by name, (n, k) int64.
 
     Raises
     ------
     ValueError
-        It is no view file, or cut off.
+        The bytes are no view file, or the file is cut off.
     """
     if data[:8] != MAGIC or len(data) < 12:
         raise ValueError("no view file")

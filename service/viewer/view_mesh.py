@@ -1,8 +1,8 @@
-"""The part for a page: facets that belong to one zone, one entry of the remainder or to nobody, with what was measured.
+"""The part for a page: facets with their zone or entry of the remainder, and the measured deviation.
 
-Faces that samples of the proof lie on are divided to about ``PITCH`` and cut where the label of the nearest sample of
-the same face changes; a corner carries the worst that was measured at the samples nearer to it than to any other. The
-rest of the part keeps the facets of its mesh.
+Faces with samples of the proof are divided to about ``PITCH`` and cut where the label of the nearest sample of the same
+face changes. A corner carries the worst deviation of the samples that are nearest to it. Other faces keep the facets of
+the mesh.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from geometry.trimming.facet_sheet import FacetSheet, refined, sheet_of, sides_o
 from geometry.trimming.label_query import LabelQuery, bisect
 from service.viewer.view_file import Chunk, Column
 
-PITCH, MOST = 0.8, 120_000  # mm between nodes, wider where that would be more facets
+PITCH, MAX_FACETS = 0.8, 120_000  # mm between nodes, wider where they would make more facets than that
 NEAR = 0.1  # mm, how near a border is to the change of label
 GRID, UNIT = 0.001, 127  # mm of places; length of normals
-LEFT_UNIT, LEFT_MOST = 0.0002, 32_000  # mm, and the most of them
+LEFT_UNIT, MAX_LEFT_UNITS = 0.0002, 32_000  # mm, unit of deviations, and its largest number
 NOBODY = -1  # label of faces without samples
 UNJUDGED, JUDGED, UNCUT = 0, 1, 2  # of a corner
-FEW = 24_000  # facets for which a rough level is not worth while
+MAX_FACETS_ONE_LEVEL = 24_000  # up to here there is no rough level
 CELLS = 90  # of the rough level, along the diagonal of the part
 I64 = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """What is known at the samples of the proof, frame of the setup.
+    """The figures of the proof at its samples, setup frame.
 
     samples : SurfaceSamples, n of them
-    label   : (n,) int64, what each belongs to, from 0
+    label   : (n,) int64, index: zone or entry of the remainder, from 0
     excess  : (n,) float64, mm over the allowance, negative where cut too deep
-    reached : (n,) bool, whether a feed move took something off there
-    scallop, gouge : mm, the budget
+    reached : (n,) bool, whether a feed move removed stock there
+    scallop, gouge : mm, allowed
     """
 
     samples: SurfaceSamples
@@ -52,7 +52,7 @@ class Judged:
 
     @property
     def badness(self) -> F64:
-        """(n,) float64, excess in times of what is allowed."""
+        """Excess over the allowed value, (n,) float64, dimensionless."""
         low, high = max(self.gouge, 1e-9), max(self.scallop, 1e-9)
         return np.asarray(np.where(self.excess > 0.0, self.excess / high, -self.excess / low))
 
@@ -61,9 +61,13 @@ class Judged:
 class Facets:
     """Facets with one label each.
 
-    place, normal : (n, 3) float64, mm and unit, of corners; face : (n,) int32, their face numbers
-    left  : (n,) float64, mm, the worst round a corner; judged : (n,) int64, whether anything was measured there
-    corners : (t, 3) int64, rows of these; label : (t,) int64
+    place   : (n, 3) float64, mm, setup frame, corners
+    normal  : (n, 3) float64, dimensionless, setup frame, unit, at the corners
+    face    : (n,) int32, index: face number of each corner
+    left    : (n,) float64, mm, worst deviation near a corner
+    judged  : (n,) int64, index: UNJUDGED, JUDGED or UNCUT
+    corners : (t, 3) int64, index: corners of each facet
+    label   : (t,) int64, index: label of each facet
     """
 
     place: F64
@@ -76,7 +80,7 @@ class Facets:
 
 
 def facets_of(part: Part, judged: Judged) -> Facets:
-    """The facets of a part, setup frame, labelled and judged by samples."""
+    """The facets of a part, setup frame, with labels and deviations from samples."""
     s = judged.samples
     faces = [int(f) for f in np.unique(s.face)]
     others = [f.number for f in part.faces if f.number not in set(faces)]
@@ -87,7 +91,7 @@ def facets_of(part: Part, judged: Judged) -> Facets:
             return np.where(row >= 0, judged.label[row], NOBODY)
 
         area = float(part.mesh.areas[np.isin(part.mesh.face_ids, faces)].sum())
-        pitch = max(PITCH, float(np.sqrt(2.0 * area / MOST)))
+        pitch = max(PITCH, float(np.sqrt(2.0 * area / MAX_FACETS)))
         sheets.append(_cut(refined(sheet_of(part, faces), pitch), LabelQuery(label)))
     if others:
         bare = sheet_of(part, others)
@@ -103,7 +107,7 @@ def facets_of(part: Part, judged: Judged) -> Facets:
 
 
 def _cut(sheet: FacetSheet, ask: LabelQuery) -> FacetSheet:
-    """The facets of a sheet cut along straight lines where the label of their corners changes."""
+    """Cut the facets of a sheet along straight lines where the label of their corners changes."""
     at = ask(sheet.nodes, sheet.face)
     mixed = (at[sheet.corners] != at[sheet.corners[:, :1]]).any(axis=1)
     whole, c = sheet.corners[~mixed], sheet.corners[mixed]
@@ -133,7 +137,10 @@ def _cut(sheet: FacetSheet, ask: LabelQuery) -> FacetSheet:
 
 
 def _measured(place: F64, face: I32, judged: Judged, near: KeyedPoints) -> tuple[F64, I64]:
-    """(n,) mm and (n,) whether: the worst of the samples each place is the nearest of its face to, else the nearest."""
+    """Worst deviation at each place, (n,) float64, mm, and its kind, (n,) int64, index.
+
+    It covers the samples whose nearest place of the same face this is; without any, the nearest sample counts.
+    """
     s = judged.samples
     left, known = np.zeros(len(place)), np.full(len(place), UNJUDGED, np.int64)
     if not len(s):
@@ -154,17 +161,17 @@ def _measured(place: F64, face: I32, judged: Judged, near: KeyedPoints) -> tuple
 
 
 def mesh_chunks(f: Facets, low: F64) -> tuple[list[Chunk], list[Chunk]]:
-    """The facets as chunks, one a label: those to be shown first, and those that take their places.
+    """The facets as chunks, one for each label: a rough level to show first, and the fine level that replaces it.
 
-    low : (3,) float64, mm, place of the grid's zero
+    low : (3,) float64, mm, setup frame, zero of the grid
     """
-    if len(f.corners) <= FEW:
+    if len(f.corners) <= MAX_FACETS_ONE_LEVEL:
         return _by_label(f, low, 0), []
     return _by_label(clustered(f), low, 0), _by_label(f, low, 1)
 
 
 def clustered(f: Facets) -> Facets:
-    """The facets with the corners of a cell and face as one; facets that lose a corner are left out."""
+    """The facets with all corners of a face in one grid cell merged; facets that lose a corner are left out."""
     cell = max(float(np.linalg.norm(np.ptp(f.place, axis=0))) / CELLS, 1e-9)
     key = np.column_stack([np.floor((f.place - f.place.min(axis=0)) / cell).astype(np.int64), f.face])
     _, first, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
@@ -183,7 +190,7 @@ def _by_label(f: Facets, low: F64, lod: int) -> list[Chunk]:
     for label in np.unique(f.label).tolist():
         corners = f.corners[f.label == label]
         used, place = np.unique(corners, return_inverse=True)
-        left = np.clip(np.rint(f.left[used] / LEFT_UNIT), -LEFT_MOST, LEFT_MOST)
+        left = np.clip(np.rint(f.left[used] / LEFT_UNIT), -MAX_LEFT_UNITS, MAX_LEFT_UNITS)
         out.append(Chunk("mesh", {"label": int(label), "lod": lod}, {
             "place": Column(np.rint((f.place[used] - low) / GRID), 4, "steps"),
             "normal": Column(np.rint(f.normal[used] * UNIT), 1, "signed"),
@@ -194,9 +201,10 @@ def _by_label(f: Facets, low: F64, lod: int) -> list[Chunk]:
 
 
 def edge_chunk(part: Part, low: F64, spacing: float) -> Chunk:
-    """Sharp edges of the part as polylines, their points about a spacing, mm, apart; ``begins`` counts the points.
+    """Sharp edges of the part as polylines; column ``begins`` holds the first point of each.
 
-    low : (3,) float64, mm, place of the grid's zero
+    low     : (3,) float64, mm, setup frame, zero of the grid
+    spacing : mm between points
     """
     lines = []
     for e in part.edges:
@@ -211,7 +219,7 @@ def edge_chunk(part: Part, low: F64, spacing: float) -> Chunk:
 
 
 def top_of(part: Part, faces: Sequence[int]) -> list[float] | None:
-    """A place at the upper end of some faces, (3,) mm, for a name to stand at; None where they have no facets."""
+    """A place at the upper end of faces for their label, (3,) mm, setup frame; None where they have no facets."""
     points = part.mesh.triangles[np.isin(part.mesh.face_ids, list(faces))].reshape(-1, 3)
     if not len(points):
         return None

@@ -1,8 +1,8 @@
-"""The way of the tool for a page: moves of the programs that were simulated, with time stamps, in two levels of detail.
+"""The track of the tool for a page: moves of the simulated programs with times, in two levels of detail.
 
-The texts are read once more by the verifier's reader, so what is shown is what was proved, links and tool changes with
-it. A job that is not proved gives no program away: its way is drawn on a grid and thinned by ``COARSE``, as fine as the
-pictures of such a job, its times are whole seconds, and it has neither feeds, speeds nor lines.
+The reader of the proof reads the programs once more, so the page shows what was proved, with links and tool changes. An
+unproved job gives no program away: its track lies on a grid and is thinned by ``COARSE``, as fine as the pictures of
+such a job. Its times are whole seconds, and it has no feeds, speeds or lines.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from verify.gcode.reader import FEED
 from verify.model import NcProgram
 from verify.program.move_times import minutes_of
 
-GRID, FINE, ROUGH = 0.001, 0.002, 0.1  # mm: places, and how far a drawn way may be off in the two levels
-COARSE = 0.25  # mm, grid and thinning of what is not proved
-START, RAPID, CUT = 0, 1, 2  # kinds of a row: a way begins here, or what the move that ends here is
+GRID, FINE, ROUGH = 0.001, 0.002, 0.1  # mm: grid of places, and error of a drawn track in the two levels
+COARSE = 0.25  # mm, grid and thinning of an unproved track
+START, RAPID, CUT = 0, 1, 2  # kinds of a row: a track begins here, or the kind of the move that ends here
 AXIS_UNIT = 32_000
 STEP_WORD = re.compile(r"^\s*[;(]\s*(?:-\s*)?(S\d+)\b")
 I64 = NDArray[np.int64]
@@ -33,7 +33,13 @@ BOOL = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Stand:
-    """How a tool stands at a moment: seconds from the start of the job, row of the steps, tip (3,) mm, axis (3,)."""
+    """Position of a tool at a moment of the job.
+
+    seconds : s, from the start of the job
+    step    : row of the steps
+    tip     : (3,) float64, mm, setup frame
+    axis    : (3,) float64, dimensionless, setup frame, unit, from the tip to the spindle
+    """
 
     seconds: float
     step: int
@@ -42,15 +48,18 @@ class Stand:
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class ToolTrack:
     """All moves of a job one after the other, setup frame.
 
-    start, end : (m, 3) float64, mm, of the tip; axis : (m, 3) float64, unit, tip to spindle, at the end
-    feed       : (m,) bool; begun, ended : (m,) float64, s, from the start of the job
-    line, tool : (m,) int64, of the program; program : (m,) int64, which
-    step       : (m,) int64, row of ``steps``
-    steps      : what the moves belong to, in order
-    names      : of the programs
+    start, end   : (m, 3) float64, mm, setup frame, tip
+    axis         : (m, 3) float64, dimensionless, setup frame, unit, from the tip to the spindle, at the end
+    feed         : (m,) bool, whether the move is a feed move
+    begun, ended : (m,) float64, s, from the start of the job
+    line, tool   : (m,) int64, index: line and T number in the program
+    program      : (m,) int64, index: place of the program in ``names``
+    step         : (m,) int64, index: row of ``steps``
+    steps        : workingsteps of the moves, in order
+    names        : of the programs
     """
 
     start: F64
@@ -67,10 +76,10 @@ class Way:
     names: tuple[str, ...]
 
     def stand(self, program: str, line: int, place: Sequence[float] | None, deep: float = 0.0) -> Stand | None:
-        """How the tool stands on a line, where it is nearest to a place; None where there is no such line.
+        """Position of the tool on a line, nearest to a place; None where there is no such line.
 
-        place : (3,) mm; None: where the line begins
-        deep  : mm that the tool is to be beyond the place, along its axis
+        place : (3,) mm, setup frame; None: where the line begins
+        deep  : mm that the tool stands beyond the place, along its axis
         """
         if program not in self.names or line < 1:
             return None
@@ -90,13 +99,13 @@ class Way:
                      self.axis[row])
 
 
-def way_of(readings: Sequence[FramedProgram], programs: Sequence[NcProgram], rotation: F64,
-           planned: Sequence[dict[str, Any]] = ()) -> Way:
-    """The way of the tool through programs.
+def track_of(readings: Sequence[FramedProgram], programs: Sequence[NcProgram], rotation: F64,
+           planned: Sequence[dict[str, Any]] = ()) -> ToolTrack:
+    """The track of the tool through programs.
 
     readings : of the programs, as ``verify.checks.program_sequence.read_all`` gives them
-    rotation : (3, 3) float64, from the setup frame to that of the proof, no unit
-    planned  : the steps of the report, whose ids stand in comments of the programs; without, a step is a tool
+    rotation : (3, 3) float64, dimensionless, from the setup frame to that of the proof
+    planned  : steps of the report, whose ids stand in comments of the programs; without them each tool is a step
     """
     known = {s["id"]: s for s in planned}
     steps: list[dict[str, Any]] = []
@@ -112,11 +121,11 @@ def way_of(readings: Sequence[FramedProgram], programs: Sequence[NcProgram], rot
                       np.full(len(p), k, np.int64), step))
     if not parts:
         none, no = np.zeros((0, 3)), np.zeros(0, np.int64)
-        return Way(none, none, none, np.zeros(0, np.bool_), np.zeros(0), np.zeros(0), no, no, no, no, (), ())
+        return ToolTrack(none, none, none, np.zeros(0, np.bool_), np.zeros(0), np.zeros(0), no, no, no, no, (), ())
     start, end, axis, feed, begun, ended, line, tool, program, step = map(np.concatenate, zip(*parts, strict=True))
     there = np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)
-    return Way(start[there], end[there], axis[there], feed[there], begun[there], ended[there], line[there], tool[there],
-               program[there], step[there], tuple(steps), tuple(p.name for p in programs))
+    return ToolTrack(start[there], end[there], axis[there], feed[there], begun[there], ended[there], line[there],
+                     tool[there], program[there], step[there], tuple(steps), tuple(p.name for p in programs))
 
 
 def _axes(r: FramedProgram) -> F64:
@@ -126,7 +135,7 @@ def _axes(r: FramedProgram) -> F64:
 
 def _steps(line: I64, tool: I64, given: NcProgram, known: dict[str, dict[str, Any]],
            steps: list[dict[str, Any]]) -> I64:
-    """(m,) row of ``steps``, to which those of this program are added, for every move of it."""
+    """Row of ``steps`` for every move of a program, (m,) int64, index; adds the steps of the program to ``steps``."""
     first = len(steps)
     marks: list[tuple[int, str]] = []
     for number, text in enumerate(given.text.split("\n"), 1) if known else ():
@@ -145,25 +154,26 @@ def _steps(line: I64, tool: I64, given: NcProgram, known: dict[str, dict[str, An
     return np.asarray(change + first, np.int64)
 
 
-def path_chunks(way: Way, low: F64, *, open_: bool) -> tuple[list[Chunk], list[Chunk], list[dict[str, Any]], float]:
-    """The way as chunks, step by step: rough, fine; and the steps with tool, times and axis, and mm of the grid.
+def path_chunks(track: ToolTrack, low: F64, *,
+                open_: bool) -> tuple[list[Chunk], list[Chunk], list[dict[str, Any]], float]:
+    """The track as chunks, step by step: rough, fine; the steps with tool, times and axis; and the grid, mm.
 
-    low   : (3,) float64, mm, place of the grid's zero
-    open_ : whether the program may be known; else there is the rough level only
+    low   : (3,) float64, mm, setup frame, zero of the grid
+    open_ : whether the program may be shown; else there is the rough level only
     """
     grid, rough = (GRID, ROUGH) if open_ else (COARSE, COARSE)
     first, then, steps = [], [], []
-    for k, words in enumerate(way.steps):
-        rows = np.flatnonzero(way.step == k)
+    for k, words in enumerate(track.steps):
+        rows = np.flatnonzero(track.step == k)
         if not len(rows):
             steps.append({**words, "tool": 0, "start_s": 0.0, "end_s": 0.0, "axis": [0.0, 0.0, 1.0]})
             continue
-        turned = bool(np.ptp(way.axis[rows], axis=0).max() > 1e-6)
-        axis = None if turned else [round(v, 6) + 0.0 for v in way.axis[rows[0]].tolist()]
+        turned = bool(np.ptp(track.axis[rows], axis=0).max() > 1e-6)
+        axis = None if turned else [round(v, 6) + 0.0 for v in track.axis[rows[0]].tolist()]
         digits = 3 if open_ else 0
-        steps.append({**words, "tool": int(way.tool[rows[0]]), "start_s": round(float(way.begun[rows[0]]), digits),
-                      "end_s": round(float(way.ended[rows[-1]]), digits), "axis": axis})
-        line = _Line(way, rows)
+        steps.append({**words, "tool": int(track.tool[rows[0]]), "start_s": round(float(track.begun[rows[0]]), digits),
+                      "end_s": round(float(track.ended[rows[-1]]), digits), "axis": axis})
+        line = _Line(track, rows)
         first.append(_chunk(line.thinned(rough), k, 0, low, grid, open_, turned))
         if open_:
             then.append(_chunk(line.thinned(FINE, by_line=True), k, 1, low, grid, open_, turned))
@@ -171,29 +181,29 @@ def path_chunks(way: Way, low: F64, *, open_: bool) -> tuple[list[Chunk], list[C
 
 
 class _Line:
-    """The moves of a step as rows: places, kinds, times, axes and lines."""
+    """The moves of a step as rows: places, kinds, times, axes and lines of the program."""
 
-    def __init__(self, way: Way, rows: I64) -> None:
-        start, end = way.start[rows], way.end[rows]
+    def __init__(self, track: ToolTrack, rows: I64) -> None:
+        start, end = track.start[rows], track.end[rows]
         broken = np.ones(len(rows), np.bool_)
         broken[1:] = np.abs(start[1:] - end[:-1]).max(axis=1) > 1e-6
         at = np.arange(len(rows)) + np.cumsum(broken)  # where the end of each move goes
         size = len(rows) + int(broken.sum())
         self.kind = np.zeros(size, np.int64)
-        self.kind[at] = np.where(way.feed[rows], CUT, RAPID)
+        self.kind[at] = np.where(track.feed[rows], CUT, RAPID)
         self.place, self.axis = np.zeros((size, 3)), np.zeros((size, 3))
         self.time, self.line = np.zeros(size), np.zeros(size, np.int64)
-        for to, move, places, times in ((at, np.arange(len(rows)), end, way.ended[rows]),
+        for to, move, places, times in ((at, np.arange(len(rows)), end, track.ended[rows]),
                                         (at[broken] - 1, np.flatnonzero(broken), start[broken],
-                                         way.begun[rows][broken])):
+                                         track.begun[rows][broken])):
             self.place[to], self.time[to] = places, times
-            self.axis[to], self.line[to] = way.axis[rows[move]], way.line[rows[move]]
+            self.axis[to], self.line[to] = track.axis[rows[move]], track.line[rows[move]]
 
     def thinned(self, tolerance: float, *, by_line: bool = False) -> tuple[F64, I64, F64, F64, I64]:
-        """Rows that are kept where the way may be off by a tolerance, mm.
+        """Rows that are kept where the track may be off by a tolerance, mm.
 
-        by_line : the end of each line of the program stays. Feeds change from line to line, on straight ways too, and
-                  the tool is to be where the program has it at a second, and that line to be the one that is told
+        by_line : keep the end of each line of the program. Feeds change from line to line, on straight tracks too. So
+                  the page shows the tool where the program has it at a second, and the right line
         """
         keep = thinned(self.place, self.kind, tolerance, np.linalg.norm(np.diff(self.axis, axis=0), axis=1),
                        self.line if by_line else None)
@@ -201,20 +211,21 @@ class _Line:
 
 
 def thinned(place: F64, kind: I64, tolerance: float, turned: F64 | None = None, line: I64 | None = None) -> I64:
-    """Rows of a polyline that are kept: every row left out is within the tolerance of the line that is left.
+    """Rows of a polyline that are kept: every row left out lies within the tolerance of the remaining polyline.
 
-    place  : (n, 3) float64, mm; kind : (n,) int64, what leads to each row; rows at which it changes stay
+    place     : (n, 3) float64, mm, any frame
+    kind      : (n,) int64, index: kind of the move to each row; rows where it changes stay
     tolerance : mm
-    turned : (n - 1,) float64, rad, by which the tool turns on the way to the next row; such rows stay
-    line   : (n,) int64, of the program; the last row of each stays
+    turned    : (n - 1,) float64, rad, turn of the tool up to the next row; such rows stay
+    line      : (n,) int64, index: line of the program; the last row of each stays
 
-    Returns (k,) int64 row numbers.
+    Returns (k,) int64, index: the rows.
 
     Notes
     -----
-    Every second row is left out where it is within what its neighbours' own omissions leave of the tolerance, until
-    none is. The bound is the sum of what each round was off by: a row left out in one round is within e of a
-    segment both of whose ends are within d of the next one, so within d + e of that.
+    Each round leaves out every second row that lies within the tolerance less the error of its neighbours, until no
+    row is left out. Errors of the rounds add up: a row left out in one round lies within e of a segment whose ends lie
+    within d of the next polyline, so it lies within d + e of that.
     """
     rows = np.arange(len(place))
     off = np.zeros(max(len(place) - 1, 0))  # of the segment behind each row
@@ -261,4 +272,4 @@ def _chunk(rows: tuple[F64, I64, F64, F64, I64], step: int, lod: int, low: F64, 
     return Chunk("path", {"step": step, "lod": lod}, columns)
 
 
-__all__ = ["Stand", "Way", "path_chunks", "thinned", "way_of"]
+__all__ = ["Stand", "ToolTrack", "path_chunks", "thinned", "track_of"]

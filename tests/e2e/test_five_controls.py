@@ -15,9 +15,9 @@ from output.gcode.dialects import DIALECTS
 from schemas.machine import DIALECT_ENDINGS
 from service import pipeline
 from service.cli import app
+from service.delivery.result_files import clear_results
 from service.from_wire import parse_setup
 from service.stages import programs
-from service.stages.result_files import clear_results
 from tests.step_files import write_step
 from verify.gcode.dialects import DIALECTS as READ
 

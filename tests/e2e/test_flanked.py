@@ -13,6 +13,7 @@ import pytest
 from geometry.mesh import F64
 from service import pipeline
 from service.from_wire import parse_setup
+from service.stages.job_inputs import JobInputs
 from service.stages.preparation import prepare
 from service.stages.programs import turning_of
 from verify.gcode.reader import read_program
@@ -89,5 +90,5 @@ def test_a_machine_that_only_indexes_is_given_no_pass_whose_axis_moves(part: Pat
     setup = parse_setup(json.dumps(SETUP | {"machine": {**MACHINE, "simultaneous": False}}))
     ready = prepare(part, setup, quiet)
     assert turning_of(ready, ready.views[0]) is None
-    moving = replace(ready, setup=parse_setup(json.dumps(SETUP)))
+    moving = replace(ready, inputs=JobInputs.of(parse_setup(json.dumps(SETUP))))
     assert turning_of(moving, ready.views[0]) is not None

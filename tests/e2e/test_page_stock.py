@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from geometry.tool_body import ToolBody
-from service.stages.access_plan import Look
+from service.stages.access_plan import ProofFrame
 from service.viewer import view_stock
 from service.viewer.view_data import tool_shape
 from service.viewer.view_file import Chunk, read_view, write_view
-from service.viewer.view_paths import AXIS_UNIT, path_chunks, way_of
+from service.viewer.view_paths import AXIS_UNIT, path_chunks, track_of
 from service.viewer.view_stock import stock_chunk
 from tests.e2e.test_page import ROOT, node
 from tests.pocket_case import SETUP, block
@@ -51,8 +51,8 @@ def view_of(read, stretches, nodes=20_000, open_=True):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(view_stock, "STRETCHES", stretches)
         patch.setattr(view_stock, "NODES", nodes)
-        field = stock_chunk(read, PART, TOOLS, MACHINE, Look("A1", TURN, PART), open_=open_)
-    way = way_of(read, [NcProgram("p.ngc", TURNING)], TURN)
+        field = stock_chunk(read, PART, TOOLS, MACHINE, ProofFrame("A1", TURN, PART), open_=open_)
+    way = track_of(read, [NcProgram("p.ngc", TURNING)], TURN)
     low = np.floor(np.minimum(way.start, way.end).min(axis=0))
     first, then, steps, grid = path_chunks(way, low, open_=open_)
     chunks: list[Chunk] = [*first, field, *then]

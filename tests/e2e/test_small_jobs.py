@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from service import pipeline
 from service.cli import app
-from service.stages.result_files import RESULT_FILES
+from service.delivery.result_files import RESULT_FILES
 from tests.step_files import write_step
 
 cq = pytest.importorskip("cadquery")

@@ -9,6 +9,7 @@ import pytest
 from examples.setups import setup_with, tool
 from schemas.setup import Setup
 from service import pipeline
+from service.stages import plan_prove_loop
 from service.stages.preparation import prepare
 from service.stages.wall_support import FREE_RATIO, PLANNED_RATIO, band_planes
 from tests.decomposition_shapes import box
@@ -50,9 +51,10 @@ def test_the_plan_holds_both_sides_and_the_order_of_before_does_not(wall, tmp_pa
     assert support["walls"] == 1 and support["places"] > 100 and support["places_over"] == 0
     assert support["most_ratio"] <= PLANNED_RATIO + 1.0 and support["limit_ratio"] == FREE_RATIO
     steps = [s["strategy"] for s in banded["steps"]]
-    assert steps.count("depth_layers") == 2 and steps.index("waterline") < len(steps) - 1 - steps[::-1].index("depth_layers")
-    monkeypatch.setattr(pipeline, "band_planes", lambda *_: ())
-    monkeypatch.setattr(pipeline, "PLANS", 1)
+    last_layers = len(steps) - 1 - steps[::-1].index("depth_layers")
+    assert steps.count("depth_layers") == 2 and steps.index("waterline") < last_layers
+    monkeypatch.setattr(plan_prove_loop, "band_planes", lambda *_: ())
+    monkeypatch.setattr(plan_prove_loop, "MAX_PLANS", 1)
     whole = plan(wall, tmp_path / "whole", setup())
     assert whole["state"] == "unproved" and set(whole["finding_counts"]) == {"support"}
     assert 14.0 < whole["proof"]["support"]["most_ratio"] < 9.5 / 0.6 + 1.0  # the last layer at the foot still stands

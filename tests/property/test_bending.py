@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from schemas.materials import MATERIALS
 from service.from_wire import parse_setup
-from service.pipeline import cut_table
+from service.stages.job_inputs import JobInputs
 from toolpath.tool_deflection import MIN_SHARE
 
 KINDS = st.sampled_from(["ball", "flat", "bull"])
@@ -23,8 +23,8 @@ def table(material, kind, diameter, neck, stickout, **more):
             "flute_length_mm": 1.5 * diameter, "neck_diameter_mm": 0.95 * diameter,
             "neck_length_mm": neck * diameter, "shank_diameter_mm": max(6.0, diameter),
             "stickout_mm": (neck + stickout) * diameter, **more}
-    return cut_table(parse_setup(json.dumps({"tools": [tool], "material": material,
-                                             "quality": {"scallop_height_mm": 0.005}})))["T1"]
+    given = {"tools": [tool], "material": material, "quality": {"scallop_height_mm": 0.005}}
+    return JobInputs.of(parse_setup(json.dumps(given))).cut_table["T1"]
 
 
 @settings(max_examples=150, deadline=None)
@@ -74,5 +74,5 @@ def test_a_finish_that_climbs_may_leave_what_a_cusp_may_and_one_that_may_dig_hal
     tool = {"id": "T1", "kind": "flat", "diameter_mm": 6, "flute_length_mm": 12, "stickout_mm": 40}
     given = {"tools": [tool], "operations": {"cut_direction": direction},
              "quality": {"scallop_height_mm": 0.03, "gouge_tolerance_mm": 0.008}}
-    cut = cut_table(parse_setup(json.dumps(given)))["T1"]
+    cut = JobInputs.of(parse_setup(json.dumps(given))).cut_table["T1"]
     assert cut.finish.under(1.0, 0.1).bend.limit == pytest.approx(limit) and cut.bend.limit == 0.05

@@ -9,12 +9,13 @@ import os
 import signal
 
 import service.pipeline as chain
+import service.stages.plan_prove_loop as loop
 import service.stages.resume as resume
 from service.pipeline import verify_program, zones_only  # noqa: F401
 from toolpath.plan_checkpoint import CheckpointKeeper
 from toolpath.planning.job_plan import plan_job
 
-PROVE = chain.prove
+PROVE = loop.prove
 ACTS = 3
 resume.ACTS_EVERY_S = resume.ACTS_PAUSE = 0.0  # each act is kept
 
@@ -56,5 +57,5 @@ def plan(part_path, setup, out, progress, kept=None, **more):
         said("proved")
         return proof
 
-    chain.prove = prove
+    loop.prove = prove
     return chain.plan(part_path, setup, out, progress, planner=planner, kept=kept, **more)

@@ -14,8 +14,8 @@ from examples.demo import demo_setup
 from schemas.materials import MATERIALS
 from service.cutting_data import MAX_CHIP_THINNING, chip_thinning, cutting_data
 from service.from_wire import parse_setup, tool_bodies
-from service.pipeline import cut_table
 from service.stages.cautions import bent, dry, limited, uncut_centres
+from service.stages.job_inputs import JobInputs
 from tests.synthetic_plan import BALL as SLIM
 from tests.synthetic_plan import step
 from toolpath.planning.job_plan import LATTICE_CARE
@@ -72,19 +72,19 @@ def test_a_bound_on_the_engaged_angle_feeds_layers_faster_and_no_finish():
 
 def test_what_the_setup_says_of_a_tool_stands_and_is_held_to_the_limits():
     own = {"spindle_rpm": 9000, "feed_mm_min": 321, "plunge_feed_mm_min": 55}
-    cut = cut_table(setup({**BALL, **own}))["T1"]
+    cut = JobInputs.of(setup({**BALL, **own})).cut_table["T1"]
     assert (cut.spindle_rpm, cut.feed, cut.plunge_feed) == (9000, 321, 55)
     assert (cut.finish.spindle_rpm, cut.finish.feed, cut.finish.plunge_feed) == (9000, 321, 55)
-    assert limited(setup({**BALL, **own})) == []
+    assert limited(JobInputs.of(setup({**BALL, **own}))) == []
     slow = setup({**BALL, **own}, {**FLAT, "spindle_rpm": 7000, "max_rpm": 5000},
                  machine={"max_rpm": 8000, "max_feed_mm_min": 200})
-    told = limited(slow)
+    told = limited(JobInputs.of(slow))
     assert [(c.subjects, c.measured, c.limit) for c in told] == [
         (("T1",), 9000, 8000), (("T1",), 321, 200), (("T2",), 7000, 5000)]
-    assert told[0].sentence == ("tool T1: spindle_rpm 9000 is more than machine.max_rpm 8000; it runs at 8000; ask for "
-                                "no more, or correct the limit")
+    assert told[0].sentence == ("tool T1: spindle_rpm 9000 is more than machine.max_rpm 8000; it runs at 8000; lower "
+                                "the figure, or correct the limit")
     assert "its max_rpm 5000" in told[2].message
-    cut = cut_table(slow)["T1"]
+    cut = JobInputs.of(slow).cut_table["T1"]
     assert (cut.spindle_rpm, cut.feed, cut.plunge_feed, cut.link_feed) == (8000, 200, 55, 200)
     only = cutting_data(slow.material, setup({**BALL, "spindle_rpm": 1000}).tools[0], slow.machine)
     assert only.feed == pytest.approx(1000 * 2 * 0.020)  # the feed follows the speed
@@ -92,17 +92,17 @@ def test_what_the_setup_says_of_a_tool_stands_and_is_held_to_the_limits():
 
 def test_an_own_figure_may_pass_the_caution_for_machines_that_state_no_limit():
     fast = setup({**BALL, "spindle_rpm": 40000, "feed_mm_min": 9000})
-    cut = cut_table(fast)["T1"]
-    assert (cut.spindle_rpm, cut.feed) == (40000, 9000) and limited(fast) == []
+    cut = JobInputs.of(fast).cut_table["T1"]
+    assert (cut.spindle_rpm, cut.feed) == (40000, 9000) and limited(JobInputs.of(fast)) == []
 
 
 def test_figures_for_coolant_are_told_of_where_there_is_none():
     own = {**FLAT, "spindle_rpm": 4000, "feed_mm_min": 300}
-    assert dry(setup(BALL, own)) == []
-    (told,) = dry(setup(BALL, own, machine={"coolant": "off"}))
+    assert dry(JobInputs.of(setup(BALL, own))) == []
+    (told,) = dry(JobInputs.of(setup(BALL, own, machine={"coolant": "off"})))
     assert told.kind == "dry" and told.subjects == ("T1",) and "cuts dry" in told.message
     half = {**FLAT, "spindle_rpm": 4000}
-    assert [c.subjects for c in dry(setup(half, machine={"coolant": "off"}))] == [("T2",)]
+    assert [c.subjects for c in dry(JobInputs.of(setup(half, machine={"coolant": "off"})))] == [("T2",)]
 
 
 @pytest.mark.parametrize("seed", range(len(OVERRIDES)))
@@ -115,7 +115,7 @@ def test_no_figure_of_the_demo_tools_is_zero_or_above_a_limit(seed):
 def test_the_sweep_notices_what_it_should(monkeypatch):
     """A check that cannot fail is none."""
     job = setup(BALL, machine={"max_rpm": 5000, "max_feed_mm_min": 100})
-    cut = cut_table(job)["T1"]
+    cut = JobInputs.of(job).cut_table["T1"]
     for wrong in ({"feed": math.nan}, {"feed": 0.0}, {"plunge_feed": 100.2}, {"spindle_rpm": 5001}, {"spindle_rpm": 0}):
         monkeypatch.setattr(feeds_sweep, "cut_table", lambda _setup, wrong=wrong: {"T1": replace(cut, **wrong)})
         assert faults(job), wrong
@@ -137,10 +137,10 @@ def test_a_tool_that_bends_too_far_is_named_with_its_worst_step():
              replace(step(5, SLIM, "waterline"), bend=DeflectionEstimate(0.02, 0.005, 1.0, 0.02, fixed=True))]
     told = bent(steps)
     assert [c.subjects for c in told] == [("T1", "S01", "S02"), ("T1", "S05")]
-    assert told[0].sentence == ("tool T1 in S02 layers and 1 other steps, roughing: its tip would bend 0.400 mm "
-                                "(limit 0.050 mm); its feed is eased to 20 %, with 0.120 mm; a shorter or thicker "
-                                "tool needs no easing")
-    assert (told[0].measured, told[0].limit) == (0.4, 0.05) and "the setup's own" in told[1].remedy
+    assert told[0].sentence == ("tool T1 in S02 depth_layers and 1 other steps, roughing: its tip would bend "
+                                "0.400 mm (limit 0.050 mm); the plan lowers its feed to 20 %, where it bends 0.120 mm; "
+                                "a shorter or thicker tool keeps its feed")
+    assert (told[0].measured, told[0].limit) == (0.4, 0.05) and "given by the setup" in told[1].remedy
 
 
 def test_a_tool_that_does_not_cut_to_its_centre_is_told_of_where_it_goes_down_into_stock():
@@ -149,7 +149,7 @@ def test_a_tool_that_does_not_cut_to_its_centre_is_told_of_where_it_goes_down_in
     wanted = parse_setup(json.dumps(asked))
     t1, t2 = tool_bodies(wanted)
     layers = [replace(step(k, t, "depth_layers"), operation="roughing") for k, t in ((1, t1), (2, t2))]
-    (told,) = uncut_centres(wanted, layers)
+    (told,) = uncut_centres(JobInputs.of(wanted), layers)
     assert told.kind == "center_cutting" and told.subjects == ("T1",) and told.measured == 0.75
     assert "drill" in told.remedy and told.limit == 6.0
-    assert not uncut_centres(wanted, [step(1, t1, "waterline"), layers[1]])
+    assert not uncut_centres(JobInputs.of(wanted), [step(1, t1, "waterline"), layers[1]])

@@ -22,7 +22,7 @@ def planned(monkeypatch):
     """What the report says of zone Z1 whose workingsteps are given."""
     monkeypatch.setattr(report, "_zone", lambda _ready, zone: {"id": zone.id, "rejected": []})
     zone = SimpleNamespace(id="Z1")
-    ready = SimpleNamespace(setup=SimpleNamespace(quality=SimpleNamespace(scallop_height_mm=0.01)))
+    ready = SimpleNamespace(inputs=SimpleNamespace(quality=SimpleNamespace(scallop_height_mm=0.01)))
 
     def ask(*steps):
         first = next((s.id for s in steps if s.zone == "Z1"), None)

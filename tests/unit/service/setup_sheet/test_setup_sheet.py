@@ -15,14 +15,15 @@ import pytest
 
 from geometry.errors import OutputError
 from geometry.part import FaceInfo, Part
+from service.delivery.result_files import Files
 from service.from_wire import parse_setup
 from service.pictures.clamping_picture import box_mesh, corners_of
-from service.setup_sheet.model import Facts, Section, Sheet
+from service.setup_sheet.model import Facts, SetupSheet, SheetSection
 from service.setup_sheet.pdf import latin, pdf_of
 from service.setup_sheet.setup_sheet import sheet_files
-from service.stages.access_plan import Program
+from service.stages.access_plan import WrittenProgram
 from service.stages.blank_model import blank_of
-from service.stages.result_files import Files
+from service.stages.job_inputs import JobInputs
 from tests.synthetic_plan import plan, step
 from toolpath.workingsteps import Workingstep
 from zones.reach.access_view import access_rotation, turned
@@ -123,8 +124,8 @@ def block() -> Part:
 def made(state: str = "proved", findings: list[dict[str, Any]] | None = None, cut: bool = True) -> dict[str, bytes]:
     setup, part = parse_setup(json.dumps(SETUP)), block()
     view = SimpleNamespace(id="A1", rotation=np.eye(3), part=part, direction=np.array([0.0, 0.0, 1.0]))
-    ready = SimpleNamespace(setup=setup, part=part, blank=blank_of(setup, part), views=(view,), accesses=setup.access,
-                            view=lambda _name: view)
+    ready = SimpleNamespace(inputs=JobInputs.of(setup), part=part, blank=blank_of(setup, part), views=(view,),
+                            accesses=setup.access, view=lambda _name: view)
     work = plan(*steps(), restart=True)
     report = report_of(state, findings or [])
     if not cut:
@@ -132,7 +133,7 @@ def made(state: str = "proved", findings: list[dict[str, Any]] | None = None, cu
     files: Files = {"zones.json": ("zones", "", None, b"{}")}
     if state == "proved":
         files["program.linuxcnc.ngc"] = ("program", "linuxcnc", "A1", b"G21\n")
-    written = [Program("A1", work, "G21 (not to be seen)\n")] if cut else []
+    written = [WrittenProgram("A1", work, "G21 (not to be seen)\n")] if cut else []
     got = sheet_files(ready, written, report, files)  # type: ignore[arg-type]
     assert {name: f[0] for name, f in got.items()} == {"sheet.html": "sheet", "sheet.pdf": "sheet"}
     return {name: data for name, (*_, data) in got.items() if isinstance(data, bytes)}
@@ -167,7 +168,7 @@ def test_all_that_the_report_names_is_on_both(proved):
         "4 below the blank",
         "X -1 to 41, Y -2 to 22, Z -3 to 14", "X 0 to 40, Y 0 to 20, Z 0 to 13", "fixture 1", "-20 to -5",
         "T1 lasts for 20 min", "have 2 cutters at hand", "a face was mended", "a note of the proof", "abababababababab",
-        "cdcdcdcdcdcdcdcd", "25.12", "Ø2.8", "81 gauge length", "0.0031 mm", "The proof found nothing",
+        "cdcdcdcdcdcdcdcd", "25.12", "Ø2.8", "81 gauge length", "0.0031 mm", "The proof has no finding",
         "program.linuxcnc.ngc", "31415", "Ti-6Al-4V"]
     for text in both(proved):
         assert [w for w in wanted if w not in text] == []
@@ -234,11 +235,12 @@ def test_a_part_that_is_turned_by_hand_is_shown_as_it_lies_each_time():
     for access in setup.access:
         turn = access_rotation(access.direction)
         views[access.id] = SimpleNamespace(id=access.id, rotation=turn, part=turned(part, turn), direction=turn[2])
-    ready = SimpleNamespace(setup=setup, part=part, blank=blank_of(setup, part), views=tuple(views.values()),
-                            accesses=setup.access, view=lambda name: views[name])
+    ready = SimpleNamespace(inputs=JobInputs.of(setup), part=part, blank=blank_of(setup, part),
+                            views=tuple(views.values()), accesses=setup.access, view=lambda name: views[name])
     first, second, third = steps()
-    written = [Program("A1", plan(first), "G21\n"), Program("A2", plan(second, clearance_plane=33.0), "G21\n", ".A2"),
-               Program("A2", plan(third, clearance_plane=33.0), "G21\n", ".A2.part2")]
+    written = [WrittenProgram("A1", plan(first), "G21\n"),
+               WrittenProgram("A2", plan(second, clearance_plane=33.0), "G21\n", ".A2"),
+               WrittenProgram("A2", plan(third, clearance_plane=33.0), "G21\n", ".A2.part2")]
     report = report_of("proved", [])
     files: Files = {name: ("program", "linuxcnc", p.access, b"G21\n") for p in written for _, name, _ in p.files()}
     for name, (*_, data) in sheet_files(ready, written, report, files).items():  # type: ignore[arg-type]
@@ -255,11 +257,11 @@ def test_a_part_that_is_turned_by_hand_is_shown_as_it_lies_each_time():
 def test_each_control_has_its_own_label():
     setup, part = parse_setup(json.dumps(SETUP)), block()
     view = SimpleNamespace(id="A1", rotation=np.eye(3), part=part, direction=np.array([0.0, 0.0, 1.0]))
-    ready = SimpleNamespace(setup=setup, part=part, blank=blank_of(setup, part), views=(view,), accesses=setup.access,
-                            view=lambda _name: view)
+    ready = SimpleNamespace(inputs=JobInputs.of(setup), part=part, blank=blank_of(setup, part), views=(view,),
+                            accesses=setup.access, view=lambda _name: view)
     for others, told in (({"haas": "", "siemens": ""}, "N200, STEP_S02"), ({"siemens": "", "heidenhain": ""},
                          'N200, STEP_S02, LBL "S02"'), ({"haas": ""}, "N200")):
-        written = [Program("A1", plan(*steps(), restart=True), "G21\n", dialect="fanuc", others=others)]
+        written = [WrittenProgram("A1", plan(*steps(), restart=True), "G21\n", dialect="fanuc", others=others)]
         files: Files = {name: ("program", d, "A1", b"G21\n") for d, name, _ in written[0].files()}
         got = sheet_files(ready, written, report_of("proved", []), files)  # type: ignore[arg-type]
         words = " ".join(" ".join(Page(got["sheet.html"][3].decode()).words).split())
@@ -281,14 +283,15 @@ def test_the_pdf_is_whole(proved):
 
 
 def test_a_line_is_cut_where_it_does_not_fit():
-    sheet = Sheet("W" * 300, True, "fine", "W" * 300, (Section("job", "Job", (Facts((("W" * 200, "W" * 2000),)),)),))
+    section = SheetSection("job", "Job", (Facts((("W" * 200, "W" * 2000),)),))
+    sheet = SetupSheet("W" * 300, True, "fine", "W" * 300, (section,))
     text = pdf_text(pdf_of(sheet))
     assert re.search(r" W{40,110}\.\.\. page 1 of 2", text) and text.count("W") > 2500
 
 
 def test_what_stands_for_the_number_of_pages_is_nothing_a_user_can_write():
     said = "{nb} \x7f\x7f"
-    sheet = Sheet(said, True, said, said, (Section("job", "Job", (Facts((("W" * 200, "W" * 2000),)),)),))
+    sheet = SetupSheet(said, True, said, said, (SheetSection("job", "Job", (Facts((("W" * 200, "W" * 2000),)),)),))
     text = pdf_text(pdf_of(sheet))
     assert text.count("{nb}") >= 4 and "page 1 of 2" in text and "page 2 of 2" in text
 

@@ -12,8 +12,9 @@ import pytest
 from examples.demo import write_small
 from schemas.setup import Setup
 from service import pipeline
-from service.stages.access_plan import Look
-from service.stages.replanning import MOST, MOST_PACKED, Attempt, Learned, learned
+from service.stages import plan_prove_loop
+from service.stages.access_plan import ProofFrame
+from service.stages.replanning import MAX_ENGAGEMENT_FINDINGS, MAX_OTHER_FINDINGS, Attempt, ProofFeedback, learned
 from tests.hand_parts import SHORT_TOOLS
 from toolpath.counterexamples import BARRED, CARE, CLOSER, STRICTER, Counterexamples
 from toolpath.lines import Line
@@ -33,17 +34,17 @@ def found(kind, line=3, tip=(1.0, 2.0, 3.0), depth=0.3, near=False):
 def attempt(*findings, counts=None, proved=(True,) * 6, answered=(1, 1, 0, 2, 2, 2)):
     steps = [SimpleNamespace(id="S01", tool=TOOL, strategy="depth_layers"),
              SimpleNamespace(id="S02", tool=TOOL, strategy="flank")]
-    side = SimpleNamespace(view=SimpleNamespace(id="A1", rotation=TILT), made=SimpleNamespace(steps=steps))
+    side = SimpleNamespace(view=SimpleNamespace(id="A1", rotation=TILT), plan=SimpleNamespace(steps=steps))
     program = SimpleNamespace(name="p.ngc", text=TEXT, work=SimpleNamespace(steps=steps))
     zones = [SimpleNamespace(id="Z1", access="A1"), SimpleNamespace(id="Z2", access="A1")]
     proof = SimpleNamespace(findings=findings, counts={"any": len(findings)} if counts is None else counts,
                             proved=np.array(proved))
     owner = np.array([1, 1, 1, 2, 2, 2])
-    return Attempt([side], [program], zones, owner, np.array(answered), Look("A1", np.eye(3), None), proof)
+    return Attempt([side], [program], zones, owner, np.array(answered), ProofFrame("A1", np.eye(3), None), proof)
 
 
 def test_a_place_that_was_dug_is_gone_to_with_care_and_then_not_at_all():
-    once = learned(Learned(), attempt(found(FindingKind.PLUNGE)))
+    once = learned(ProofFeedback(), attempt(found(FindingKind.PLUNGE)))
     there = np.array([[1.0, 3.0, -2.0]])  # in the frame of the access
     assert np.allclose(once.along("A1").dug[TOOL.id], there) and not once.along("A1").barred
     assert "S01" in once.notes[0] and "with care" in once.notes[0] and "X9.00 Y9.00 Z9.00" in once.notes[0]
@@ -58,22 +59,23 @@ def test_a_step_written_with_arcs_is_another_one_and_still_known():
     tried = attempt(found(FindingKind.PLUNGE))
     program = tried.programs[0]
     program.work.steps = [SimpleNamespace(**vars(s)) for s in program.work.steps]
-    told = learned(Learned(), tried)
+    told = learned(ProofFeedback(), tried)
     assert told is not None and len(told.along("A1").dug[TOOL.id]) == 1
     program.work.steps[0].id, program.text = "S09", TEXT.replace("S01", "S09")
-    assert learned(Learned(), tried) is None  # of no side: nothing that another plan would be told
+    assert learned(ProofFeedback(), tried) is None  # of no side: nothing that another plan would be told
 
 
 def test_where_too_much_was_in_stock_is_gone_in_skims_and_then_not_at_all():
-    once = learned(Learned(), attempt(found(FindingKind.ENGAGEMENT)))
+    once = learned(ProofFeedback(), attempt(found(FindingKind.ENGAGEMENT)))
     assert np.allclose(once.along("A1").packed[TOOL.id], [[1.0, 3.0, -2.0]]) and "in skims" in once.notes[0]
     assert once.along("A1").crowds(TOOL, np.array([[1.0, 3.0, -2.0], [9.0, 3.0, -2.0]])).tolist() == [True, False]
     twice = learned(once, attempt(found(FindingKind.ENGAGEMENT)))
     assert len(twice.along("A1").barred[TOOL.id]) == 1 and "kept away" in twice.notes[1]
-    many = [found(FindingKind.ENGAGEMENT, tip=(9.0 * k, 2.0, 3.0)) for k in range(MOST_PACKED + 1)]
-    assert len(learned(Learned(), attempt(*many[1:])).along("A1").packed[TOOL.id]) == MOST_PACKED > MOST
-    assert learned(Learned(), attempt(*many)) is None
-    leaning = learned(Learned(), attempt(found(FindingKind.ENGAGEMENT, line=5)))
+    many = [found(FindingKind.ENGAGEMENT, tip=(9.0 * k, 2.0, 3.0)) for k in range(MAX_ENGAGEMENT_FINDINGS + 1)]
+    places = learned(ProofFeedback(), attempt(*many[1:])).along("A1").packed[TOOL.id]
+    assert len(places) == MAX_ENGAGEMENT_FINDINGS > MAX_OTHER_FINDINGS
+    assert learned(ProofFeedback(), attempt(*many)) is None
+    leaning = learned(ProofFeedback(), attempt(found(FindingKind.ENGAGEMENT, line=5)))
     assert len(leaning.along("A1").barred[TOOL.id]) == 1  # a flank has no skims
 
 
@@ -81,36 +83,36 @@ def test_a_wall_without_support_is_cut_in_bands_and_then_in_lower_ones():
     unheld = replace(found(FindingKind.SUPPORT, tip=None, depth=8.0), limit=6.0)
     tried = attempt(unheld)
     tried.proof.support = SimpleNamespace(limit=10.0)
-    once = learned(Learned(), tried)
+    once = learned(ProofFeedback(), tried)
     (wall,) = once.along("A1").unheld
     top = float((np.array(unheld.point) @ TILT.T)[2])  # in the frame of the access
     assert (wall.top, wall.bottom) == pytest.approx((top, top - 8.0)) and wall.thickness == pytest.approx(0.6 * CLOSER)
     assert "in lower bands" in once.notes[0] and not once.along("A1").barred
     twice = learned(once, tried)
     assert twice.along("A1").unheld[1].thickness == pytest.approx(0.6 * CLOSER**2)
-    assert learned(Learned(), attempt(replace(unheld, line=0))) is None
+    assert learned(ProofFeedback(), attempt(replace(unheld, line=0))) is None
 
 
 @pytest.mark.parametrize(("kind", "line"), [(FindingKind.COLLISION, 3), (FindingKind.RUBBING, 3),
                                             (FindingKind.PLUNGE, 5)])
 def test_what_was_met_or_dug_beside_a_wall_bars_the_tool(kind, line):
-    told = learned(Learned(), attempt(found(kind, line)))
+    told = learned(ProofFeedback(), attempt(found(kind, line)))
     assert len(told.along("A1").barred[TOOL.id]) == 1 and not told.along("A1").dug
 
 
 @pytest.mark.parametrize("tried", [
     attempt(), attempt(found(FindingKind.GOUGE)), attempt(found(FindingKind.RAPID)),
     attempt(found(FindingKind.PLUNGE), found(FindingKind.GOUGE)), attempt(found(FindingKind.PLUNGE, tip=None)),
-    attempt(found(FindingKind.PLUNGE, line=1)), attempt(*[found(FindingKind.PLUNGE)] * (MOST + 1)),
+    attempt(found(FindingKind.PLUNGE, line=1)), attempt(*[found(FindingKind.PLUNGE)] * (MAX_OTHER_FINDINGS + 1)),
     attempt(found(FindingKind.PLUNGE), counts={"plunge": 300}), attempt(found(FindingKind.RESIDUAL, 0, None, -0.1)),
     attempt(found(FindingKind.PROGRAM))])
 def test_a_fault_of_the_planner_is_not_planned_away(tried):
-    assert learned(Learned(), tried) is None
+    assert learned(ProofFeedback(), tried) is None
 
 
 def test_samples_with_more_than_was_planned_are_told_zone_by_zone():
     residual = found(FindingKind.RESIDUAL, 0, None)
-    told = learned(Learned(), attempt(residual, proved=(True, False, False, True, True, False)))
+    told = learned(ProofFeedback(), attempt(residual, proved=(True, False, False, True, True, False)))
     left = told.along("A1").left  # the third is one that the plan gave up itself
     assert {k: v.tolist() for k, v in left.items()} == {"Z1": [1], "Z2": [2]}
     assert told.along("A1").aims("Z2", 0.02, 4).tolist() == [0.02, 0.02, 0.02 * STRICTER, 0.02]
@@ -147,11 +149,11 @@ def test_accesses_before_the_first_that_is_told_something_are_planned_once(tmp_p
         return plan_job(zones, *args, **kwargs)
 
     def once(told, attempt):
-        asked.append([s.view.id for s in attempt.sides])
+        asked.append([s.view.id for s in attempt.access_plans])
         far = Counterexamples(barred={"T1": np.array([[0.0, 0.0, 90.0]])})
-        return Learned({"A2": far}) if len(asked) == 1 else None
+        return ProofFeedback({"A2": far}) if len(asked) == 1 else None
 
-    monkeypatch.setattr(pipeline, "learned", once)
+    monkeypatch.setattr(plan_prove_loop, "learned", once)
     report = pipeline.plan(part, Setup.model_validate(given), tmp_path / "out", lambda *_: None, planner=planner)
     assert along == ["A1", "A2", "A2"] and asked == [["A1", "A2"]] * 2
     assert report["state"] == "proved" and {z["access"] for z in report["zones"]} == {"A1", "A2"}

@@ -17,8 +17,11 @@ from examples.demo import write_small
 from schemas.setup import Setup
 from service import pipeline
 from service.checkpoint_store import Kept
-from service.stages import resume
-from service.stages.access_plan import Side
+from service.stages import plan_prove_loop, resume
+from service.stages.access_plan import AccessPlan
+from service.stages.preparation import prepare
+from service.stages.proof_samples import score
+from service.stages.replanning import Attempt, ProofFeedback
 from service.stages.resume import Resumed
 from tests.synthetic_plan import step
 from toolpath.counterexamples import NONE, Counterexamples
@@ -31,7 +34,7 @@ from zones.lattice import Lattice
 TWO_WAYS = {"access": [{"id": "A1"}, {"id": "A2", "direction": [1.0, 0.0, 0.0], "work_offset": "G55"}]}
 TURNED = {"machine": {"kind": "5-axis", "kinematics": "table-table-AC", "orientations": "given"},
           "access": [{"id": "A1", "direction": [0.6, 0.0, 0.8]}, {"id": "A2"}]}
-PROVE: Callable[..., Proof] = pipeline.prove
+PROVE: Callable[..., Proof] = plan_prove_loop.prove
 
 
 class Cut(Exception):
@@ -75,7 +78,7 @@ class Job:
             self.proved += 1
             return PROVE(*args, **more)
 
-        self.patch.setattr(pipeline, "prove", prove)
+        self.patch.setattr(plan_prove_loop, "prove", prove)
         out = self.folder / name
         pipeline.plan(self.part, self.setup, out, lambda *_: None, planner=planner, kept=kept)
         return {p.name: p.read_bytes() for p in out.iterdir()}
@@ -137,13 +140,13 @@ def test_rounds_are_gone_through_again_without_planning_or_proving(tmp_path, mon
     """A job that is planned twice, for its first proof has something to say of the second access."""
     asked: list[int] = []
 
-    def once(told: pipeline.Learned, attempt: pipeline.Attempt) -> pipeline.Learned | None:
+    def once(feedback: ProofFeedback, attempt: Attempt) -> ProofFeedback | None:
         asked.append(1)
         zone = next(z for z in attempt.zones if z.access == "A2")
         left = Counterexamples(left={zone.id: np.arange(len(zone.tips) // 2)})
-        return pipeline.Learned({"A2": left}, ("planned again",)) if len(asked) == 1 else None
+        return ProofFeedback({"A2": left}, ("planned again",)) if len(asked) == 1 else None
 
-    monkeypatch.setattr(pipeline, "learned", once)
+    monkeypatch.setattr(plan_prove_loop, "learned", once)
     job, kept = Job(tmp_path, monkeypatch, **TWO_WAYS), Kept(tmp_path / "kept")
     plain = job.run("plain", None)
     assert job.planned == ["A1", "A2", "A2"] and job.proved == 2
@@ -161,8 +164,8 @@ class Prepared:
 
     def __init__(self, folder: Path) -> None:
         part, path = write_small(folder)
-        self.ready = pipeline.prepare(part, Setup.model_validate(json.loads(path.read_text())), lambda *_: None)
-        scored = pipeline.score(self.ready)
+        self.ready = prepare(part, Setup.model_validate(json.loads(path.read_text())), lambda *_: None)
+        scored = score(self.ready)
         self.checks, self.samples = scored.checks(self.ready), scored.samples
         self.view = self.ready.views[0]
         self.tool = next(iter(self.view.fields.values())).tool
@@ -171,11 +174,11 @@ class Prepared:
     def resumed(self, kept: Kept, **changes: Any) -> Resumed:
         return Resumed(kept, replace(self.ready, **changes), self.checks, self.samples)
 
-    def side(self, keeper: CheckpointKeeper = NOTHING) -> Side:
+    def side(self, keeper: CheckpointKeeper = NOTHING) -> AccessPlan:
         """A plan, with the stock as it leaves it."""
         self.made += 1
         left = StockMap(Lattice(0.0, 0.0, 0.5, 3, 2), np.arange(6.0).reshape(2, 3))
-        return Side(self.view, Plan((step(1, self.tool, "waterline"),), ()), 12.5, left)
+        return AccessPlan(self.view, Plan((step(1, self.tool, "waterline"),), ()), 12.5, left)
 
     def proof(self) -> Proof:
         """A proof that found nothing."""
@@ -185,10 +188,11 @@ class Prepared:
         return Proof((), {}, np.zeros(n), none, none, np.ones(n, np.bool_), {}, {}, 0.0, Spent(1.0, 1.0, 0.0, 1, 1),
                      2.0, {1: 0.5}, {}, 0.001, 0.2, 0.15)
 
-    def asked(self, kept: Kept, found: Counterexamples = NONE, before: tuple[Side, ...] = (), **changes: Any) -> int:
+    def asked(self, kept: Kept, found: Counterexamples = NONE, before: tuple[AccessPlan, ...] = (),
+              **changes: Any) -> int:
         """How many plans are made where one is asked for: none where it is kept."""
         self.made = 0
-        self.resumed(kept, **changes).side(self.view, before, found, self.side)
+        self.resumed(kept, **changes).access_plan(self.view, before, found, self.side)
         return self.made
 
 
@@ -199,10 +203,10 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Prepared:
 
 def test_a_plan_comes_back_with_the_stock_it_left(prepared, tmp_path):
     kept = Kept(tmp_path / "kept")
-    first = prepared.resumed(kept).side(prepared.view, (), NONE, prepared.side)
-    again = prepared.resumed(kept).side(prepared.view, (), NONE, pytest.fail)
+    first = prepared.resumed(kept).access_plan(prepared.view, (), NONE, prepared.side)
+    again = prepared.resumed(kept).access_plan(prepared.view, (), NONE, pytest.fail)
     assert again.name == first.name and again.clearance == 12.5 and again.view is prepared.view
-    assert again.made.steps[0].tool is prepared.tool
+    assert again.plan.steps[0].tool is prepared.tool
     assert first.left is not None and again.left is not None and again.left.lattice == first.left.lattice
     assert again.left.top.tobytes() == first.left.top.tobytes()
     assert again.left.cover.tobytes() == first.left.cover.tobytes()
@@ -235,9 +239,9 @@ def test_a_plan_under_way_is_there_until_the_plan_is(prepared, tmp_path, monkeyp
     kept = Kept(tmp_path / "kept", told.append)
     found: list[PlanSnapshot | None] = []
 
-    def make(keeper: CheckpointKeeper, change: Callable[[], object] = lambda: None) -> Side:
+    def make(keeper: CheckpointKeeper, change: Callable[[], object] = lambda: None) -> AccessPlan:
         found.append(keeper.taken(lambda now: now))
-        keeper.done(lambda: replace(UNDER_WAY, acts=len(found), steps=prepared.side().made.steps))
+        keeper.done(lambda: replace(UNDER_WAY, acts=len(found), steps=prepared.side().plan.steps))
         assert kinds(kept) == ["acts"]
         change()
         if len(found) < 4:
@@ -250,11 +254,11 @@ def test_a_plan_under_way_is_there_until_the_plan_is(prepared, tmp_path, monkeyp
 
     for change in (lambda: None, harm, lambda: None):
         with pytest.raises(Cut):
-            prepared.resumed(kept).side(prepared.view, (), NONE, partial(make, change=change))
-    prepared.resumed(kept).side(prepared.view, (), NONE, make)
+            prepared.resumed(kept).access_plan(prepared.view, (), NONE, partial(make, change=change))
+    prepared.resumed(kept).access_plan(prepared.view, (), NONE, make)
     assert [now and now.acts for now in found] == [None, 1, None, 3] and kinds(kept) == ["plan"]
     assert told == [{"acts": 1}, {"acts": 2}]
-    prepared.resumed(kept).side(prepared.view, (), NONE, pytest.fail)
+    prepared.resumed(kept).access_plan(prepared.view, (), NONE, pytest.fail)
 
 
 def test_a_plan_under_way_is_written_down_now_and_then(prepared, tmp_path, monkeypatch):
@@ -268,13 +272,13 @@ def test_a_plan_under_way_is_written_down_now_and_then(prepared, tmp_path, monke
         clock[0] += seconds
         return UNDER_WAY
 
-    def make(keeper: CheckpointKeeper) -> Side:
+    def make(keeper: CheckpointKeeper) -> AccessPlan:
         for k in range(4000):
             clock[0] = max(clock[0], 0.1 * k)
             keeper.done(partial(now, 0.0 if k < 500 else 2.0))
         return prepared.side()
 
-    prepared.resumed(Kept(tmp_path / "kept")).side(prepared.view, (), NONE, make)
+    prepared.resumed(Kept(tmp_path / "kept")).access_plan(prepared.view, (), NONE, make)
     assert written == pytest.approx([15.0, 30.0, 45.0, 60.0, 182.0, 304.0], abs=0.2)
 
 
@@ -283,14 +287,14 @@ def test_what_is_no_plan_under_way_is_thrown_away(prepared, tmp_path, monkeypatc
     monkeypatch.setattr(resume, "ACTS_EVERY_S", 0.0)
     kept = Kept(tmp_path / "kept")
 
-    def make(keeper: CheckpointKeeper) -> Side:
+    def make(keeper: CheckpointKeeper) -> AccessPlan:
         keeper.done(lambda: UNDER_WAY)
         (path,) = (tmp_path / "kept").iterdir()
         kept.put(*path.name.split("-"), len(words).to_bytes(8, "little") + words)
         assert keeper.taken(lambda now: now) is None and not path.exists()
         return prepared.side()
 
-    prepared.resumed(kept).side(prepared.view, (), NONE, make)
+    prepared.resumed(kept).access_plan(prepared.view, (), NONE, make)
 
 
 def test_what_came_from_anything_else_is_not_taken_over(prepared, tmp_path, monkeypatch):
@@ -324,9 +328,9 @@ def test_a_proof_is_of_the_very_text_it_was_made_of(prepared, tmp_path):
 def test_what_cannot_be_packed_or_written_does_not_stop_a_job(prepared, tmp_path):
     (tmp_path / "file").write_text("")
     assert prepared.asked(Kept(tmp_path / "file" / "kept")) == 1
-    odd = Side(prepared.view, Plan((object(),), ()), 12.5, None)  # type: ignore[arg-type]
+    odd = AccessPlan(prepared.view, Plan((object(),), ()), 12.5, None)  # type: ignore[arg-type]
     kept = Kept(tmp_path / "kept")
-    assert prepared.resumed(kept).side(prepared.view, (), NONE, lambda _: odd).made is odd.made
+    assert prepared.resumed(kept).access_plan(prepared.view, (), NONE, lambda _: odd).plan is odd.plan
     assert not (tmp_path / "kept").exists()
 
 

@@ -126,7 +126,7 @@ def test_reasons_are_told_once_with_their_area():
             {"reason": "corner", "area_mm2": 3.5}]
     assert preview_picture._reasons(rows) == ["30 mm2 stay: undercut", "5.5 mm2 stay: corner (2 places)"]
     many = [{"reason": f"r{k}", "area_mm2": 10.0 - k} for k in range(8)]
-    assert len(preview_picture._reasons(many)) == preview_picture.MOST_REASONS
+    assert len(preview_picture._reasons(many)) == preview_picture.MAX_REASONS
     assert preview_picture._reasons(many)[-1] == "18.0 mm2 for 4 more reasons"
 
 
@@ -138,8 +138,9 @@ def test_colours_and_classes_are_those_of_the_page():
         numbers = [float(v) for v in re.findall(r"\d+(?:\.\d+)?", body)]
         return np.array(numbers).reshape(-1, 3)
 
-    assert np.allclose(rows("TOOLS"), preview_picture.TOOLS) and np.allclose(rows("REMAINDER"), [preview_picture.REMAINDER])
-    assert np.allclose(rows("OTHER"), [preview_picture.OTHER]) and np.allclose(rows("CONNECTION"), [preview_picture.CONNECTION])
+    assert np.allclose(rows("TOOLS"), preview_picture.TOOLS)
+    for name in ("REMAINDER", "OTHER", "CONNECTION"):
+        assert np.allclose(rows(name), [getattr(preview_picture, name)])
     assert np.allclose(rows("CLASSES"), deviation_map.COLOURS[:deviation_map.UNCUT])
     assert np.allclose(rows("UNCUT"), [deviation_map.COLOURS[deviation_map.UNCUT]])
     assert f"STEPS = [{deviation_map.STEPS[0]:g}, {deviation_map.STEPS[1]:g}]" in source

@@ -8,7 +8,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from geometry.tool_body import ToolBody
-from service.viewer.view_paths import AXIS_UNIT, COARSE, CUT, GRID, RAPID, START, Way, path_chunks, thinned, way_of
+from service.viewer.view_paths import (
+    AXIS_UNIT,
+    COARSE,
+    CUT,
+    GRID,
+    RAPID,
+    START,
+    ToolTrack,
+    path_chunks,
+    thinned,
+    track_of,
+)
 from tests.hand_parts import as_part, box_mesh
 from verify.checks.program_sequence import read_all
 from verify.model import NcProgram, ProofSetup
@@ -70,7 +81,7 @@ def test_a_circle_needs_few_rows():
 
 def read_way(program, part, tools, steps=()):
     readings = read_all([program], part, tools, ProofSetup(), 0, lambda _share: None)
-    return way_of(readings, [program], np.eye(3), steps)
+    return track_of(readings, [program], np.eye(3), steps)
 
 
 @pytest.fixture(scope="module")
@@ -163,8 +174,8 @@ def test_a_tool_that_turns_keeps_its_axes():
     axis = np.column_stack([np.sin(turn[1:]), np.zeros(n), np.cos(turn[1:])])
     no = np.zeros(n, np.int64)
     step = {"id": "T1", "zone": None, "operation": "", "strategy": "", "program": "p"}
-    way = Way(place[:-1], place[1:], axis, np.ones(n, np.bool_), np.arange(n) + 0.0, np.arange(n) + 1.0,
-              np.arange(n) + 1, no + 1, no, no, (step,), ("p",))
+    way = ToolTrack(place[:-1], place[1:], axis, np.ones(n, np.bool_), np.arange(n) + 0.0, np.arange(n) + 1.0,
+                    np.arange(n) + 1, no + 1, no, no, (step,), ("p",))
     (first,), (then,), (step,), _ = path_chunks(way, np.zeros(3), open_=True)
     assert step["axis"] is None
     for chunk in (first, then):  # straight, yet nothing is left out: the tool turns all the way

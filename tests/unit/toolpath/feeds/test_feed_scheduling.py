@@ -10,7 +10,7 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from service.from_wire import parse_setup, tool_bodies
-from service.pipeline import cut_table
+from service.stages.job_inputs import JobInputs
 from tests.hand_parts import ball, box_mesh, tool
 from toolpath.feeds.feed_scheduling import ANGLE, GUARD, STEP, Pace, paced
 from toolpath.stock.engagement import SKIN_SHARE, angles
@@ -116,14 +116,14 @@ def test_an_eased_feed_is_given_back_where_less_stands_and_never_more():
     slim = {"id": "T1", "kind": "flat", "diameter_mm": 3, "flutes": 4, "flute_length_mm": 8, "neck_diameter_mm": 2.8,
             "neck_length_mm": 24, "shank_diameter_mm": 6, "stickout_mm": 40}
     setup = parse_setup(json.dumps({"tools": [slim], "material": "Ti-6Al-4V"}))
-    cut, (body,) = cut_table(setup)["T1"], tool_bodies(setup)
+    cut, (body,) = JobInputs.of(setup).cut_table["T1"], tool_bodies(setup)
     full = cut.feed / cut.bend.share
     assert cut.bend.share < 0.8
     assert cut.feed_under(body, cut.step_down, math.pi) == pytest.approx(cut.feed)
     assert cut.feed_under(body, 0.05, 0.2) == pytest.approx(full)
     halves = [cut.feed_under(body, d * cut.step_down, a) for d in (0.1, 0.5, 1.0) for a in (0.5, 1.5, 3.0)]
     assert all(cut.feed <= f <= full * (1.0 + 1e-9) for f in halves) and halves[0] > halves[-1]
-    own = cut_table(parse_setup(json.dumps({"tools": [{**slim, "feed_mm_min": 300}]})))["T1"]
+    own = JobInputs.of(parse_setup(json.dumps({"tools": [{**slim, "feed_mm_min": 300}]}))).cut_table["T1"]
     assert own.feed_under(body, 0.05, 0.2) == own.feed == 300
 
 

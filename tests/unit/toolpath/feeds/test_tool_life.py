@@ -111,11 +111,11 @@ def test_a_run_longer_than_a_life_gets_a_cutter_of_its_own_and_is_told_of():
     whole = step(4, 10.0, 300.0, 10.0)
     got = with_fresh_cutters([whole], {"T1": 0.5}, CLEAR)
     assert [(s.id, len(cuts([s]))) for s in got] == [("S04", 2), ("S04b", 2), ("S04c", 2)]
-    setup = SimpleNamespace(tools=[SimpleNamespace(id="T1", life_min=0.5), SimpleNamespace(id="T2", life_min=None)])
-    told = lives_ended(setup, got)
+    inputs = SimpleNamespace(tools=[SimpleNamespace(id="T1", life_min=0.5), SimpleNamespace(id="T2", life_min=None)])
+    told = lives_ended(inputs, got)
     assert [c.subjects for c in told] == [("T1", "S04b", "S04c"), ("T1", "S04b")]
-    assert told[0].remedy == "have 3 cutters at hand" and told[1].measured == pytest.approx(1.0, abs=0.05)
-    assert lives_ended(setup, [step(1, 10.0)]) == []
+    assert told[0].remedy == "have 3 cutters ready" and told[1].measured == pytest.approx(1.0, abs=0.05)
+    assert lives_ended(inputs, [step(1, 10.0)]) == []
 
 
 def test_the_thirtieth_part_has_a_name_of_two_letters():

@@ -14,6 +14,7 @@ from geometry.part import Part  # noqa: E402
 from geometry.setup_frame import SetupFrame  # noqa: E402
 from geometry.step_import.occ.loading import load_part  # noqa: E402
 from service.from_wire import parse_setup  # noqa: E402
+from service.stages.job_inputs import JobInputs  # noqa: E402
 from service.stages.preparation import planning_samples  # noqa: E402
 from tests.hand_parts import ball, tool  # noqa: E402
 from tests.step_files import write_step  # noqa: E402
@@ -78,7 +79,8 @@ def pocket(tmp_path_factory):
     hollow = cq.Workplane().box(44, 24, DEEP, centered=(True, True, False)).edges("|Z").fillet(RADIUS)
     block = cq.Workplane().box(64, 44, 30, centered=(True, True, False)).cut(hollow.translate((0, 0, 10)))
     part = load_part(write_step(block, tmp_path_factory.mktemp("pocket") / "a.step"), chord=0.0015)
-    samples = planning_samples(part, decompose(part), parse_setup({"tools": TOOLS}), np.array([[0.0, 0.0, 1.0]]))
+    inputs = JobInputs.of(parse_setup({"tools": TOOLS}))
+    samples = planning_samples(part, decompose(part), inputs, np.array([[0.0, 0.0, 1.0]]))
     rounds = np.isin(samples.face, [f.number for f in part.faces if f.surface == "cylinder"])
     assert samples.area[rounds].sum() == pytest.approx(2 * math.pi * RADIUS * DEEP, rel=1e-3)
     return part, samples.subset(rounds)

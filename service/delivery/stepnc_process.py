@@ -1,6 +1,6 @@
-"""Entry of the process that writes STEP-NC and reads it back beside its parent: request on stdin, names in the result.
+"""Entry of the process that writes STEP-NC and reads it back: request on stdin, file names in the result.
 
-The request is a pickle of what ``service.stages.stepnc_files.stepnc_files`` takes, made by the parent for this child alone.
+The request is a pickle of the arguments of ``service.delivery.stepnc_files.stepnc_files``. Only the parent writes it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from geometry.errors import CamError
 def main() -> int:
     """Write the files, answer with their kinds and places; returns the exit code."""
     result = guard_child()
-    from service.stages.stepnc_files import stepnc_files
+    from service.delivery.stepnc_files import stepnc_files
 
     try:
         files = stepnc_files(*pickle.load(sys.stdin.buffer))

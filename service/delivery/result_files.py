@@ -1,4 +1,4 @@
-"""The files of a job: what they are, and written so that each is there whole or not at all."""
+"""The files of a job: their names, and how each is written whole or not at all."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from geometry.errors import InputError
 from schemas.machine import DIALECT_ENDINGS
 
 Files = dict[str, tuple[str, str, str | None, bytes | Path]]
-"""By name: kind, dialect, access, content; a large one as a file beside its place, which is moved there."""
+"""By name: kind, dialect, access, content. A large content is a file beside its final place, which is moved there."""
 
 
 def deliver(out: Path, report: dict[str, Any], files: Files) -> None:
@@ -39,7 +39,7 @@ def json_bytes(data: dict[str, Any]) -> bytes:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file so that it is there whole or not at all."""
+    """Write a file whole or not at all."""
     partial = path.with_name(path.name + ".part")
     with open(partial, "wb") as f:
         f.write(data)
@@ -70,7 +70,7 @@ PLAN_MARKS = (*(f"program{k}.{p}" for p in PROGRAMS for k in ("", ".*")), "job.s
 
 
 def clear_results(folder: Path) -> None:
-    """Delete the files of an earlier job from a folder: a program left beside a new report would pass for proved.
+    """Delete the files of an earlier job from a folder, so that no old program lies beside a new report.
 
     Raises
     ------
@@ -86,8 +86,8 @@ def clear_verification(folder: Path) -> None:
     Raises
     ------
     InputError
-        One of them cannot be deleted; ``out_holds_a_job``: files of a plan lie there, perhaps the very program that is
-        to be proved, and the report of a plan must not be taken from beside its programs.
+        One of them cannot be deleted. Code 'out_holds_a_job': the folder holds the files of a plan, perhaps the program
+        to be proved, and the report of a plan must stay beside its programs.
     """
     plan = sorted({p.name for pattern in PLAN_MARKS for p in folder.glob(pattern)})
     if plan:
@@ -97,7 +97,7 @@ def clear_verification(folder: Path) -> None:
 
 
 def _clear(folder: Path, patterns: Iterable[str]) -> None:
-    """Delete what matches, and what a crash left half written of it."""
+    """Delete the files that match, and what a crash left half written of them."""
     wanted = [p for pattern in patterns for p in (pattern, f"{pattern}.part")]
     for path in sorted({p for pattern in wanted for p in folder.glob(pattern)}):
         try:

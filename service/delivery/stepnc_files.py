@@ -1,7 +1,7 @@
-"""STEP-NC of a proved job: written, read back and held against the program before any of it counts.
+"""STEP-NC of a proved job: written, read back and compared with the program before it is delivered.
 
-That takes a few times as long as the rest of a report, so for long programs it goes on in a process of its own while
-the rest is made (``stepnc_under_way``).
+That takes a few times as long as the rest of a report. For long programs another process does it meanwhile
+(``stepnc_under_way``).
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from geometry.tool_body import ToolBody
 from output.stepnc.ap238 import stream_stepnc_aim
 from output.stepnc.iso14649 import stream_stepnc_arm
 from output.workplan import Workplan
-from service.stages.access_plan import Program
-from service.stages.result_files import Files
+from service.delivery.result_files import Files
+from service.stages.access_plan import WrittenProgram
 from verify.checks.program_sequence import read_all
 from verify.comparison.stepnc_agreement import check_agreement
 from verify.model import NcProgram, ProofSetup
@@ -33,18 +33,18 @@ from verify.model import NcProgram, ProofSetup
 Stream = Callable[[Workplan, Callable[[str], object]], None]
 FORMS: tuple[tuple[str, str, Stream], ...] = (
     ("stepnc", "stpnc", stream_stepnc_aim), ("stepnc-arm", "arm.stpnc", stream_stepnc_arm))
-"""Kind and ending of the files of both forms, and what writes them."""
-LONG = 1_000_000  # characters of programs from which on another process is worth the seconds it takes to start
+"""Kind and file ending of both forms, and the function that writes each."""
+LONG = 1_000_000  # characters of programs; from there on another process saves more than its start costs
 TIME_LIMIT, MEMORY_LIMIT = 7200.0, 8e9  # s, bytes
 
 
 @contextmanager
-def stepnc_under_way(programs: Sequence[Program], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
+def stepnc_under_way(programs: Sequence[WrittenProgram], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
                      out: Path) -> Iterator[Callable[[], Files]]:
-    """``stepnc_files`` going on while something else is done: gives what waits for them.
+    """Run ``stepnc_files`` in another process meanwhile; yields a function that waits for the files and returns them.
 
-    Short programs are begun only then. Where the other process cannot do it, for want of memory or time, this one does.
-    If nobody waited, nothing of them stays.
+    This process writes short programs itself, once the function is called. It also does so where the other process
+    exceeds its memory or time. Files that are never taken are deleted.
     """
     job = (programs, part, tools, setup, out)
     if sum(len(p.text) for p in programs) < LONG or (os.cpu_count() or 1) < 2:
@@ -63,8 +63,9 @@ def stepnc_under_way(programs: Sequence[Program], part: Part, tools: Sequence[To
 
     try:
         with ThreadPoolExecutor(1) as pool:
-            begun = pool.submit(run_limited, [sys.executable, "-m", "service.stages.stepnc_process"], pickle.dumps(job),
-                                time_limit=TIME_LIMIT, memory_limit=MEMORY_LIMIT, name="stepnc", stop=stop)
+            command = [sys.executable, "-m", "service.delivery.stepnc_process"]
+            begun = pool.submit(run_limited, command, pickle.dumps(job), time_limit=TIME_LIMIT,
+                                memory_limit=MEMORY_LIMIT, name="stepnc", stop=stop)
             try:
                 yield wait
             finally:
@@ -76,7 +77,7 @@ def stepnc_under_way(programs: Sequence[Program], part: Part, tools: Sequence[To
 
 
 def _named(begun: Future[bytes]) -> Files:
-    """The files a child says it has written."""
+    """The files that the other process has written."""
     return {name: (kind, "", None, Path(place)) for name, (kind, place) in json.loads(begun.result()).items()}
 
 
@@ -84,9 +85,9 @@ def _beside(out: Path, name: str) -> Path:
     return out / f"{name}.part"
 
 
-def stepnc_files(programs: Sequence[Program], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
+def stepnc_files(programs: Sequence[WrittenProgram], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
                  out: Path) -> Files:
-    """Both forms of STEP-NC of proved programs, as files beside their place in a folder.
+    """Both forms of STEP-NC of proved programs, as files beside their final place in a folder.
 
     programs : each without a finding
     part, tools, setup : of the proof, as ``verify.prove.prove`` takes them
@@ -94,7 +95,8 @@ def stepnc_files(programs: Sequence[Program], part: Part, tools: Sequence[ToolBo
     Raises
     ------
     InternalError
-        Code stepnc_differs, stepnc_unreadable: what was written is not read back as the program; no file stays.
+        Code stepnc_differs, stepnc_unreadable: the file that was written does not read back as the program; no file
+        stays.
     OutputError
         As the writers.
     """
@@ -111,24 +113,25 @@ def stepnc_files(programs: Sequence[Program], part: Part, tools: Sequence[ToolBo
                 given = NcProgram(name, path.read_text(encoding="ascii"), program.turn, program.work.work_offset)
                 (read,) = read_all([given], part, tools, setup, 0, _silent)
                 if remarks := read.program.remarks:
-                    raise InternalError(f"{name} is not read back without a remark: {remarks[0].message}",
+                    raise InternalError(f"{name} reads back with a remark: {remarks[0].message}",
                                         code="stepnc_unreadable", subjects=(name,), measured=remarks[0].line,
-                                        remedy="please report it with part and setup; nothing is delivered")
+                                        remedy="report this error with part and setup; no file is delivered")
                 check_agreement(proved.program, read.program)
     except BaseException as problem:
         for *_, written in files.values():
             with suppress(OSError):
                 Path(str(written)).unlink(missing_ok=True)
-        if isinstance(problem, InputError):  # of ours, not of the user's
-            raise InternalError(f"what was written is not read back: {problem.message}", code="stepnc_unreadable",
-                                subjects=problem.subjects, measured=problem.measured, limit=problem.limit,
-                                remedy="please report it with part and setup; nothing is delivered") from None
+        if isinstance(problem, InputError):  # a fault of the writer, not of the user
+            raise InternalError(f"the STEP-NC file that was written cannot be read back: {problem.message}",
+                                code="stepnc_unreadable", subjects=problem.subjects, measured=problem.measured,
+                                limit=problem.limit,
+                                remedy="report this error with part and setup; no file is delivered") from None
         raise
     return files
 
 
 def _silent(_share: float) -> None:
-    """Nobody is told how far it is."""
+    """Drop the progress."""
 
 
 __all__ = ["FORMS", "stepnc_files", "stepnc_under_way"]

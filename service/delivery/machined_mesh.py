@@ -1,4 +1,4 @@
-"""The machined part as a mesh: which one is asked for, its figures and its STL file."""
+"""The machined part as a mesh: the requested one, its figures and its STL file."""
 
 from __future__ import annotations
 
@@ -23,9 +23,10 @@ MESH_NAME = "machined.stl"
 
 @dataclass(frozen=True, eq=False)
 class MeshWish:
-    """The mesh of the machined part that is asked for.
+    """The requested mesh of the machined part.
 
-    step : mm between nodes; box : (2, 3) float64, mm, a window in the coordinates of the program, or None
+    step : mm between nodes
+    box  : (2, 3) float64, mm, a window in the coordinates of the program; None: the whole part
     """
 
     step: float
@@ -33,7 +34,7 @@ class MeshWish:
 
     @classmethod
     def of(cls, step: float, box: str | None) -> MeshWish:
-        """From what was written: ``box`` as 'x0,y0,z0,x1,y1,z1'.
+        """From the text of a request: ``box`` as 'x0,y0,z0,x1,y1,z1'.
 
         Raises
         ------
@@ -48,25 +49,29 @@ class MeshWish:
         except ValueError:
             numbers = []
         if len(numbers) != 6:
-            raise InputError(f"the window of the machined part is no six numbers: {box}", code="bad_mesh_box",
+            raise InputError(f"the window of the machined part must be six numbers, not {box}", code="bad_mesh_box",
                              measured=box, remedy="give x0,y0,z0,x1,y1,z1 in mm, the lower corner first")
         return cls(step, np.array(numbers).reshape(2, 3))
 
 
 def machined_part(wish: MeshWish, programs: Sequence[Given], part: Part, tools: Sequence[ToolBody],
                   setup: ProofSetup, progress: Report, *, spindle_tool: int = 0) -> tuple[dict[str, Any], bytes]:
-    """The machined part as figures for the report, file and access left out, and as a binary STL file.
+    """Figures of the machined part for the report, without file and access, and its binary STL file.
 
-    programs, part, tools, setup, spindle_tool : as ``verify.material.machined_part.machined_stock`` takes them, and errors as it
-        raises them; ``nothing_stands`` (InputError) where the window holds no stock
+    programs, part, tools, setup, spindle_tool : as ``verify.material.machined_part.machined_stock`` takes them
+
+    Raises
+    ------
+    InputError
+        Code 'nothing_stands': the window holds no stock; else as ``machined_stock``.
     """
     field = machined_stock(programs, part, tools, setup, wish.step, box=wish.box, spindle_tool=spindle_tool,
                            progress=progress)
     mesh = field.surface()
     if not len(mesh.faces):
-        raise InputError("nothing stands in the window of the machined part", code="nothing_stands",
+        raise InputError("the window of the machined part holds no stock", code="nothing_stands",
                          measured=None if wish.box is None else wish.box.tolist(),
-                         remedy="give a window that holds some of the part, or a finer step")
+                         remedy="give a window that overlaps the part, or a finer step")
     figures = {"volume_mm3": round(field.volume, 4), "step_mm": round(field.step, 6),
                "error_mm": round(surface_error(field.step, setup.kinematics is not None), 6),
                "box_mm": np.round(mesh.bounds, 4).tolist(), "triangles": len(mesh.faces)}

@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from geometry.errors import InternalError, ResourceError
-from service.stages import stepnc_files as stepnc
-from service.stages.access_plan import Program
-from service.stages.stepnc_files import stepnc_files, stepnc_under_way
+from service.delivery import stepnc_files as stepnc
+from service.delivery.stepnc_files import stepnc_files, stepnc_under_way
+from service.stages.access_plan import WrittenProgram
 from tests.pocket_case import SETUP, block
 from tests.synthetic_plan import BALL, line, plan, step, write_linuxcnc
 from toolpath.workingsteps import TrajectoryKind
@@ -18,7 +18,7 @@ from toolpath.workingsteps import TrajectoryKind
 @pytest.fixture
 def job():
     work = plan(step(1, BALL, "waterline"))
-    return [Program("A1", work, write_linuxcnc(work))], block(), [BALL], SETUP
+    return [WrittenProgram("A1", work, write_linuxcnc(work))], block(), [BALL], SETUP
 
 
 @pytest.fixture

@@ -1,0 +1,92 @@
+"""What planner and proof of an access take from the job: stock, tolerances, heights, limits.
+
+Lengths are mm in the frame of the access, or of the proof.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from output.arc_fitting import SHARE as ARCS
+from schemas.setup import Lean
+from service.stages.access_plan import ProofFrame
+from service.stages.preparation import Prepared, table_height
+from service.stages.programs import access_of, fixture_boxes, turning_of
+from service.stages.wall_support import FREE_RATIO, in_turn
+from toolpath.plan_settings import Pattern, PlanSettings, ToolLean
+from toolpath.stock.stock_map import StockMap
+from toolpath.workingsteps import CutDirection
+from verify.model import ProofSetup
+from zones.reach.access_view import View
+
+RAMP_ANGLE = np.radians(3.0)
+STOCK_STEP = 0.08  # mm, the planner's stock lattice; wider where that would take more than STOCK_CELLS
+STOCK_CELLS = 4e6
+ABOVE = 1.0  # mm between the height rapids may go down to and the clearance plane
+
+
+def planning_stock(ready: Prepared, view: View) -> StockMap:
+    """The stock that the planner of an access starts from: the largest that the setup allows."""
+    lo, hi = ready.blank.corners(view.rotation)
+    step = max(min(STOCK_STEP, ready.inputs.engagement_spacing), float(np.sqrt(np.prod(hi[:2] - lo[:2]) / STOCK_CELLS)))
+    return ready.blank.planned(view, step)
+
+
+def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
+    """Tolerances and heights of a plan, in the frame of the access."""
+    inputs = ready.inputs
+    q, ops = inputs.quality, inputs.operations
+    tops = [stock.highest, float(view.part.bounds[1, 2]) + q.stock_allowance_mm]
+    tops.extend(float(f[1, 2]) for f in fixture_boxes(ready, view))
+    floor = float(np.ceil(10.0 * (max(tops) + inputs.clearances.rapid + 0.1)) / 10.0)
+    chord = q.chordal_tolerance_mm * (1.0 - (ARCS if inputs.machine.arcs else 0.0))
+    return PlanSettings(q.scallop_height_mm, chord, q.stock_allowance_mm, ready.lift, floor + ABOVE,
+                        floor, float(RAMP_ANGLE), ops.roughing, ops.finishing, CutDirection(ops.cut_direction),
+                        Pattern(ops.pattern), turning_of(ready, view), rates=inputs.rates,
+                        semi_finishing=ops.semi_finishing, leaned=leaned(ops.lean))
+
+
+def leaned(lean: Lean) -> ToolLean | None:
+    """Lead and tilt of the setup as the planner takes them, rad; None where it asks for none."""
+    if not lean.asked:
+        return None
+    walls = lean.walls_tilt_deg
+    return ToolLean(math.radians(lean.lead_deg), math.radians(lean.tilt_deg),
+                  None if walls is None else math.radians(walls))
+
+
+def proof_setup(ready: Prepared, view: View | ProofFrame, *, foreign: bool = False) -> ProofSetup:
+    """The conditions of a proof in the frame of a view.
+
+    foreign : the programs were not planned here; then a table of unknown height is no obstacle
+    """
+    inputs = ready.inputs
+    c, q, machine = inputs.clearances, inputs.quality, inputs.machine
+    # the height of the table is known in the setup frame only, so a proof in an oblique frame leaves the table out
+    tabled = (inputs.turns and np.array_equal(view.rotation, np.eye(3))
+              and not (foreign and machine.table_z_mm is None))
+    cylinder, upwards = ready.blank.proof_cylinder(view.rotation)
+    return ProofSetup(
+        stock_kind=inputs.stock.kind, margin=inputs.stock.margin_mm, uncertainty=ready.blank.beyond,
+        stock_box=ready.blank.proof_box(view.rotation), stock_cylinder=cylinder, stock_axis=upwards,
+        stock_mesh=ready.blank.proof_mesh(view.rotation),
+        fixtures=fixture_boxes(ready, view), clearance_neck=c.neck,
+        clearance_shank=c.shank, clearance_holder=c.holder, clearance_rapid=c.rapid,
+        scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,
+        stock_allowance=q.stock_allowance_mm, ramp_angle=float(RAMP_ANGLE),
+        rapid_feed=inputs.rates.rapid, acceleration=inputs.rates.acceleration,
+        work_offset=access_of(ready, view).work_offset,
+        travel=None if machine.travel_mm is None else np.array(machine.travel_mm, dtype=np.float64),
+        gauge_length=inputs.gauge_lengths,
+        line_spacing=min(ProofSetup.line_spacing, inputs.engagement_spacing),
+        dogleg=machine.rapid_motion == "dogleg", max_feed=machine.max_feed_mm_min,
+        max_engaged=inputs.max_engaged, max_rpm=inputs.max_rpm,
+        table=table_height(inputs, ready.blank) if tabled else None,
+        table_known=machine.table_z_mm is not None, free_ratio=FREE_RATIO, walls_in_turn=in_turn(ready),
+        kinematics=inputs.kinematics, rotary_limits=inputs.rotary_limits,
+        rotary_rate=None if machine.rotary_rate_deg_min is None else float(np.radians(machine.rotary_rate_deg_min)))
+
+
+__all__ = ["leaned", "plan_settings", "planning_stock", "proof_setup"]

@@ -1,0 +1,174 @@
+"""What a job needs from its setup, converted once.
+
+``JobInputs.of`` is the one place where a setup becomes what the inner packages take: bodies of tools, cutting data,
+clearances, frames, rates and limits. Sections of the setup that are plain values already (machine, stock, quality,
+operations) are kept as they are. Everything after it takes a ``JobInputs`` and no ``Setup``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from geometry.mesh import F64
+from geometry.move_timing import Rates
+from geometry.setup_frame import SetupFrame
+from geometry.tool_body import ToolBody
+from output.inverse_kinematics import RotaryMachine
+from schemas.machine import Machine
+from schemas.materials import Material
+from schemas.setup import Access, Operations, Quality, Setup, Stock, setup_sha256
+from schemas.tools import Tool
+from service.cutting_data import STEP_DOWN, bending, cutting_data, rates_of
+from service.from_wire import machine_kinematics, material_name, rotary_limits, rotary_machine, tool_bodies
+from toolpath.plan_settings import CutData
+from toolpath.tool_deflection import effective_diameter
+from verify.kinematics import Kinematics
+from zones.reach.assembly import Clearances
+
+LINK_FEED = 3000.0  # mm/min, feed moves in air
+ENGAGEMENT_SHARE = 0.15  # of the radius of a tool, between places of the stock: at the edge 32 degrees of it
+SLOT_DEG = 180.0  # engaged angle of a slot
+
+
+@dataclass(frozen=True, eq=False)
+class JobInputs:
+    """A setup in the terms of planner, writers and proof.
+
+    sha256        : of the setup in canonical form
+    labels        : texts of the user by key
+    solid         : which solid of the STEP file, from 1; None for the only one
+    placement     : the setup frame in the coordinates of the STEP file
+    accesses      : as in the setup, the first one is that of the decomposition
+    tools, bodies : entries and shapes of the tools, in the same order
+    cut_table     : speeds, feeds and layer depths by tool id
+    gauge_lengths : mm from the spindle face to the tip, by T number
+    machine, stock, quality, operations, material : sections of the setup
+    clearances    : radial, mm
+    fixtures      : (2, 3) float64 each, mm, setup frame, lower and upper corner of a box
+    rates         : what the machine does
+    """
+
+    sha256: str
+    labels: Mapping[str, str]
+    solid: int | None
+    placement: SetupFrame
+    accesses: tuple[Access, ...]
+    tools: tuple[Tool, ...]
+    bodies: tuple[ToolBody, ...]
+    cut_table: Mapping[str, CutData]
+    gauge_lengths: Mapping[int, float]
+    machine: Machine
+    stock: Stock
+    fixtures: tuple[F64, ...]
+    clearances: Clearances
+    quality: Quality
+    operations: Operations
+    material: Material
+    material_name: str
+    rates: Rates
+
+    @classmethod
+    def of(cls, setup: Setup) -> JobInputs:
+        """The inputs of a job from its setup."""
+        c, bodies = setup.clearance_mm, tool_bodies(setup)
+        return cls(setup_sha256(setup), setup.labels, setup.part.solid, placement_of(setup), tuple(setup.access),
+                   tuple(setup.tools), bodies, _cut_table(setup, bodies), _gauge_lengths(setup.tools, bodies),
+                   setup.machine, setup.stock, tuple(np.array(f.box_mm, dtype=np.float64) for f in setup.fixtures),
+                   Clearances(c.neck, c.shank, c.holder, c.rapid), setup.quality, setup.operations, setup.material,
+                   material_name(setup), rates_of(setup))
+
+    @property
+    def turns(self) -> bool:
+        """Whether the machine has rotary axes, so that all accesses are cut in one clamping by one program."""
+        return self.machine.kind == "5-axis"
+
+    @cached_property
+    def rotary(self) -> RotaryMachine | None:
+        """The rotary axes as the writers take them; None on a machine of three axes.
+
+        Raises
+        ------
+        SetupError
+            As ``service.from_wire.rotary_machine``.
+        """
+        return rotary_machine(self.machine)
+
+    @cached_property
+    def kinematics(self) -> Kinematics | None:
+        """The rotary axes as the proof takes them; None on a machine of three axes."""
+        return machine_kinematics(self.machine)
+
+    @cached_property
+    def rotary_limits(self) -> F64 | None:
+        """(2, 2) float64, rad: least and greatest angle of the tilting and the turning axis; None where not limited."""
+        return rotary_limits(self.machine)
+
+    @property
+    def mesh_chord(self) -> float:
+        """Chord of the mesh, mm: its share of the scallop and of the gouge tolerance."""
+        return mesh_chord(self.quality)
+
+    @property
+    def max_engaged(self) -> dict[int, float]:
+        """Rad by T number: the largest engaged angle, of the tools that have a limit of it."""
+        return {body.number: math.radians(t.max_engagement_deg)
+                for t, body in zip(self.tools, self.bodies, strict=True) if t.max_engagement_deg is not None}
+
+    @property
+    def max_rpm(self) -> dict[int, float]:
+        """1/min by T number: the largest speed that tool and machine allow, where one of them has a limit."""
+        return {body.number: min(limits) for t, body in zip(self.tools, self.bodies, strict=True)
+                if (limits := [x for x in (t.max_rpm, self.machine.max_rpm) if x is not None])}
+
+    @property
+    def tool_lives(self) -> dict[str, float]:
+        """Minutes in cut by tool id, of the tools whose life is limited."""
+        return {t.id: t.life_min for t in self.tools if t.life_min is not None}
+
+    @property
+    def engagement_spacing(self) -> float:
+        """Largest spacing of the stock, mm, at which engaged angles can be told apart; inf where none is limited."""
+        return min((ENGAGEMENT_SHARE * 0.5 * t.diameter_mm for t in self.tools
+                    if (t.max_engagement_deg or SLOT_DEG) < SLOT_DEG), default=math.inf)
+
+
+def mesh_chord(quality: Quality) -> float:
+    """Chord of the mesh, mm: its share of the scallop and of the gouge tolerance."""
+    return float(np.clip(0.15 * quality.scallop_height_mm, 0.001, min(0.005, 0.4 * quality.gouge_tolerance_mm)))
+
+
+def placement_of(setup: Setup) -> SetupFrame:
+    """The setup frame in the coordinates of the file."""
+    p = setup.placement
+    return SetupFrame(origin=tuple(p.origin_mm), z_axis=tuple(p.z_axis), x_axis=tuple(p.x_axis))
+
+
+def _cut_table(setup: Setup, bodies: Sequence[ToolBody]) -> dict[str, CutData]:
+    """Speeds, feeds and layer depths by tool id; layers are slots, as far as the engaged angle is not bounded."""
+    out = {}
+    for tool, body in zip(setup.tools, bodies, strict=True):
+        depth = STEP_DOWN[tool.kind] * tool.diameter_mm
+        link = min(LINK_FEED, setup.machine.max_feed_mm_min or LINK_FEED)
+        engaged = math.radians(SLOT_DEG if tool.max_engagement_deg is None else tool.max_engagement_deg)
+        rough, fine = (cutting_data(setup.material, tool, setup.machine, d) for d in (depth, None))
+        finish = CutData(fine.spindle_rpm, fine.feed, fine.plunge_feed, link, depth, engaged,
+                         bending=bending(setup, tool, body, fine, None))
+        layers = CutData(rough.spindle_rpm, rough.feed, rough.plunge_feed, link, depth, engaged, finish,
+                         bending(setup, tool, body, rough, depth))
+        slot = effective_diameter(body.diameter, body.corner_radius, depth)
+        out[tool.id] = layers.under(depth, 0.5 * slot * (1.0 - math.cos(engaged)))
+    return out
+
+
+def _gauge_lengths(tools: Sequence[Tool], bodies: Sequence[ToolBody]) -> dict[int, float]:
+    """Distance from the spindle face to the tip, mm, by T number: stickout and holder where it is not given."""
+    return {body.number: t.gauge_length_mm if t.gauge_length_mm is not None else
+            body.stickout + sum(h.length for h in body.holder) for t, body in zip(tools, bodies, strict=True)}
+
+
+__all__ = ["JobInputs", "mesh_chord", "placement_of"]
