@@ -179,12 +179,10 @@ def family(out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folde
 
 @app.command()
 def warm(as_json: AsJson = False) -> None:
-    """Compile what is otherwise compiled in the first job, which then takes a minute longer."""
+    """Compile the kernels on all cores; otherwise the first job compiles them, on one."""
     with reported(as_json):
-        from service.commands.demo import run_warm
-        from service.console import say
+        from service.commands.warm import run_warm
 
-        say("compiling kernels, about a minute the first time")
         run_warm()
 
 
