@@ -14,7 +14,7 @@ PIP_OPTIONS = install --disable-pip-version-check --progress-bar off
 INSTALL = $(if $(UV),uv pip install --no-progress --python $(BIN)/python,$(BIN)/python -m pip $(PIP_OPTIONS))
 SHOW := $(PYTHON) .ci/progress.py
 
-.PHONY: setup hooks peers check types test test-cov test-slow test-runtime soak image clients audit golden bench docs demo serve lock third-party clean
+.PHONY: setup hooks peers check types test test-cov test-slow test-runtime soak image clients audit kernels golden bench docs demo serve lock third-party clean
 
 # The page wants Node 20.19 or newer with npm; where there is none, that of a wheel is put into .venv.
 PAGE := service/page/index.html
@@ -115,6 +115,10 @@ clients: $(STAMP)
 # Known vulnerabilities of dependencies, where advisories can be reached.
 audit: $(STAMP)
 	$(BIN)/python .ci/audit.py build/audit
+
+# Rewrites the list of kernels that `zonemill warm` compiles on all cores; a test tells when it is due.
+kernels: $(STAMP)
+	$(BIN)/python .ci/kernel_signatures.py
 
 # Rewrites the expected files; the diff is what gets reviewed.
 golden: $(STAMP)

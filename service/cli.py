@@ -202,12 +202,10 @@ def family(out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folde
 
 @app.command()
 def warm(as_json: AsJson = False) -> None:
-    """Compile the kernels once, so that the first job starts at once. This takes about a minute."""
+    """Compile the kernels on all cores; otherwise the first job compiles them, on one."""
     with error_reporting(as_json):
-        from service.commands.demo import run_warm
-        from service.console import say
+        from service.commands.warm import run_warm
 
-        say("compiling kernels, about a minute the first time")
         run_warm()
 
 

@@ -154,11 +154,11 @@ def build_nodes(triangles: F64, leaf_size: int):
     bin_n, right = np.empty(BINS, np.int64), np.empty(BINS)
     clo, chi = np.empty(3), np.empty(3)
     stack = np.empty((STACK, 4), np.int64)
-    stack[0] = (0, 0, m, 0)
+    stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = 0, 0, m, 0
     top, k = 1, 1
     while top > 0:
         top -= 1
-        node, start, stop, depth = stack[top]
+        node, start, stop, depth = stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3]
         node_lo[node] = np.inf
         node_hi[node] = -np.inf
         clo[:] = np.inf
@@ -184,12 +184,14 @@ def build_nodes(triangles: F64, leaf_size: int):
             axis = np.argmax(chi - clo)
             part = order[start:stop].copy()
             keys = lower[part, axis] + upper[part, axis]
-            order[start:stop] = part[np.argsort(keys, kind="mergesort")]
+            sorted_rows = np.argsort(keys, kind="mergesort")
+            for i in range(len(part)):
+                order[start + i] = part[sorted_rows[i]]
         child[node] = k
         parent[k] = node
         parent[k + 1] = node
-        stack[top] = (k + 1, middle, stop, depth + 1)
-        stack[top + 1] = (k, start, middle, depth + 1)
+        stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3] = k + 1, middle, stop, depth + 1
+        stack[top + 1, 0], stack[top + 1, 1], stack[top + 1, 2], stack[top + 1, 3] = k, start, middle, depth + 1
         top += 2
         k += 2
     return (node_lo[:k].copy(), node_hi[:k].copy(), child[:k].copy(), parent[:k].copy(), first[:k].copy(),
@@ -243,7 +245,8 @@ def column_rows(node_lo, node_hi, child, parent, first, count, corners):
             normal[i, 1] += side * (uz * vx - ux * vz)
             normal[i, 2] += side * nz
         if parent[i] >= 0:
-            normal[parent[i]] += normal[i]
+            for j in range(3):
+                normal[parent[i], j] += normal[i, j]
         out[i, 0], out[i, 1] = node_lo[i, 0], node_hi[i, 0]
         out[i, 2], out[i, 3] = node_lo[i, 1], node_hi[i, 1]
         out[i, 4] = node_hi[i, 2]

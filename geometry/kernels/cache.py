@@ -22,8 +22,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from numba import config
+from numba import config, types
 from numba.core import caching
+from numba.core.dispatcher import Dispatcher
 
 from geometry.kernels.sources import ROOT, Sources
 
@@ -166,13 +167,31 @@ def remove_stale(given: str | None = None, age_s: float = WEEK_S) -> list[Path]:
     return removed
 
 
+def compile_constants_as_values() -> None:
+    """Let a kernel that another one calls with a constant be compiled for the constant's type, not for its value.
+
+    Numba compiles such a kernel once for every constant, from source to machine code, though the value makes no
+    difference before LLVM inlines the call. LLVM knows the constant all the same.
+    """
+    template = Dispatcher.get_call_template
+
+    def of_values(self: Any, args: Any, kws: Any) -> Any:
+        if sources().name_of(Path(self.py_func.__code__.co_filename)) is not None:
+            args = tuple(types.unliteral(a) for a in args)
+            kws = {name: types.unliteral(a) for name, a in kws.items()}
+        return template(self, args, kws)
+
+    setattr(Dispatcher, template.__name__, of_values)
+
+
 def install() -> None:
-    """Put our locator before numba's, and our index in place of numba's."""
+    """Put our locator before numba's, our index in place of numba's, and constants beside values."""
     caching.CacheImpl._locator_classes.insert(0, KernelLocator)
     chosen = str(getattr(config, "CACHE_LOCATOR_CLASSES", ""))  # a list of the user's own would go before it
     if chosen:
         config.CACHE_LOCATOR_CLASSES = f"{__name__}.{KernelLocator.__name__},{chosen}"
     caching.IndexDataCacheFile = LockedIndex
+    compile_constants_as_values()
 
 
 install()

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _segment2(px, py, pz, p, q):
     """Squared distance from a point to a segment."""
     ux, uy, uz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
@@ -18,7 +18,7 @@ def _segment2(px, py, pz, p, q):
     return (wx - s * ux) ** 2 + (wy - s * uy) ** 2 + (wz - s * uz) ** 2
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def triangle2(px, py, pz, t):
     """Squared distance from a point to a triangle (3, 3): to its plane over it, else to its edges."""
     ux, uy, uz = t[1, 0] - t[0, 0], t[1, 1] - t[0, 1], t[1, 2] - t[0, 2]
@@ -35,7 +35,7 @@ def triangle2(px, py, pz, t):
     return min(_segment2(px, py, pz, t[0], t[1]), _segment2(px, py, pz, t[1], t[2]), _segment2(px, py, pz, t[2], t[0]))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def foot(px, py, pz, t):
     """The point of a triangle (3, 3) that ``triangle2`` measures to."""
     p = np.array([px, py, pz])
@@ -58,7 +58,7 @@ def foot(px, py, pz, t):
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _box2(lower, upper, px, py, pz):
     x = max(lower[0] - px, 0.0, px - upper[0])
     y = max(lower[1] - py, 0.0, py - upper[1])
@@ -66,7 +66,7 @@ def _box2(lower, upper, px, py, pz):
     return x * x + y * y + z * z
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def nearest_row(lower, upper, child, first, size, corners, px, py, pz, most2, stack):
     """Squared distance in mm² from a point to the mesh, and the row of the nearest triangle.
 
@@ -92,7 +92,7 @@ def nearest_row(lower, upper, child, first, size, corners, px, py, pz, most2, st
     return best, found
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def nearest_triangles(lower, upper, child, first, size, corners, points, limit, out, row, feet):
     """out[i] = distance in mm from points[i] to the mesh, row[i] the row of the nearest triangle, feet[i] the place.
 
@@ -105,4 +105,6 @@ def nearest_triangles(lower, upper, child, first, size, corners, points, limit, 
         out[i] = math.sqrt(best) if found >= 0 else np.inf
         row[i] = found
         if found >= 0:
-            feet[i] = foot(px, py, pz, corners[found])
+            place = foot(px, py, pz, corners[found])
+            for k in range(3):
+                feet[i, k] = place[k]

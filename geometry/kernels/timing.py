@@ -52,10 +52,13 @@ def seconds_of_moves(way, speed, stop, curve, a, d, out):
     An arc counts to the moves before and behind it by halves.
     """
     m = len(way)
-    size = np.sqrt((way * way).sum(axis=1))
+    size = np.empty(m)
+    for i in range(m):
+        size[i] = math.sqrt(way[i, 0] * way[i, 0] + way[i, 1] * way[i, 1] + way[i, 2] * way[i, 2])
     # by turns what is left straight of a move and the arc behind it: length, most speed, most change of it
     length, most, change = np.zeros(2 * m), np.zeros(2 * m), np.full(2 * m, a)
-    length[::2], most[::2] = size, speed
+    for i in range(m):
+        length[2 * i], most[2 * i] = size[i], speed[i]
     for i in range(m - 1):
         k = 2 * i + 1
         change[k] = ARC_SHARE * a

@@ -1,4 +1,4 @@
-"""``zonemill demo`` runs the first steps of a user over HTTP; ``zonemill warm`` compiles the kernels."""
+"""``zonemill demo`` runs the first steps of a user over HTTP."""
 
 from __future__ import annotations
 
@@ -49,32 +49,6 @@ def run_demo(out: Path, *, keep: bool, chain: str = "service.pipeline") -> int:
                 say(f"serving on {url} until Ctrl-C; the page is {url}/")
                 wait_for_interrupt()
     return exit_code(job)
-
-
-def run_warm() -> None:
-    """Compile every kernel by planning and proving a small part.
-
-    Compiled code of other versions is removed a week after its last use.
-
-    Raises
-    ------
-    InternalError
-        The small part was not proved, so this machine must not plan other parts.
-    """
-    from examples.demo import write_small
-    from geometry.kernels.cache import remove_stale
-    from service.from_wire import read_setup
-    from service.pipeline import plan
-
-    remove_stale()
-    with tempfile.TemporaryDirectory(prefix="zonemill-warm-") as folder:
-        step, setup = write_small(folder)
-        report = plan(step, read_setup(setup), Path(folder, "out"), lambda _stage, _share: None)
-    if report["state"] != "proved":
-        raise InternalError("the small test part was not proved, although it should be", code="not_as_installed",
-                            subjects=tuple(f["message"] for f in report["findings"][:5]),
-                            measured=report["state"], limit="proved",
-                            remedy="install again; please report the error if it remains")
 
 
 def exit_code(job: dict[str, Any]) -> int:

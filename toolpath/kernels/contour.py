@@ -33,7 +33,7 @@ HALVINGS = 5  # of a chord
 MOST_PER_CHORD = 2 ** HALVINGS
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _side_id(side, i, j, nx):
     if side == 0:
         return 2 * (i * nx + j)
@@ -44,7 +44,7 @@ def _side_id(side, i, j, nx):
     return 2 * (i * nx + j) + 1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def trace(blocked, active, segments):
     """Chains of edge ids: (ids, starts, closed); chain k is ids[starts[k]:starts[k+1]].
 
@@ -93,7 +93,7 @@ def trace(blocked, active, segments):
     return ids[:n], starts[: chains + 1], closed[:chains]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def stands_blocked(tree, noncut, row, x, y, z, radius, corner, allowance):
     """Whether the assembly cannot stand with its tip at (x, y, z)."""
     if noncut_at(noncut, row, x, y) > z:
@@ -101,7 +101,7 @@ def stands_blocked(tree, noncut, row, x, y, z, radius, corner, allowance):
     return is_blocked(tree, x, y, z - allowance, radius, corner)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _bisect(tree, noncut, row, fx, fy, bx, by, z, radius, corner, allowance, rounds):
     """Last free place between a free point f and a blocked point b."""
     for _ in range(rounds):
@@ -113,7 +113,7 @@ def _bisect(tree, noncut, row, fx, fy, bx, by, z, radius, corner, allowance, rou
     return fx, fy
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True, parallel=True)
 def place_crossings(tree, noncut, row, ids, blocked, x0, y0, step, z, radius, corner, allowance, rounds, out):
     """Exact place (n, 2) of every crossing, on its free side."""
     nx = blocked.shape[1]
@@ -128,7 +128,7 @@ def place_crossings(tree, noncut, row, ids, blocked, x0, y0, step, z, radius, co
         out[k, 0], out[k, 1] = _bisect(tree, noncut, row, ax, ay, bx, by, z, radius, corner, allowance, rounds)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _true_place(tree, noncut, row, px, py, qx, qy, z, radius, corner, allowance, tol, reach):
     """Where the boundary really is beside the middle of a chord: (x, y, moved)."""
     mx, my = 0.5 * (px + qx), 0.5 * (py + qy)
@@ -164,7 +164,7 @@ def _true_place(tree, noncut, row, px, py, qx, qy, z, radius, corner, allowance,
     return mx, my, False
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True, parallel=True)
 def refine(tree, noncut, row, points, follows, z, radius, corner, allowance, tol, reach, out, count):
     """Points put in on every chord that leaves the true boundary by more than tol.
 
@@ -202,7 +202,7 @@ def refine(tree, noncut, row, points, follows, z, radius, corner, allowance, tol
         count[k] = m
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def chords_free(tree, noncut, row, points, z, radius, corner, allowance, spacing, ok):
     """ok[k]: the straight move from point k to k+1 at height z stays free, tested every ``spacing`` mm."""
     for k in range(len(points) - 1):
@@ -217,7 +217,7 @@ def chords_free(tree, noncut, row, points, z, radius, corner, allowance, spacing
                 break
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def linear_crossings(ids, value, level, x0, y0, step, out):
     """Places (n, 2) where a nodal field ``value`` passes ``level`` on each edge, by linear interpolation."""
     nx = value.shape[1]
@@ -232,7 +232,7 @@ def linear_crossings(ids, value, level, x0, y0, step, out):
         out[k, 1] = y0 + step * (i + t * (i2 - i))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def thin(points, tol, keep):
     """Mark the points of a polyline (n, 3) to keep so that the rest lie within tol of it (Douglas-Peucker)."""
     n = len(points)

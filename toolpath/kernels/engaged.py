@@ -17,12 +17,12 @@ SECTORS = 36
 """Of the half circle: an angle is known to a 36th of it."""
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _sector(sine):
     return max(0, min(int((math.asin(min(max(sine, -1.0), 1.0)) / math.pi + 0.5) * SECTORS), SECTORS - 1))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def engaged(top, x0, y0, step, tips, ways, radius, corner, skin, window, out):
     """Angle in stock, rad, at tips (n, 3), mm, on their ways (n, 2), unit, into ``out`` (n,).
 

@@ -76,14 +76,21 @@ def _at(px, py, pz, part, t, cosine, sine, radius, corner, flute):
 
 
 @njit(**KERNEL)
+def _put(stack, n, a, s_a, slope_a, b, s_b, slope_b):
+    """One number at a time: numba checks the shape of a row at run time, with a message it compiles for seconds."""
+    stack[n, 0], stack[n, 1], stack[n, 2] = a, s_a, slope_a
+    stack[n, 3], stack[n, 4], stack[n, 5] = b, s_b, slope_b
+
+
+@njit(**KERNEL)
 def _least(px, py, pz, part, bend, mid, mid_slope, radius, corner, flute, best, stack):
     """The least of ``best`` and of s along a part of a move, to TOLERANCE; bend: B; mid, mid_slope: s, s' at 1/2."""
     theta = part[12]
     first, first_slope = _at(px, py, pz, part, 0.0, 1.0, 0.0, radius, corner, flute)
     last, last_slope = _at(px, py, pz, part, 1.0, np.cos(theta), np.sin(theta), radius, corner, flute)
     best = min(best, first, mid, last)
-    stack[0] = 0.0, first, first_slope, 0.5, mid, mid_slope
-    stack[1] = 0.5, mid, mid_slope, 1.0, last, last_slope
+    _put(stack, 0, 0.0, first, first_slope, 0.5, mid, mid_slope)
+    _put(stack, 1, 0.5, mid, mid_slope, 1.0, last, last_slope)
     n = 2
     while n > 0:
         n -= 1
@@ -98,8 +105,8 @@ def _least(px, py, pz, part, bend, mid, mid_slope, radius, corner, flute, best, 
         t = a + min(max(cross, LEAST_SHARE * length), (1.0 - LEAST_SHARE) * length)
         s, slope = _at(px, py, pz, part, t, np.cos(theta * t), np.sin(theta * t), radius, corner, flute)
         best = min(best, s)
-        stack[n] = a, s_a, slope_a, t, s, slope
-        stack[n + 1] = t, s, slope, b, s_b, slope_b
+        _put(stack, n, a, s_a, slope_a, t, s, slope)
+        _put(stack, n + 1, t, s, slope, b, s_b, slope_b)
         n += 2
     return best
 

@@ -18,7 +18,7 @@ SETTLED = 1e-6
 """Of a step: what a value may still get less by."""
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def march(far, inside, step):
     """Lower ``far`` (ny, nx), mm, 0 at sources and inf elsewhere, in place to the length of the way; returns rounds.
 
@@ -53,7 +53,7 @@ def march(far, inside, step):
             return rounds
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def spread(when, radius, step, out):
     """Lower ``out`` (ny, nx) in place to the least ``when`` of the discs that hold a node.
 

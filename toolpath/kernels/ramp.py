@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def ease(points, lift, slope, rounding):
     """Raise ``lift`` (n,) in place until no move along points (n, 3) loses more of it than its length allows.
 

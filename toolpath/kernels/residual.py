@@ -19,7 +19,7 @@ FAR = 1e3
 LEVEL_PLANE, UPRIGHT = 1, 2
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True, inline="always")
 def _gap(px, py, pz, cx, cy, cz, radius, corner, level):
     if level == LEVEL_PLANE:
         u = np.sqrt((px - cx) ** 2 + (py - cy) ** 2) - (radius - corner)
@@ -33,7 +33,7 @@ def _gap(px, py, pz, cx, cy, cz, radius, corner, level):
     return np.sqrt(u * u + w * w) - corner
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _segment_gap(p, a, b, radius, corner, level):
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     best = min(_gap(p[0], p[1], p[2], a[0], a[1], a[2], radius, corner, level),
@@ -51,7 +51,7 @@ def _segment_gap(p, a, b, radius, corner, level):
     return best
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def lower(points, level, cell_start, cell_items, gx, gy, cell, ncx, ncy, path, flute, radius, corner, margin, residual):
     """Lower residual (n,) by one polyline of tips (m, 3); samples are binned in square cells in plan.
 

@@ -14,7 +14,7 @@ HALF_DIAGONAL = 0.7072  # of a cell, rounded up
 LEAST_RISE = 0.02  # of a tool axis: one that lies lower takes nothing off a height over the plan
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True, inline="always")
 def _bottom(rho, radius, corner):
     u = rho - (radius - corner)
     if u <= 0.0:
@@ -22,7 +22,7 @@ def _bottom(rho, radius, corner):
     return corner - np.sqrt(max(corner * corner - u * u, 0.0))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def stamp(top, cover, x0, y0, step, points, radius, corner):
     """Lower ``top`` and ``cover`` along a polyline of tips (n, 3).
 
@@ -53,7 +53,7 @@ def stamp(top, cover, x0, y0, step, points, radius, corner):
                         cover[i, j] = min(cover[i, j], z + _bottom(rho + half, radius, corner))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def overlaps(heights, pooled, side, x0, y0, step, tips, radius, corner, margin, half, least, out):
     """How far the stock stands above the cutter's bottom at tips (n, 3), mm: greatest over the disc; <= 0 is air.
 
@@ -94,7 +94,7 @@ def overlaps(heights, pooled, side, x0, y0, step, tips, radius, corner, margin, 
         out[k] = worst
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def standing(cover, part, x0, y0, step, tips, radius, half, out):
     """How far stock stands above tips (n, 3), mm, in the cells that a cutter of this radius may touch.
 
@@ -117,7 +117,7 @@ def standing(cover, part, x0, y0, step, tips, radius, half, out):
         out[k] = worst
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def meets(top, pooled, side, x0, y0, step, tips, height, radius, out):
     """Set out[k] where stock stands higher than ``height`` mm over tip k within ``radius`` mm of its axis.
 
@@ -147,7 +147,7 @@ def meets(top, pooled, side, x0, y0, step, tips, height, radius, out):
                 pooled[row, col] = highest
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _gone(x, y, z, turns, tops, frames, rise):
     """Whether a place lies above one of the maps of ``sink``, or beside it."""
     for k in range(len(turns)):
@@ -162,7 +162,7 @@ def _gone(x, y, z, turns, tops, frames, rise):
     return False
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def sink(heights, known, x0, y0, step, low, turns, tops, frames, rise):
     """Lower heights to where, on the way straight down, stock begins that other maps show too.
 
@@ -196,7 +196,7 @@ def sink(heights, known, x0, y0, step, low, turns, tops, frames, rise):
                 heights[i, j] = above
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def stamp_leaning(heights, x0, y0, step, tips, axes, sides, radius, low, high, shrink):
     """Lower heights by the flank of a leaning tool standing at poses, pose after pose.
 
@@ -243,7 +243,7 @@ def stamp_leaning(heights, x0, y0, step, tips, axes, sides, radius, low, high, s
                     heights[i, j] = tz + under
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def stamp_balls(heights, x0, y0, step, centres, radius, shrink):
     """Lower heights by balls, one after the other.
 

@@ -15,7 +15,7 @@ from verify.kernels.rays import plan_distance
 from verify.kernels.stock import _note, _worse, known_depth
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _body_cells(cx0, cx1, cy0, cy1, origin, size, shape, first, points, a, d, body, slack, best):
     """Find the points that one body takes in by more than ``slack`` along one move."""
     z0, z1, r0, r1 = body[0], body[1], body[2], body[3]
@@ -45,7 +45,7 @@ def _body_cells(cx0, cx1, cy0, cy1, origin, size, shape, first, points, a, d, bo
                     _worse(best, int(body[5]), depth, body[4], points[i, 0], points[i, 1], points[i, 2])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def body_tile(cx0, cx1, cy0, cy1, origin, size, shape, first, points, starts, ends, feeds, tool, radii, bodies,
               body_first, slack, events):
     """Events of all feed moves with the points in cell columns cx0..cx1-1, cy0..cy1-1; returns their number."""

@@ -22,18 +22,18 @@ GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 SECTIONS = 32  # of a move: 2e-7 of it is left
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _aside(s, wx, wy, wz, dx, dy, dz, z0, r, k):
     ux, uy = wx - s * dx, wy - s * dy
     return r + k * (wz - s * dz - z0) - math.sqrt(ux * ux + uy * uy)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _lesser(s, wx, wy, wz, dx, dy, dz, z0, r, k):
     return min(_aside(s, wx, wy, wz, dx, dy, dz, z0, r, k), wz - s * dz - z0)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _nearest(s1, s2, wx, wy, dx, dy, dz, k):
     """Where on [s1, s2] aside is greatest."""
     plan2, fall = dx * dx + dy * dy, -k * dz
@@ -46,7 +46,7 @@ def _nearest(s1, s2, wx, wy, dx, dy, dz, k):
     return min(max(s, s1), s2)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _lesser_most(s1, s2, wx, wy, wz, dx, dy, dz, z0, r, k):
     """The greatest on [s1, s2] of the lesser of aside and down."""
     beside, high = _nearest(s1, s2, wx, wy, dx, dy, dz, k), s1 if dz > 0.0 else s2
@@ -69,7 +69,7 @@ def _lesser_most(s1, s2, wx, wy, wz, dx, dy, dz, z0, r, k):
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _meeting(wz, dz, low, high):
     """First and last s at which a place wz over the tip is between two heights of the tool; first > last for never."""
     if abs(dz) < 1e-15:
@@ -78,7 +78,7 @@ def _meeting(wz, dz, low, high):
     return max(0.0, min(u, v)), min(1.0, max(u, v))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _most(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column, lesser):
     """The greatest of aside, or of the lesser of aside and down; -inf where the heights never meet.
 
@@ -102,7 +102,7 @@ def _most(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column, lesser):
     return max(out, _aside(_nearest(s1, s2, wx, wy, dx, dy, dz, k), wx, wy, wz, dx, dy, dz, z0, r0, k))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def overlap(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
     """How deep (radially, mm) the frustum takes in the point, or the column below it.
 
@@ -111,7 +111,7 @@ def overlap(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
     return _most(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column, False)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def penetration(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
     """How deep the frustum takes in the point (or the column below it), mm: the shorter way out, aside or down.
 
@@ -120,7 +120,7 @@ def penetration(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
     return max(_most(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column, True), 0.0)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def no_deeper(wx, wy, wz, dx, dy, dz, z0, z1, wide, clearance, known):
     """Whether ``contact`` with anything of radius ``wide``, the clearance in it, from z0 to z1 is ``known`` at most.
 
@@ -131,7 +131,7 @@ def no_deeper(wx, wy, wz, dx, dy, dz, z0, z1, wide, clearance, known):
     return overlap(wx, wy, wz, dx, dy, dz, z0, z1, wide, wide, False) <= known
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def contact(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, clearance, slack, known, column):
     """How deep a body grown by ``clearance`` takes in a point (or the column below it), as an event counts it.
 
@@ -147,7 +147,7 @@ def contact(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, clearance, slack, known, col
     return clearance + bare if bare > slack else min(depth, clearance)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _of_ball(s, wx, wy, wz, dx, dy, dz, z0, z1, r, k, v, lesser):
     """The greatest of aside, or of the lesser of aside and down, of places within v of the point, at s.
 
@@ -175,7 +175,7 @@ def _of_ball(s, wx, wy, wz, dx, dy, dz, z0, z1, r, k, v, lesser):
     return high + q
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _most_of_ball(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, v, lesser):
     """The greatest on the move of ``_of_ball``, which is concave in s: by golden sections."""
     s1, s2 = _meeting(wz, dz, z0 - v, z1 + v)
@@ -202,7 +202,7 @@ def _most_of_ball(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, v, lesser):
     return most
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def contact_of_ball(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, v, clearance, slack, known):
     """As ``contact``, for the deepest of all places within v mm of the point."""
     k = (r1 - r0) / max(z1 - z0, 1e-12)

@@ -18,20 +18,20 @@ from numba import njit
 INF = np.inf
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def bottom(rho, a, r):
     """Height of the cutting profile over the tip at distance rho from the axis."""
     over = max(rho - a, 0.0)
     return r - math.sqrt(max(r * r - over * over, 0.0))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _rho(s, wx, wy, dx, dy):
     ux, uy = wx - s * dx, wy - s * dy
     return math.sqrt(ux * ux + uy * uy)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _lowest_s(wx, wy, dx, dy, dz, plan, s0, miss2, s1, s2, a, r):
     """Where on [s1, s2] the profile over the line is lowest (a convex function of s)."""
     if dz == 0.0:
@@ -56,7 +56,7 @@ def _lowest_s(wx, wy, dx, dy, dz, plan, s0, miss2, s1, s2, a, r):
     return 0.5 * (lo + hi)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def lowest(x, y, ax, ay, az, dx, dy, dz, radius, corner, grow):
     """Least height over (x, y) of a cutting profile carried along the move, and the s of its first touch.
 
@@ -65,7 +65,7 @@ def lowest(x, y, ax, ay, az, dx, dy, dz, radius, corner, grow):
     return lowest_within(x, y, ax, ay, az, dx, dy, dz, radius + grow, radius - corner + grow, corner)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def lowest_within(x, y, ax, ay, az, dx, dy, dz, wide, a, r):
     """As ``lowest``, of what of a profile, flat to a and round by r, is no farther out than ``wide``."""
     wx, wy = x - ax, y - ay
@@ -86,14 +86,14 @@ def lowest_within(x, y, ax, ay, az, dx, dy, dz, wide, a, r):
     return az + s * dz + bottom(_rho(s, wx, wy, dx, dy), a, r), s1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _within(s, wx, wy, dx, dy, dz, over, radius, corner):
     """How deep a line is in a cutting part at s: the shorter of the way aside and the way over its end."""
     rho = _rho(s, wx, wy, dx, dy)
     return min(radius - rho, over - s * dz - bottom(min(rho, radius), radius - corner, corner))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def entered(wx, wy, over, dx, dy, dz, radius, corner):
     """How deep a line is in a cutting part carried along a move, mm: the shorter way out, aside or over its end.
 
@@ -123,13 +123,13 @@ def entered(wx, wy, over, dx, dy, dz, radius, corner):
     return _within(0.5 * (s1 + s2), wx, wy, dx, dy, dz, over, radius, corner)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _cells(lo, hi, origin, step, first, stop):
     """Lines whose coordinate lies in [lo, hi], cut to first..stop-1."""
     return (max(first, math.ceil((lo - origin) / step - 0.5)), min(stop - 1, math.floor((hi - origin) / step - 0.5)))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _raise_facet(height, i0, i1, origin, step, p, q, s, reach):
     """Raise lines to the upper side of one triangle shifted by ``reach`` along its normal."""
     ux, uy, uz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
@@ -150,7 +150,7 @@ def _raise_facet(height, i0, i1, origin, step, p, q, s, reach):
                 height[i, j] = max(height[i, j], oz + f * uz + g * vz)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _raise_edge(height, i0, i1, origin, step, p, q, reach):
     """Raise lines to the upper side of a sphere of radius ``reach`` carried along one edge."""
     dx, dy, dz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
@@ -177,7 +177,7 @@ def _raise_edge(height, i0, i1, origin, step, p, q, reach):
                 height[i, j] = max(height[i, j], p[2] + s * dz + math.sqrt(reach * reach - rho * rho))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def raise_offset(height, i0, i1, origin, step, vertices, faces, edges, reach):
     """Raise the lines of rows i0..i1-1 to the top of a mesh grown by ``reach``: exact on every line.
 

@@ -18,7 +18,7 @@ TOUCH = 1e-6
 SAME = 1e-8  # mm: a move that takes less than that off a ray has taken nothing, as the way back out of a plunge
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def plan_distance(wx, wy, dx, dy, length2):
     """Distance in plan from (wx, wy) to the segment from the origin to d."""
     s = 0.0
@@ -29,7 +29,7 @@ def plan_distance(wx, wy, dx, dy, length2):
     return math.sqrt(wx * wx + wy * wy)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def gap(x, y, z, dx, dy, dz, plan2, radius, corner, length):
     """A lower bound of the distance from a point, seen from the tip, to the swept cutting part (negative inside)."""
     plan = plan_distance(x, y, dx, dy, plan2)
@@ -47,7 +47,7 @@ def gap(x, y, z, dx, dy, dz, plan2, radius, corner, length):
     return max(side, math.sqrt(wx * wx + wy * wy + wz * wz) - corner)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _flank_bound(wx, wy, nx, ny, dx, dy, plan2, radius):
     """A lower bound of t at which the ray can enter the upright sweep of the full radius (0 inside).
 
@@ -65,7 +65,7 @@ def _flank_bound(wx, wy, nx, ny, dx, dy, plan2, radius):
     return (rho - radius) / closing if closing > 1e-12 else 1e300
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def new_left(qx, qy, qz, nx, ny, nz, dx, dy, dz, plan2, radius, corner, length, left):
     """What a move leaves on a ray from q along n that had ``left`` on it; ``left`` itself where it takes nothing.
 
@@ -97,7 +97,7 @@ def new_left(qx, qy, qz, nx, ny, nz, dx, dy, dz, plan2, radius, corner, length, 
     return lo if lo <= hi and hi >= -TOUCH and lo < left else left
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def cut_tile(cx0, cx1, cy0, cy1, origin, size, shape, first, points, normals, residual, mover, left,
              starts, ends, feeds, tool, cutters):
     """Work all feed moves through the cell columns cx0..cx1-1, cy0..cy1-1.

@@ -22,7 +22,7 @@ REFRESH = 64
 ARM = 0.05  # mm by which a line that stands over the flutes must reach into them
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _top(height, i0, i1, j0, j1):
     most = -INF
     for i in range(i0, i1):
@@ -31,7 +31,7 @@ def _top(height, i0, i1, j0, j1):
     return most
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _note(events, count, m, best):
     """Append the events of one move; of a full table the worse half stays. Returns how many were noted in all.
 
@@ -43,10 +43,17 @@ def _note(events, count, m, best):
         if best[code, 0] > 0.0:
             if used == room:
                 used = room // 2
-                worst = np.sort(np.argsort(events[:room, 3] - events[:room, 2])[:used])
-                events[:used] = events[worst]
+                worse = np.zeros(room, np.bool_)
+                worse[np.argsort(events[:room, 3] - events[:room, 2])[:used]] = True
+                kept = 0
+                for row in range(room):
+                    if worse[row]:
+                        for k in range(events.shape[1]):
+                            events[kept, k] = events[row, k]
+                        kept += 1
             events[used, 0], events[used, 1] = m, code
-            events[used, 2:7] = best[code]
+            for k in range(5):
+                events[used, 2 + k] = best[code, k]
             used += 1
             count += 1
             best[code, 0] = 0.0
@@ -54,7 +61,7 @@ def _note(events, count, m, best):
     return count
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def known_depth(best, code, clearance):
     """What a depth that counts from a body grown by ``clearance`` must exceed to be graver than the one noted.
 
@@ -63,13 +70,13 @@ def known_depth(best, code, clearance):
     return max(best[code, 0] - best[code, 1] + clearance, 0.0) if best[code, 0] > 0.0 else 0.0
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _worse(best, code, depth, clearance, x, y, z):
     if depth > known_depth(best, code, clearance):
         best[code, 0], best[code, 1], best[code, 2], best[code, 3], best[code, 4] = depth, clearance, x, y, z
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _lower(height, box, origin, step, a, d, cutter, end_radius, skin, steep, earned, since, dug, gone_on, come, begun,
            engaged, best):
     """Lower the lines under one feed move.
@@ -138,7 +145,7 @@ def _lower(height, box, origin, step, a, d, cutter, end_radius, skin, steep, ear
     return cut, under
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _meet_body(height, box, origin, step, a, d, body, grow, slack, best):
     """Find the lines that one body, grown further by ``grow``, takes in by more than ``slack``."""
     z0, z1, r0, r1 = body[0], body[1], body[2] + grow, body[3] + grow
@@ -161,7 +168,7 @@ def _meet_body(height, box, origin, step, a, d, body, grow, slack, best):
                 _worse(best, code, depth, body[4] + grow, x, y, top)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _rapid_cutter(height, box, origin, step, a, d, cutter, grow, best):
     """Find the lines that the cutting part, grown radially, enters in a rapid; whether they stand over the flutes."""
     radius, corner, length = cutter
@@ -198,7 +205,7 @@ def _rapid_cutter(height, box, origin, step, a, d, cutter, grow, best):
     return under
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def stock_tile(i0, i1, j0, j1, origin, step, height, starts, ends, feeds, free, steep, earned, ways, parts, tool,
                cutters, ends_radius, skins, bodies, body_first, rapid_grow, slack, cut, under, engaged, events):
     """Work all moves through the lines i0..i1-1, j0..j1-1 of ``height``, in place.

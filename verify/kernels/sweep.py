@@ -27,7 +27,7 @@ FLAT_RAY = 1e-9
 ROOT_ERROR = 1e-9
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _below_zero(a, b, c):
     """The interval of x with a x² + 2 b x + c <= 0 for a >= 0; (inf, -inf) where there is none."""
     if a <= 1e-18:
@@ -42,7 +42,7 @@ def _below_zero(a, b, c):
     return (-b - w) / a, (-b + w) / a
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _on_line_s(s, att, ats, ass, bt, bs, c, qz, nz, dz, h0, h1):
     """Extent in t of the region on the line s = const."""
     lo, hi = _below_zero(att, bt + ats * s, c + 2.0 * bs * s + ass * s * s)
@@ -58,7 +58,7 @@ def _on_line_s(s, att, ats, ass, bt, bs, c, qz, nz, dz, h0, h1):
     return (lo, hi) if lo <= hi else (INF, -INF)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _on_line_h(h, att, ats, ass, bt, bs, c, qz, nz, dz):
     """Extent in t of the region on the line of constant height h.
 
@@ -85,7 +85,7 @@ def _on_line_h(h, att, ats, ass, bt, bs, c, qz, nz, dz):
     return min(ta, tb), max(ta, tb)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def quadric_interval(att, ats, ass, bt, bs, c, qz, nz, dz, h0, h1):
     """Extent in t of {att t² + 2 ats t s + ass s² + 2 bt t + 2 bs s + c <= 0, 0 <= s <= 1, h0 <= h <= h1}.
 
@@ -113,14 +113,14 @@ def quadric_interval(att, ats, ass, bt, bs, c, qz, nz, dz, h0, h1):
     return lo, hi
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def cylinder_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, h0, h1):
     """Interval of t inside the sweep of a vertical cylinder h0 <= h <= h1."""
     return quadric_interval(nx * nx + ny * ny, -(nx * dx + ny * dy), dx * dx + dy * dy, qx * nx + qy * ny,
                             -(qx * dx + qy * dy), qx * qx + qy * qy - radius * radius, qz, nz, dz, h0, h1)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def sphere_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, centre, h1):
     """Interval of t inside the sweep of a sphere centred at height ``centre``, cut off above height h1."""
     z = qz - centre
@@ -129,7 +129,7 @@ def sphere_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, centre, h1):
                             qx * qx + qy * qy + z * z - radius * radius, qz, nz, dz, -1e300, h1)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def capsule_start(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, centre):
     """Least t inside the sweep of a whole sphere: inf where missed, NaN where the ray runs along the move.
 
@@ -158,7 +158,7 @@ def capsule_start(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, centre):
     return -b - math.sqrt(disc) if disc >= 0.0 else INF
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _disc_slope(s, qx, qy, qz, dx, dy, dz, a):
     """d/ds of half the squared distance from q to the disc of radius a carried to s D."""
     wx, wy, wz = qx - s * dx, qy - s * dy, qz - s * dz
@@ -169,7 +169,7 @@ def _disc_slope(s, qx, qy, qz, dx, dy, dz, a):
     return slope
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _disc_nearest(qx, qy, qz, dx, dy, dz, a):
     """The s in [0, 1] at which a horizontal disc of radius a carried along D is nearest to q."""
     lo, hi = 0.0, 1.0
@@ -199,7 +199,7 @@ def _disc_nearest(qx, qy, qz, dx, dy, dz, a):
     return 0.5 * (lo + hi)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def disc_distance(qx, qy, qz, nx, ny, nz, dx, dy, dz, a):
     """Distance from q to the swept disc and its derivative along n."""
     s = _disc_nearest(qx, qy, qz, dx, dy, dz, a)
@@ -213,7 +213,7 @@ def disc_distance(qx, qy, qz, nx, ny, nz, dx, dy, dz, a):
     return dist, (over * radial + wz * nz) / dist
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _disc_root(t, limit, sign, qx, qy, qz, nx, ny, nz, dx, dy, dz, a, r):
     """Newton from t (outside) in the direction of ``sign`` to distance r; NaN where the ray passes by."""
     for _ in range(80):
@@ -228,7 +228,7 @@ def _disc_root(t, limit, sign, qx, qy, qz, nx, ny, nz, dx, dy, dz, a, r):
     return t
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def torus_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, r):
     """Interval of t inside the sweep of a disc of radius R - r at height r grown by r (error 1e-9 mm)."""
     lo, hi = sphere_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, r, 1e300)
@@ -242,7 +242,7 @@ def torus_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, r):
     return first, (first if math.isnan(last) else last)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def cutter_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, corner, length):
     """Interval of t inside the sweep of a whole cutting part; (inf, -inf) where the ray misses it."""
     lo, hi = cylinder_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, corner, length)

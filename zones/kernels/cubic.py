@@ -16,7 +16,7 @@ RIDGE = np.array([1e-14, 1e-14, 1e-10, 1e-10, 1e-10, 1e-6, 1e-6, 1e-6, 1e-6])
 """Cost of each term. Where few rows of nodes do not separate v from v^2, or u^2 from u^3, the lower order wins."""
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def local_nodes(faces, ids, par, vertices, same):
     """Nodes that are one per face, vertex and parameters, so both sides of a seam have their own.
 
@@ -46,7 +46,7 @@ def local_nodes(faces, ids, par, vertices, same):
     return corner, first[:n].copy()
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def rings(corner, count):
     """Neighbours of every node, most of them twice: (n + 1,) int64 starts and the nodes in one row."""
     start = np.zeros(count + 1, np.int64)
@@ -64,7 +64,7 @@ def rings(corner, count):
     return start, ring
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _neighbours(i, start, ring, out):
     """Nodes around node i, without it, each once: two rings, and up to ``RINGS`` until there are ``ENOUGH``."""
     n, done = 0, 0
@@ -88,7 +88,7 @@ def _neighbours(i, start, ring, out):
     return n
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _solve(a, b):
     """a x = b for a (m, m) symmetric and positive definite, b (m, 3) is overwritten by x (Cholesky)."""
     m = len(a)
@@ -109,14 +109,14 @@ def _solve(a, b):
             b[i, c] /= a[i, i]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _terms(s, t, out):
     """The nine terms of a patch."""
     out[0], out[1], out[2], out[3], out[4] = s, t, s * s, s * t, t * t
     out[5], out[6], out[7], out[8] = s * s * s, s * s * t, s * t * t, t * t * t
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def fit_patches(place, par, start, ring):
     """Least-squares patch of every node, (n, 9, 3) float64, weighted by one over the squared scaled distance."""
     coef = np.zeros((len(place), 9, 3))
@@ -153,7 +153,7 @@ def fit_patches(place, par, start, ring):
     return coef
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _shares(a, b, c, p, out):
     """Barycentric coordinates of p in the triangle a b c, clipped to it."""
     e, f, w = b - a, c - a, p - a
@@ -164,7 +164,7 @@ def _shares(a, b, c, p, out):
     out[0] = 1.0 - out[1] - out[2]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def blend_patches(corner, points, place, par, coef):
     """Places (k, 3) and unit normals (k, 3) on the patches at points (k, 3) of triangles of nodes (k, 3).
 

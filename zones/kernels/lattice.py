@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def noncut_at(grid, row, x, y):
     """Tip limit of shank and holder at one place, mm."""
     j = int(np.floor((x - row[0]) / row[2] + 0.5))
@@ -19,7 +19,7 @@ def noncut_at(grid, row, x, y):
     return grid[min(max(i, 0), grid.shape[0] - 1), min(max(j, 0), grid.shape[1] - 1)]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def noncut_lookup(grid, row, xy):
     """``noncut_at`` for xy (n, 2)."""
     out = np.empty(len(xy))
@@ -28,7 +28,7 @@ def noncut_lookup(grid, row, xy):
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def noncut_blocked(grid, row, tips):
     """Whether shank or holder are too low at tips (n, 3)."""
     out = np.empty(len(tips), np.bool_)

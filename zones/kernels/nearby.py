@@ -8,7 +8,7 @@ from numba import njit
 from geometry.kernels.nearest import triangle2
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def one_piece(neighbours, corners, starts, goals, centres, radius, out):
     """out[i]: whether triangle goals[i] is reached from starts[i] over neighbours that a ball round centres[i] meets.
 

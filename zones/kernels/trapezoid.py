@@ -30,14 +30,20 @@ DONE, MEET, LOST = range(3)  # of build_map: built; two pieces cross, touch or l
 OUTSIDE = -1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def orientation(ends, t, x, y):
     """> 0 where (x, y) is left of piece t (above it), < 0 where right of it, 0 on its line."""
     px, py = np.int64(ends[t, 0]), np.int64(ends[t, 1])
     return (ends[t, 2] - px) * (y - py) - (ends[t, 3] - py) * (x - px)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _slot(trap, at, slot):
+    """What a trapezoid holds, of the type that a computed number has: what takes it is compiled for one type only."""
+    return np.int64(trap[at, slot])
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _runs_below(ends, s, t):
     """Whether s lies below t at both ends of their common stretch, but for a shared point; else they meet."""
     left, right = 1, 1
@@ -54,14 +60,14 @@ def _runs_below(ends, s, t):
     return left > 0 and right > 0
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _start(node, ends, s):
     """(trapezoid in which piece s starts, piece it meets or -1)."""
     p = ends[s, P]
     x, y = ends[s, 0], ends[s, 1]
     i = 0
     while node[i, 0] != IS_LEAF:
-        item = node[i, 1]
+        item = np.int64(node[i, 1])
         if node[i, 0] == IS_POINT:  # a piece that starts at the point itself runs to its right
             i = node[i, 3] if p >= item else node[i, 2]
             continue
@@ -75,7 +81,7 @@ def _start(node, ends, s):
     return node[i, 1], -1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _crossed(trap, node, ends, points, s, path):
     """Trapezoids that piece s runs through, into path: (how many, state, piece it meets or -1)."""
     at, met = _start(node, ends, s)
@@ -85,22 +91,22 @@ def _crossed(trap, node, ends, points, s, path):
     while True:
         if at < 0:
             return count, LOST, -1
-        if not _runs_below(ends, s, trap[at, TOP]):
+        if not _runs_below(ends, s, _slot(trap, at, TOP)):
             return count, MEET, trap[at, TOP]
-        if not _runs_below(ends, trap[at, BOTTOM], s):
+        if not _runs_below(ends, _slot(trap, at, BOTTOM), s):
             return count, MEET, trap[at, BOTTOM]
         path[count] = at
         count += 1
-        r = trap[at, RIGHT]
+        r = _slot(trap, at, RIGHT)
         if ends[s, Q] <= r:
             return count, DONE, -1
         side = orientation(ends, s, points[r, 0], points[r, 1])
         if side == 0:  # a point on the piece: return a piece that ends or starts there
             return count, MEET, _piece_at(ends, r)
-        at = trap[at, LR] if side > 0 else trap[at, UR]
+        at = _slot(trap, at, LR if side > 0 else UR)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _piece_at(ends, point):
     """The first piece with this end."""
     for t in range(len(ends)):
@@ -109,7 +115,7 @@ def _piece_at(ends, point):
     return -1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _new(trap, node, free, count, top, bottom, left, right):
     """A trapezoid without neighbours, with its leaf; count: (trapezoid slots used, nodes, free slots)."""
     if count[2] > 0:
@@ -126,7 +132,7 @@ def _new(trap, node, free, count, top, bottom, left, right):
     return at
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _join_top(trap, left, right):
     """Make two trapezoids neighbours across a wall under their common top; -1 is nobody."""
     if left >= 0:
@@ -135,7 +141,7 @@ def _join_top(trap, left, right):
         trap[right, UL] = left
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _join_bottom(trap, left, right):
     """Make two trapezoids neighbours across a wall over their common bottom; -1 is nobody."""
     if left >= 0:
@@ -144,7 +150,7 @@ def _join_bottom(trap, left, right):
         trap[right, LL] = left
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _branch(node, count, at, kind, item, first, second):
     """Turn node ``at`` into an inner one; a child of -1 is made here and its number returned."""
     made = -1
@@ -157,67 +163,67 @@ def _branch(node, count, at, kind, item, first, second):
     return made
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _cut(trap, node, free, count, path, crossed, ends, points, s):
     """Cut the trapezoids of path by piece s; above and below s what had the same neighbour is one trapezoid."""
-    p, q = ends[s, P], ends[s, Q]
+    p, q = np.int64(ends[s, P]), np.int64(ends[s, Q])
     d = path[0]
-    upper = _new(trap, node, free, count, trap[d, TOP], s, p, q)
-    lower = _new(trap, node, free, count, s, trap[d, BOTTOM], p, q)
+    upper = _new(trap, node, free, count, _slot(trap, d, TOP), s, p, q)
+    lower = _new(trap, node, free, count, s, _slot(trap, d, BOTTOM), p, q)
     before, after = -1, -1
-    if trap[d, LEFT] == p:
-        _join_top(trap, trap[d, UL], upper)
-        _join_bottom(trap, trap[d, LL], lower)
+    if _slot(trap, d, LEFT) == p:
+        _join_top(trap, _slot(trap, d, UL), upper)
+        _join_bottom(trap, _slot(trap, d, LL), lower)
     else:
-        before = _new(trap, node, free, count, trap[d, TOP], trap[d, BOTTOM], trap[d, LEFT], p)
-        _join_top(trap, trap[d, UL], before)
-        _join_bottom(trap, trap[d, LL], before)
+        before = _new(trap, node, free, count, _slot(trap, d, TOP), _slot(trap, d, BOTTOM), _slot(trap, d, LEFT), p)
+        _join_top(trap, _slot(trap, d, UL), before)
+        _join_bottom(trap, _slot(trap, d, LL), before)
         _join_top(trap, before, upper)
         _join_bottom(trap, before, lower)
     for j in range(crossed):
         d = path[j]
-        r = trap[d, RIGHT]
+        r = _slot(trap, d, RIGHT)
         last = j == crossed - 1
         if last and r != q:
-            after = _new(trap, node, free, count, trap[d, TOP], trap[d, BOTTOM], q, r)
-        at = trap[d, LEAF]
+            after = _new(trap, node, free, count, _slot(trap, d, TOP), _slot(trap, d, BOTTOM), q, r)
+        at = _slot(trap, d, LEAF)
         if j == 0 and before >= 0:
-            at = _branch(node, count, at, IS_POINT, p, trap[before, LEAF], -1)
+            at = _branch(node, count, at, IS_POINT, p, _slot(trap, before, LEAF), -1)
         if after >= 0:
-            at = _branch(node, count, at, IS_POINT, q, -1, trap[after, LEAF])
-        _branch(node, count, at, IS_PIECE, s, trap[upper, LEAF], trap[lower, LEAF])
+            at = _branch(node, count, at, IS_POINT, q, -1, _slot(trap, after, LEAF))
+        _branch(node, count, at, IS_PIECE, s, _slot(trap, upper, LEAF), _slot(trap, lower, LEAF))
         if last:
             break
         following = path[j + 1]
         if orientation(ends, s, points[r, 0], points[r, 1]) > 0:  # the wall of r now ends on s from above
             trap[upper, RIGHT] = r
-            _join_top(trap, upper, trap[d, UR])
-            fresh = _new(trap, node, free, count, trap[following, TOP], s, r, q)
-            _join_top(trap, trap[following, UL], fresh)
+            _join_top(trap, upper, _slot(trap, d, UR))
+            fresh = _new(trap, node, free, count, _slot(trap, following, TOP), s, r, q)
+            _join_top(trap, _slot(trap, following, UL), fresh)
             _join_bottom(trap, upper, fresh)
             upper = fresh
         else:
             trap[lower, RIGHT] = r
-            _join_bottom(trap, lower, trap[d, LR])
-            fresh = _new(trap, node, free, count, s, trap[following, BOTTOM], r, q)
-            _join_bottom(trap, trap[following, LL], fresh)
+            _join_bottom(trap, lower, _slot(trap, d, LR))
+            fresh = _new(trap, node, free, count, s, _slot(trap, following, BOTTOM), r, q)
+            _join_bottom(trap, _slot(trap, following, LL), fresh)
             _join_top(trap, lower, fresh)
             lower = fresh
     if after >= 0:
-        _join_top(trap, after, trap[d, UR])
-        _join_bottom(trap, after, trap[d, LR])
+        _join_top(trap, after, _slot(trap, d, UR))
+        _join_bottom(trap, after, _slot(trap, d, LR))
         _join_top(trap, upper, after)
         _join_bottom(trap, lower, after)
     else:
-        _join_top(trap, upper, trap[d, UR])
-        _join_bottom(trap, lower, trap[d, LR])
+        _join_top(trap, upper, _slot(trap, d, UR))
+        _join_bottom(trap, lower, _slot(trap, d, LR))
     for j in range(crossed):
         trap[path[j], TOP] = -1
         free[count[2]] = path[j]
         count[2] += 1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _rows(points, pieces):
     """(points as int32, ``ends``): narrow, and all of a piece in one place, for the time goes into cache misses."""
     narrow = points.astype(np.int32)
@@ -229,7 +235,7 @@ def _rows(points, pieces):
     return narrow, ends
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def build_map(points, pieces):
     """Insert the pieces (without the box) in the given order, which the caller has shuffled [DeBerg2008, chapter 6].
 
@@ -252,13 +258,15 @@ def build_map(points, pieces):
             return state, s, met, trap[:0], node[:0]
         if count[1] + 2 * crossed + 8 > len(node):
             wider = np.empty((2 * len(node) + 2 * crossed, 4), np.int32)
-            wider[: count[1]] = node[: count[1]]
+            for i in range(count[1]):
+                for k in range(4):
+                    wider[i, k] = node[i, k]
             node = wider
         _cut(trap, node, free, count, path, crossed, ends, narrow, s)
     return DONE, -1, -1, trap[: count[0]], node[: count[1]]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def find_trapezoids(node, points, pieces, places):
     """Trapezoid and depth (visited inner nodes) for places (k, 2) int64 on the grid SUB times finer than the points.
 
