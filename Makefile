@@ -67,6 +67,8 @@ check: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/lint-imports --no-logo
 	$(BIN)/mypy
+	$(BIN)/python .ci/plain_words.py
+	$(BIN)/python .ci/docstrings.py
 	$(BIN)/python -m pytest -q tests/unit/house/test_docstrings.py tests/unit/house/test_dependencies.py
 
 test: $(STAMP) page

@@ -3,9 +3,9 @@
 ``python .ci/docstrings.py`` prints the figures and exits with 1 where a rule is broken; ``--list`` names every place,
 folders or files restrict it to those. The rules are in docs/style.md.
 
-- A function or method that takes or returns arrays names each array parameter and gives a shape such as (n, 3), a dtype,
-  a unit (``dimensionless``, ``index``, ``bool`` or ``count`` where there is none) and, for points or directions, a frame.
-  What the docstring of its class or module says of unit, dtype and frame counts too.
+- A function or method that takes or returns arrays names each array parameter and gives a shape such as (n, 3), a
+  dtype, a unit (``dimensionless``, ``index``, ``bool`` or ``count`` where there is none) and, for points or
+  directions, a frame. What the docstring of its class or module says of unit, dtype and frame counts too.
 - A function that raises has a Raises section that names each class.
 - A function that implements a formula names its source by a key of docs/bibliography.bib, such as [Lee2003].
 """
@@ -27,7 +27,8 @@ LEAST_SOURCES = 60
 ARRAY = re.compile(r"\b(NDArray|ndarray|ArrayLike|F64|F32|I32|I64|U8|BOOL|Array)\b")
 SHAPE = re.compile(r"\(\s*[\w*+/\-. |]+\s*,(\s*[\w*+/\-. |]+\s*,?)*\s*\)")
 DTYPE = re.compile(r"\b(float64|float32|int64|int32|int16|int8|uint8|uint16|uint32|uint64|bool|complex128)\b")
-UNIT = re.compile(r"\b(mm|rad|deg|s|min|ms|px|N|GPa|rpm|dimensionless|index|bool|count|bytes)\b|mm[²³]|1/mm|1/min|mm/min|°")
+UNIT = re.compile(r"\b(mm|rad|deg|s|min|ms|px|N|GPa|rpm|dimensionless|index|bool|count|bytes)\b"
+                  r"|mm[²³]|1/mm|1/min|mm/min|°")
 SPATIAL = re.compile(r"\([^()]*,\s*[23]\s*\)")
 FRAME = re.compile(r"\b(frame|frames|coordinates|plane|parameters?|pixels?|unit square)\b", re.IGNORECASE)
 KEY = re.compile(r"\[[A-Z][A-Za-z]*\d{4}[a-z]?(?:,[^\]]*)?\]|\[ISO\d+(?:-\d+)?(?:,[^\]]*)?\]")
@@ -76,7 +77,7 @@ def judged(node: ast.FunctionDef | ast.AsyncFunctionDef, around: str, where: str
         missing += [] if SHAPE.search(text) else ["no shape"]
         missing += [] if DTYPE.search(text) or DTYPE.search(around) else ["no dtype"]
         missing += [] if UNIT.search(text) or UNIT.search(around) else ["no unit"]
-        missing += ["no frame"] if SPATIAL.search(text) and not FRAME.search(text + around) else []
+        missing += ["no frame"] if SPATIAL.search(text) and not FRAME.search(f"{text}\n{around}") else []
     if errors:
         section = text.partition("Raises")[2]
         absent = sorted(e for e in errors if e not in section)
@@ -121,7 +122,8 @@ def main() -> int:
         return f"{held} of {len(of)}"
 
     sources = sum(p.source for p in found)
-    print(f"public functions {len(found)}, with arrays {len(arrays)}, that raise {len(errors)}, with a source {sources}")
+    print(f"public functions {len(found)}, with arrays {len(arrays)}, that raise {len(errors)}, "
+          f"with a source {sources}")
     for what in ("no word", "no shape", "no dtype", "no unit", "no frame"):
         print(f"  {what.removeprefix('no '):6} {share(arrays, what)}")
     print(f"  raises {share(errors, 'no Raises')}")

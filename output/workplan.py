@@ -146,5 +146,5 @@ class Workplan:
         return known or Assembly(tool.stickout + sum(h.length for h in tool.holder))
 
 
-__all__ = ["FIRST_NUMBER", "Ap238", "Assembly", "Clamping", "AccessFrame", "TrajectoryKind", "StockBox", "StockCylinder",
-           "Trajectory", "Workingstep", "Workplan"]
+__all__ = ["FIRST_NUMBER", "Ap238", "Assembly", "Clamping", "AccessFrame", "TrajectoryKind", "StockBox",
+           "StockCylinder", "Trajectory", "Workingstep", "Workplan"]

@@ -107,7 +107,7 @@ def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float 
     is
     applied to layers where the setup bounds the engagement, or where only the corner cuts. Values of the setup for the
     tool
-    replace these. AxisLimits of tool and machine apply to both. Where the machine states none and the tool has no value of
+    replace these. Limits of tool and machine apply to both. Where the machine states none and the tool has no value of
     its
     own, the limits are ``DEFAULT_MAX_RPM`` and ``DEFAULT_MAX_FEED_MM_MIN``. No feed is below the least feed.
     """

@@ -1,9 +1,10 @@
 """Finished five-axis programs on the whole LinuxCNC controller: do its joints go as far as ours, and does it complain?
 
-Run from the root of the checkout: ``python benchmarks/five_axis/five_axis_control.py [NAME ...] [--out DIR] [--override N]``.
-Names are those of ``MACHINES``; without any all are taken. On each a bar between two walls is planned and proved,
-roughed with a flat end mill and finished with a ball, upright and from one further axis. Each program then runs, as it
-was written, on ``shared/tools/linuxcnc_run.sh`` beside the checkout: in real time, feeds N times as fast (4).
+Run from the root of the checkout: ``python benchmarks/five_axis/five_axis_control.py [NAME ...] [--out DIR]
+[--override N]``. Names are those of ``MACHINES``; without any all are taken. On each a bar between two walls is
+planned and proved, roughed with a flat end mill and finished with a ball, upright and from one further axis. Each
+program then runs, as it was written, on ``shared/tools/linuxcnc_run.sh`` beside the checkout: in real time, feeds N
+times as fast (4).
 
 Ours is what the reader of the proof (``verify``) makes of the program: tip and rotary axes of every move, put into
 joints by ``verify.kinematics`` at 17 places a move, and zero, where the controller starts. With tool centre point

@@ -1,9 +1,10 @@
 """What rotary axes win on a part: coverage, metres and minutes upright, with fixed further axes, and all five moving.
 
-Run from the root of the checkout: ``python benchmarks/five_axis/five_axis_gain.py [NAME ...] [--public DIR]``. Names are those of
-``parts_table.py``; without any the demo, a strut impeller and, where its folder is given, the KJ66 wheel. Each is
-planned and proved three times on a table A/C (A -30 to 110 degrees): with the accesses of its setup alone, with further
-axes found, and with these and passes whose axis moves. The tools, the scallop and the proof are the same.
+Run from the root of the checkout: ``python benchmarks/five_axis/five_axis_gain.py [NAME ...] [--public DIR]``. Names
+are those of ``parts_table.py``; without any the demo, a strut impeller and, where its folder is given, the KJ66
+wheel. Each is planned and proved three times on a table A/C (A -30 to 110 degrees): with the accesses of its setup
+alone, with further axes found, and with these and passes whose axis moves. The tools, the scallop and the proof are
+the same.
 
 Walls are the zones of form steep: their area, the way and the time of their finish. Areas are in mm² of what lies in
 zones, for what is machinable differs. Roughing is told apart: it is not what is compared.

@@ -1,14 +1,15 @@
 """Seeded parts with walls 0.8 to 6 mm apart on five axes: how many are proved, and how much of what can be reached.
 
-    python benchmarks/five_axis/five_axis_sweep.py [--seeds 0:200] [--out out/five_axis_sweep] [--limit 900] [--score-only]
+    python benchmarks/five_axis/five_axis_sweep.py [--seeds 0:200] [--out out/five_axis_sweep] [--limit 900]
+    [--score-only]
 
 Parts are of the recipe random with two or three walls, up to three connections and every channel's least gap in that
 range, with their suggested tools; the machine is a table A/C (A -30 to 110 degrees). Each is planned and proved in a
 process of its own; what others have written reads its files, as ``stepnc_family.py`` says, the form of AP238 going
 round with the seeds. What a part gave is kept as a line of ``rows.jsonl`` in the folder, so a broken run goes on where
 it stopped; a line holds a digest of the sources it was made with, and one made with others is told apart. A part that
-ends in an error or over the limit counts as not proved. ``benchmarks/five_axis/five_axis_rows`` has those made so far: go on
-there with ``--out``, see them with ``--score-only``.
+ends in an error or over the limit counts as not proved. ``benchmarks/five_axis/five_axis_rows`` has those made so
+far: go on there with ``--out``, see them with ``--score-only``.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 """LinuxCNC's five-axis impeller cut from a plain cylinder: seconds, findings, three of them by hand, a picture.
 
-Run from the root of the checkout: ``python benchmarks/foreign/foreign_impeller.py [--out DIR] [--picture FILE.png]``. The part
-is a hub of revolution just under what the cutter covers (``foreign_twin.envelope``), written as STEP and read back. The
-program says itself that a lathe cuts the outer cone before it; here nobody has, so its rapids go through what the lathe
-would have taken. It is run with a ball of 3 mm whose flutes are longer than it is deep anywhere, and with one as they
-are sold: 9 mm of flutes, a neck to 20 mm, a shank of 6 mm and a holder at 36 mm. The same lines as the twin's are
-asked for, and of the deepest three collisions how far the body stands over the place named. ``zonemill verify`` proves
-the same from the command line.
+Run from the root of the checkout: ``python benchmarks/foreign/foreign_impeller.py [--out DIR] [--picture FILE.png]``.
+The part is a hub of revolution just under what the cutter covers (``foreign_twin.envelope``), written as STEP and
+read back. The program says itself that a lathe cuts the outer cone before it; here nobody has, so its rapids go
+through what the lathe would have taken. It is run with a ball of 3 mm whose flutes are longer than it is deep
+anywhere, and with one as they are sold: 9 mm of flutes, a neck to 20 mm, a shank of 6 mm and a holder at 36 mm. The
+same lines as the twin's are asked for, and of the deepest three collisions how far the body stands over the place
+named. ``zonemill verify`` proves the same from the command line.
 """
 
 from __future__ import annotations

@@ -1,11 +1,12 @@
 """LinuxCNC's own sample programs through the proof, each beside a brute-force twin.
 
-Run from the root of the checkout: ``python benchmarks/foreign/foreign_programs.py [NAME ...]``. Every sample is proved with a
-part it is right for (``foreign_cases``). The twin stands the tool at poses 5 µm apart: no pose may reach the part, and
-lines on which a rapid, a neck, a shank or a holder meets stock, or a descent is too steep, are noted in a stock of its
-own. A line of the table: moves, seconds of the proof, geometric findings by kind, how they lie to the lines of the twin
-(``alone`` is a finding no line of the twin bears out, nor of a finer one, ``missed`` a line no finding names), volume
-by both, and remarks on the text, which are no geometry. The part is then raised: cuts of known depth must be found.
+Run from the root of the checkout: ``python benchmarks/foreign/foreign_programs.py [NAME ...]``. Every sample is
+proved with a part it is right for (``foreign_cases``). The twin stands the tool at poses 5 µm apart: no pose may
+reach the part, and lines on which a rapid, a neck, a shank or a holder meets stock, or a descent is too steep, are
+noted in a stock of its own. A line of the table: moves, seconds of the proof, geometric findings by kind, how they
+lie to the lines of the twin (``alone`` is a finding no line of the twin bears out, nor of a finer one, ``missed`` a
+line no finding names), volume by both, and remarks on the text, which are no geometry. The part is then raised: cuts
+of known depth must be found.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields: 
              cut_data: dict[str, CutData], stock: StockMap, settings: PlanSettings,
              progress: Callable[[float], None] | None = None, first_step: int = 1,
              trimmed: Mapping[str, Sequence[Faces]] | None = None) -> Plan:
-    """Plan all zones, tool by tool; arguments as of ``toolpath.planning.job_plan.plan_job``, ``trimmed`` is not looked at."""
+    """Plan all zones, tool by tool; arguments as of ``toolpath.planning.job_plan.plan_job``, without ``trimmed``."""
     settings = replace(settings, turning=None, pattern=Pattern.ZIGZAG)
     steps: list[Workingstep] = []
     begun: list[Finish] = []

@@ -1,7 +1,7 @@
 """The whole chain on a list of parts, one row each, as a markdown table.
 
-Run from the root of the checkout: ``python benchmarks/jobs/parts_table.py [NAME ...] [--out DIR] [--public DIR]``. Without
-names all parts are taken: the demo, five of the family, and four public parts whose files are looked for in the
+Run from the root of the checkout: ``python benchmarks/jobs/parts_table.py [NAME ...] [--out DIR] [--public DIR]``.
+Without names all parts are taken: the demo, five of the family, and four public parts whose files are looked for in the
 folder given by ``--public`` (left out with a word where absent). Counts of walls and connections stand beside the
 truth of the generator; coverage beside the brute-force reach of ``brute_reach``; programs and STEP-NC of proved jobs
 go through the outside judges where those are found beside the checkout.

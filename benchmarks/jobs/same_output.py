@@ -1,7 +1,7 @@
 """Whether two releases plan and prove the same: jobs of both, compared byte for byte but for renamed words.
 
-    python benchmarks/jobs/same_output.py make FOLDER             # run in each of the two checkouts, with its environment
-    python benchmarks/jobs/same_output.py compare BEFORE AFTER
+    python benchmarks/jobs/same_output.py make FOLDER             # run in each of the two checkouts, with its
+    environment python benchmarks/jobs/same_output.py compare BEFORE AFTER
 
 ``make`` runs the demo on three axes, the demo on five axes, a small job for all controls, and one verification for each
 control. ``compare`` maps the renamed strategy words, leaves the version out, and drops prose: messages, remedies and
@@ -52,8 +52,8 @@ def make(folder: Path) -> None:
     plan(folder / "controls", small, {**small_setup, "machine": {"dialects": list(CONTROLS)}})
     for control, ending in CONTROLS.items():
         program = folder / "controls" / f"program.{control}.{ending}"
-        report = run("verify", str(small), "--setup", str(folder / "controls" / "setup.json"), "--program", str(program),
-                     "--dialect", control)
+        setup_file = str(folder / "controls" / "setup.json")
+        report = run("verify", str(small), "--setup", setup_file, "--program", str(program), "--dialect", control)
         (folder / f"verification.{control}.json").write_text(report)
     leaning = {"kind": "5-axis", "kinematics": "table-table-AC", "rotary_deg": [[-110, 110], [-360, 360]]}
     plan(folder / "small_on_five_axes", small,
@@ -101,7 +101,8 @@ def differences(before: Path, after: Path) -> list[str]:
         elif path.suffix in TEXTS:
             a, b = moves(path.read_text()), moves(other.read_text())
             out += [f"{name}: {len(a)} lines, {len(b)} after"] if len(a) != len(b) else []
-            out += [f"{name}:{k + 1}: {x!r} -> {y!r}" for k, (x, y) in enumerate(zip(a, b, strict=False)) if x != y][:10]
+            unlike = [(k, x, y) for k, (x, y) in enumerate(zip(a, b, strict=False), 1) if x != y]
+            out += [f"{name}:{k}: {x!r} -> {y!r}" for k, x, y in unlike[:10]]
         elif path.suffix not in MAPPED_AWAY and path.read_bytes() != other.read_bytes():
             out.append(f"{name}: other bytes")
     return out

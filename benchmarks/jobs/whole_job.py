@@ -6,8 +6,8 @@
 Parts: the demo, a gap of 0.8 mm, a closed pocket, a strut impeller; axes 3 (upright) and 5 (table A/C, A -30 to 110
 degrees). Each is planned and proved in a process of its own, with the feeds of its setup; what it gave is a line of
 ``rows.jsonl`` in the folder, with a digest of the sources it was made with. ``baseline`` is the plan of
-``baseline_plan.py``, which stays as it was committed; its lines in ``benchmarks/jobs/whole_job_rows`` were made then, and
-again with the feeds of ours where these changed.
+``baseline_plan.py``, which stays as it was committed; its lines in ``benchmarks/jobs/whole_job_rows`` were made then,
+and again with the feeds of ours where these changed.
 ``--table`` prints the newest line of each. Times and moves are those the proof simulated; air is all time but that of
 moves which take stock. A move takes stock where it takes a line of the proof's stock, and lines stand 0.15 mm apart, so
 a skin that a finishing pass takes off a wall meets few of them and much of the pass counts as air; ``--spacing`` says

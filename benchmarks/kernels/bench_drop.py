@@ -1,8 +1,9 @@
 """Drop and blocked queries: microseconds a point, and the ratio to opencamlib's BatchDropCutter.
 
-Run from the root of the checkout: ``python benchmarks/kernels/bench_drop.py [--quick] [--convex]``. Times are wall clock, the
-best of several runs, in one process; the peer runs on the same points, fewer of them, with as many threads. First the
-thesis' convex surface under a ball of R 3.175 at 251,001 points (--convex: that alone), then a wavy field.
+Run from the root of the checkout: ``python benchmarks/kernels/bench_drop.py [--quick] [--convex]``. Times are wall
+clock, the best of several runs, in one process; the peer runs on the same points, fewer of them, with as many
+threads. First the thesis' convex surface under a ball of R 3.175 at 251,001 points (--convex: that alone), then a
+wavy field.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """Drop heights against opencamlib: ball, flat, bull and tapered on five meshes, every larger difference judged.
 
-Run from the root of the checkout: ``python benchmarks/kernels/bench_heights.py [--seconds S] [--points N]``. Ours runs on all
-points; the peer on as many of them, from the first on, as it gets through in S seconds a line (it says how many). Where
-the two differ by more than 1e-6 mm, the height of the lower one is put to the test without either kernel: does some
-point of the mesh stand inside the cutter there? For ours the point is looked for in every triangle under the cutter.
+Run from the root of the checkout: ``python benchmarks/kernels/bench_heights.py [--seconds S] [--points N]``. Ours
+runs on all points; the peer on as many of them, from the first on, as it gets through in S seconds a line (it says
+how many). Where the two differ by more than 1e-6 mm, the height of the lower one is put to the test without either
+kernel: does some point of the mesh stand inside the cutter there? For ours the point is looked for in every triangle
+under the cutter.
 """
 
 from __future__ import annotations

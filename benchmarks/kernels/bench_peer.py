@@ -1,7 +1,7 @@
 """Volumes cut by three programs of three axes: the witness's field of distances beside FreeCAD's path simulator.
 
-Run from the root of the checkout: ``python benchmarks/kernels/bench_peer.py [--steps H ...]``, with ``freecadcmd`` on the path
-(Debian: freecad; measured with 0.20.2); says so and ends where it is not there. The programs: the pocket of
+Run from the root of the checkout: ``python benchmarks/kernels/bench_peer.py [--steps H ...]``, with ``freecadcmd`` on
+the path (Debian: freecad; measured with 0.20.2); says so and ends where it is not there. The programs: the pocket of
 ``tests/pocket_case.py``, the ball to and fro over the wavy block of ``bench_prove.py``, and what ``zonemill plan``
 makes of the small part that ``zonemill warm`` compiles with. A line is one program at one step of both.
 

@@ -1,8 +1,9 @@
 """Trapezoidal map: seconds of noding and building, look-up depth and time, against n ln n and ln n.
 
-Run from the root of the checkout: ``python benchmarks/kernels/bench_trapezoids.py [--quick]``. One process, one thread, wall
-clock, the best of several runs (n = 1e3 many, n = 1e5 few). "kernel" is ``build_map`` alone, in the order the product
-uses; "shuffled" the same in a plain random permutation; "map" everything from the noding to the numbered trapezoids.
+Run from the root of the checkout: ``python benchmarks/kernels/bench_trapezoids.py [--quick]``. One process, one
+thread, wall clock, the best of several runs (n = 1e3 many, n = 1e5 few). "kernel" is ``build_map`` alone, in the
+order the product uses; "shuffled" the same in a plain random permutation; "map" everything from the noding to the
+numbered trapezoids.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 Run from the root of the checkout: ``python benchmarks/passes/bench_isoparametric.py [--cases] [--chords] [--trims N]
 [--demo] [--wheel FOLDER [--lean DEGREES]]``; without a flag all but the last. What is left is judged by
-``verify.surface.removal``, which shares no code with the passes. Seconds are wall clock of one run, compiled kernels: laying
-into the square, passes and steps.
+``verify.surface.removal``, which shares no code with the passes. Seconds are wall clock of one run, compiled kernels:
+laying into the square, passes and steps.
 """
 
 from __future__ import annotations

@@ -1,15 +1,16 @@
 """Flat ends matched to curvature against balls: on a plane, on surfaces in the range of papers/001, on a blade.
 
-Run from the root of the checkout: ``python benchmarks/passes/bench_matching.py [--plane] [--ranges A B C] [--split A B C D]
-[--blade --public DIR]``; the first two where nothing is asked.
+Run from the root of the checkout: ``python benchmarks/passes/bench_matching.py [--plane] [--ranges A B C] [--split A
+B C D] [--blade --public DIR]``; the first two where nothing is asked.
 
 split : the ranges whole, fed the better way, and parted; and D, whose curvatures change places: 600 mm across all over,
         1200 mm along on one half and 150 mm on the other
 blade : both sides of a blade of the KJ66 wheel; nothing of the wheel is looked at but that face
 
-What passes leave, and how deep they cut, is measured by ``verify.surface.removal`` on the exact surface, 1 mm apart (0.15 mm on
-the blade). The bound is the closed form of a strip at the match, or at the least tilt where there is none, integrated
-over the surface: as many passes as if each could be as wide everywhere as it is in the middle of its strip.
+What passes leave, and how deep they cut, is measured by ``verify.surface.removal`` on the exact surface, 1 mm apart
+(0.15 mm on the blade). The bound is the closed form of a strip at the match, or at the least tilt where there is
+none, integrated over the surface: as many passes as if each could be as wide everywhere as it is in the middle of its
+strip.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Side steps bracketed on the true measure: passes and what they leave, on the thesis's surfaces and on others.
 
-Run from the root of the checkout: ``python benchmarks/passes/bench_scallop.py [--thesis] [--others N] [--parts FOLDER]``;
-without a flag both tables. What is left is measured by ``verify.surface.removal``, which shares no code with the planner's
-measure but the mesh: closed forms of straight moves on the normals of the exact surface, 0.05 mm apart, borders
-included. Seconds are wall clock, one run, compiled kernels.
+Run from the root of the checkout: ``python benchmarks/passes/bench_scallop.py [--thesis] [--others N] [--parts
+FOLDER]``; without a flag both tables. What is left is measured by ``verify.surface.removal``, which shares no code
+with the planner's measure but the mesh: closed forms of straight moves on the normals of the exact surface, 0.05 mm
+apart, borders included. Seconds are wall clock, one run, compiled kernels.
 """
 
 from __future__ import annotations

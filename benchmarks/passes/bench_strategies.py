@@ -1,11 +1,11 @@
 """Iso-parametric passes against Z-level and plane-parallel ones, zone by zone of a whole plan, at equal true scallop.
 
-Run from the root of the checkout: ``python benchmarks/passes/bench_strategies.py [--wheel FOLDER] [--parallel N]``; the demo
-part, or the compressor wheel from the folder of parts by others. Every zone with exact faces is walked by each strategy
-through the same stock, refined by the planner's own rounds until no more than the scallop is left; then by the planner
-as it is, which goes on from what it took. What is left at the samples of the zone and how deep the ball enters the part
-are measured by ``verify.surface.removal`` and on exact faces, which share no code with the planner. Plane-parallel passes are
-tried on the first N steep zones of each tool, 120 s at most each.
+Run from the root of the checkout: ``python benchmarks/passes/bench_strategies.py [--wheel FOLDER] [--parallel N]``;
+the demo part, or the compressor wheel from the folder of parts by others. Every zone with exact faces is walked by
+each strategy through the same stock, refined by the planner's own rounds until no more than the scallop is left; then
+by the planner as it is, which goes on from what it took. What is left at the samples of the zone and how deep the
+ball enters the part are measured by ``verify.surface.removal`` and on exact faces, which share no code with the
+planner. Plane-parallel passes are tried on the first N steep zones of each tool, 120 s at most each.
 """
 
 from __future__ import annotations

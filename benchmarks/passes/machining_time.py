@@ -4,8 +4,8 @@ Run from the root of the checkout: ``python benchmarks/passes/machining_time.py 
 [--kins KINS]``. Programs run on ``shared/tools/linuxcnc_run.sh`` beside the checkout in real time, feeds N times as
 fast; without any PROGRAM the patterns below do, a minute together. ``--jobs`` plans and proves three whole jobs of
 small parts from a box, on three axes, 3+2 and five, and runs their programs, ten minutes each at N = 1. Ours is
-``verify.program.move_times`` with what that controller does: 500 mm/s, 5000 mm/s² and 360 deg/s. What it takes for a program that
-hardly moves is taken off its time; the time it takes to change tools stays.
+``verify.program.move_times`` with what that controller does: 500 mm/s, 5000 mm/s² and 360 deg/s. What it takes for a
+program that hardly moves is taken off its time; the time it takes to change tools stays.
 """
 
 from __future__ import annotations

@@ -1,12 +1,15 @@
 """An S-shaped thin wall, as five-axis machines are tried on: how evenly the tool axis goes, and what the passes leave.
 
-Run from the root of the checkout: ``python benchmarks/passes/s_wall.py [--cost]``. The wall is 160 mm long, 30 high and 3
-thick, each side ruled between two waves of different height, the upper shifted along: it leans out here and in there,
-by up to 11 degrees, and twice stands upright, where A and C of a table have their pole. Both sides are finished by
+Run from the root of the checkout: ``python benchmarks/passes/s_wall.py [--cost]``. The wall is 160 mm long, 30 high
+and 3 thick, each side ruled between two waves of different height, the upper shifted along: it leans out here and in
+there, by up to 11 degrees, and twice stands upright, where A and C of a table have their pole. Both sides are
+finished by
 
-- the flank of a bull nose (``toolpath.five_axis.flank_milling``): the ruling of every station looked for alone, or as it is planned;
-- a ball, its axis 65 degrees off the normal, as the wall has it, or led by ``toolpath.five_axis.axis_smoothing``: evenly, under a limit
-  of turning, and past a post that stands 32 mm before the wall. Where the tool is blocked passes break off.
+- the flank of a bull nose (``toolpath.five_axis.flank_milling``): the ruling of every station looked for alone, or as
+  it is planned;
+- a ball, its axis 65 degrees off the normal, as the wall has it, or led by ``toolpath.five_axis.axis_smoothing``:
+  evenly, under a limit of turning, and past a post that stands 32 mm before the wall. Where the tool is blocked
+  passes break off.
 
 Rates are of the rotary axes of a table A/C by millimetre of tip; ``rough`` is the root mean square of how the tool axis
 bends, deg/mm², with stations evenly on the tip's way; a reversal is a turn back of a rotary axis by more than 0.05 deg.

@@ -1,10 +1,11 @@
 """What is left of simple blanks against closed forms: the error of the volume, of the surface, and of residuals.
 
-Run from the root of the checkout: ``python benchmarks/proof/bench_machined.py [--steps H ...]``. The cases and their formulas
-are those of ``tests/machined_cases.py``. A line of the first table is one case at one step between nodes, over four
-places of the lattice: the root mean square of the error of the volume left and its largest share of the stated bound,
-and how far the vertices of the surface are off the exact one. Slopes are fitted over the steps: 1 halves the error with
-the step, 2 quarters it. The second table is the error of residuals along exact normals, which have no step.
+Run from the root of the checkout: ``python benchmarks/proof/bench_machined.py [--steps H ...]``. The cases and their
+formulas are those of ``tests/machined_cases.py``. A line of the first table is one case at one step between nodes,
+over four places of the lattice: the root mean square of the error of the volume left and its largest share of the
+stated bound, and how far the vertices of the surface are off the exact one. Slopes are fitted over the steps: 1
+halves the error with the step, 2 quarters it. The second table is the error of residuals along exact normals, which
+have no step.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Proof of a long program: seconds, memory, and where they go.
 
-Run from the root of the checkout: ``python benchmarks/proof/bench_prove.py [--points N ...] [--axes 3 5]``. A ball of 6 mm
-is dragged to and fro over a wavy block of 50 x 50 mm, N points, rows four times as far apart as points, tips by
+Run from the root of the checkout: ``python benchmarks/proof/bench_prove.py [--points N ...] [--axes 3 5]``. A ball of
+6 mm is dragged to and fro over a wavy block of 50 x 50 mm, N points, rows four times as far apart as points, tips by
 drop_cutter; the program is read, and proved at D samples a mm² along their normals (error under 1e-6 mm, whatever N
 is). With ``--axes 5`` the tool leans by 5 to 25 degrees all the while and turns once a row, on a table-table-AC machine
 under tool centre point control: the ball touches the same places, so the residuals are the same within 5e-4 mm. Wall

@@ -1,9 +1,10 @@
 """What further fixed tool axes win: area in zones upright and with the axes found, how many, and seconds.
 
-Run from the root of the checkout: ``python benchmarks/reach/bench_indexing.py [NAME ...] [--public DIR]``. Names are those of
-``parts_table.py``; without any the demo, a strut impeller and, where its folder is given, the KJ66 wheel. Each part is
-taken once on a machine that keeps the accesses of its setup and once on one that looks for more (table A/C, A -30 to
-110 degrees). Areas are in mm², for what is machinable differs: with rotary axes it is all that can be turned to.
+Run from the root of the checkout: ``python benchmarks/reach/bench_indexing.py [NAME ...] [--public DIR]``. Names are
+those of ``parts_table.py``; without any the demo, a strut impeller and, where its folder is given, the KJ66 wheel.
+Each part is taken once on a machine that keeps the accesses of its setup and once on one that looks for more (table
+A/C, A -30 to 110 degrees). Areas are in mm², for what is machinable differs: with rotary axes it is all that can be
+turned to.
 """
 
 from __future__ import annotations

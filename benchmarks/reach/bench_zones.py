@@ -1,9 +1,9 @@
 """Seconds of ``zonemill zones`` against the number of faces, up to ten walls and sixteen connections.
 
-Run from the root of the checkout: ``python benchmarks/reach/bench_zones.py [--out DIR]``. Parts of recipe ``random`` of the
-family, each the first seed that has as many connections as asked for; every part in a process of its own with compiled
-kernels, as a user meets it, start-up and reading included, the better of two runs. Wall clock and processor time of the
-process; the exponent is the slope of a straight line through log time against log faces.
+Run from the root of the checkout: ``python benchmarks/reach/bench_zones.py [--out DIR]``. Parts of recipe ``random``
+of the family, each the first seed that has as many connections as asked for; every part in a process of its own with
+compiled kernels, as a user meets it, start-up and reading included, the better of two runs. Wall clock and processor
+time of the process; the exponent is the slope of a straight line through log time against log faces.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What a setup could reach of a part, by brute force: a height map, dilated by every tool, asked point by point.
 
-Run from the root of the checkout: ``python benchmarks/reach/brute_reach.py PART.step SETUP.json [--step MM]``. It is the
-peer that the coverage of a job is held against, and shares nothing with the planner but the STEP reader. Normals of
+Run from the root of the checkout: ``python benchmarks/reach/brute_reach.py PART.step SETUP.json [--step MM]``. It is
+the peer that the coverage of a job is held against, and shares nothing with the planner but the STEP reader. Normals of
 samples are those of the CAD faces at the foot of each sample, asked of the kernel one by one (``kernel_normals``):
 
 1. h(x, y), the highest material over every node of a square grid, by rasterising the triangles.

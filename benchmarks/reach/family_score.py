@@ -1,6 +1,7 @@
 """How often the decomposition is right on random parts of the public family.
 
-    python -m benchmarks.reach.family_score --seeds 0:40 [--recipe mixed] [--jobs 2] [--limit 300] [--out out/family_score]
+    python -m benchmarks.reach.family_score --seeds 0:40 [--recipe mixed] [--jobs 2] [--limit 300] [--out
+    out/family_score]
 
 Every part is made, read and decomposed in a child process with a time limit; what a child answers is kept in a cache
 folder under the name of recipe, seed and a digest of the sources it depends on, so a broken run goes on where it

@@ -261,7 +261,8 @@ def main() -> None:
     low, high = (int(v) for v in given.seeds.split(":"))
 
     def ask(seed: int) -> dict[str, Any]:
-        command = [sys.executable, "-m", "benchmarks.reach.invariance", "--one", str(seed), "--recipe", given.recipe, "--out",
+        command = [sys.executable, "-m", "benchmarks.reach.invariance", "--one", str(seed), "--recipe", given.recipe,
+        "--out",
                    str(given.out), *(["--zones"] if given.zones else [])]
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=given.limit, check=False)

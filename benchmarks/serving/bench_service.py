@@ -1,8 +1,8 @@
 """What the service costs: start, idle memory, processor time of a job beside ``zonemill plan``, writes to the database.
 
-``python benchmarks/serving/bench_service.py [--jobs 40]``; prints JSON, which ``scale.py`` takes. Times of processors, not of
-the clock, where that is what counts, so that other load on the machine shows little. PostgreSQL is started by itself;
-where it is not installed the figures of the cluster are left out.
+``python benchmarks/serving/bench_service.py [--jobs 40]``; prints JSON, which ``scale.py`` takes. Times of
+processors, not of the clock, where that is what counts, so that other load on the machine shows little. PostgreSQL is
+started by itself; where it is not installed the figures of the cluster are left out.
 """
 
 from __future__ import annotations

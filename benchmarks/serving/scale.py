@@ -1,9 +1,10 @@
 """How many workers one database and one scheduler feed: queues with the costs that ``bench_service.py`` measured.
 
-``python benchmarks/serving/scale.py [--job 60] [--apis 2] [--costs bench.json]``. A job runs for so many seconds; meanwhile its
-worker asks the database five times a second whether it still holds the job, writes progress and renews the lease. Each
-API process goes round five times a second and whenever a job of its own ends: it asks the scheduler for the slots,
-counts what runs, claims. Claims wait for one another. Looked for is what is busy first, and how many workers have work.
+``python benchmarks/serving/scale.py [--job 60] [--apis 2] [--costs bench.json]``. A job runs for so many seconds;
+meanwhile its worker asks the database five times a second whether it still holds the job, writes progress and renews
+the lease. Each API process goes round five times a second and whenever a job of its own ends: it asks the scheduler
+for the slots, counts what runs, claims. Claims wait for one another. Looked for is what is busy first, and how many
+workers have work.
 """
 
 from __future__ import annotations

@@ -168,7 +168,8 @@ def to_and_fro(step: Workingstep) -> bool:
     """
     if step.strategy != "isoparametric":
         return step.strategy == "zigzag" or step.cut_direction.both_ways
-    chords = np.array([t.points[-1] - t.points[0] for t in step.trajectories if t.motion is TrajectoryKind.CUT]).reshape(-1, 3)
+    cuts = [t.points for t in step.trajectories if t.motion is TrajectoryKind.CUT]
+    chords = np.array([points[-1] - points[0] for points in cuts]).reshape(-1, 3)
     return bool(len(chords) > 1 and ((chords[1:] * chords[:-1]).sum(axis=1) < 0.0).mean() > 0.5)
 
 

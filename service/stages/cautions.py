@@ -118,9 +118,10 @@ def upright(requested: ToolLean | None, zones: Sequence[ZonePlan], steps: Sequen
     out = []
     for z in zones:
         mine = [s for s in steps if s.zone == z.zone.id]
-        if inclined_axis.requested_lean(requested, z.zone.form, z.zone.tool) is None or not mine:  # roughing may leave nothing
+        if inclined_axis.requested_lean(requested, z.zone.form, z.zone.tool) is None or not mine:
             continue
-        way, whole = upright_way(mine), sum(t.length for s in mine for t in s.trajectories if t.motion is TrajectoryKind.CUT)
+        way = upright_way(mine)
+        whole = sum(t.length for s in mine for t in s.trajectories if t.motion is TrajectoryKind.CUT)
         reasons = [str(r["reason"]) for r in z.rejected if r["strategy"] == inclined_axis.NAME]
         if z.strategy not in LEANING:
             state, default_reason = "stays upright", "it is finished in bands, or no pass lies on it"

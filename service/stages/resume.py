@@ -156,7 +156,8 @@ class _UnderWay(CheckpointKeeper):
 
     def taken(self, use: Callable[[PlanSnapshot], T]) -> T | None:
         """See ``CheckpointKeeper``; the result counts as the number of its workingsteps."""
-        found = self.resumed.taken(ACTS, self.name, lambda v: (use(_checked(PlanSnapshot, v)), len(v.steps)), itemgetter(1))
+        found = self.resumed.taken(ACTS, self.name, lambda v: (use(_checked(PlanSnapshot, v)), len(v.steps)),
+                                   itemgetter(1))
         return None if found is None else found[0]
 
     def done(self, now: Callable[[], PlanSnapshot]) -> None:

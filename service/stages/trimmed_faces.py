@@ -31,7 +31,8 @@ def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
     """
     curved = {f.number for f in ready.part.faces if f.surface != "plane"}
     leans = ready.inputs.turns and ready.inputs.machine.simultaneous
-    wanted = [z for z in ready.zones if z.form is not AreaForm.LEVEL and suits(z.tool) or leans and z.form is AreaForm.STEEP]
+    wanted = [z for z in ready.zones
+              if z.form is not AreaForm.LEVEL and suits(z.tool) or leans and z.form is AreaForm.STEEP]
     flat = {f for z in wanted if leans and z.form is AreaForm.STEEP for f in z.faces} - curved
     numbers = sorted({f for z in wanted for f in z.faces} & curved | flat)
     if not numbers:

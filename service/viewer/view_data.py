@@ -111,7 +111,8 @@ def _entries(s: SurfaceSamples, remainder: Sequence[RemainderEntry], count: int)
 
 
 def _file(ready: Prepared, samples: SurfaceSamples, frame: ProofFrame, label: I64, names: Sequence[Mapping[str, Any]],
-          proof: Proof, setup: ProofSetup, track: ToolTrack, read: Sequence[FramedProgram], report: Mapping[str, Any], *,
+          proof: Proof, setup: ProofSetup, track: ToolTrack, read: Sequence[FramedProgram],
+          report: Mapping[str, Any], *,
           open_: bool) -> Files:
     part, d = ready.part, ready.decomposition
     here = turned_samples(samples, frame.rotation.T)

@@ -21,7 +21,8 @@ from verify.model import ProofSetup
 NODES, STRETCHES = 200_000, 32
 
 
-def stock_chunk(read: Sequence[FramedProgram], part: Part, tools: Sequence[ToolBody], setup: ProofSetup, frame: ProofFrame, *,
+def stock_chunk(read: Sequence[FramedProgram], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
+                frame: ProofFrame, *,
                 open_: bool) -> Chunk:
     """Blank, part and the changes as a chunk of kind 'field'.
 

@@ -88,7 +88,8 @@ def test_a_job_whose_uploads_are_gone_fails_by_name_and_is_not_claimed_for_ever(
 
 def test_a_round_is_left_out_after_the_clock_was_set(make_client, monkeypatch):
     client = make_client()
-    janitor = RetentionSweeper(client.app.state.engine.settings, client.app.state.engine.jobs, client.app.state.engine.artifacts)
+    engine = client.app.state.engine
+    janitor = RetentionSweeper(engine.settings, engine.jobs, engine.artifacts)
     assert not janitor._clock_was_set()
     true = time.time
     monkeypatch.setattr(time, "time", lambda: true() + 400 * DAY)

@@ -1,4 +1,5 @@
-"""Planted faults, the everyday share of ``benchmarks/faults/fault_table.py``: every kind, found where it is and as deep.
+"""Planted faults, the everyday share of ``benchmarks/faults/fault_table.py``: every kind, found where it is and as
+deep.
 
 Whether a fault is one, on which line and how deep, is said by the benchmark's brute-force twin, which takes its time:
 every day the right pocket alone, faults and other parts in the slow set; dome and cone are for the benchmark.

@@ -130,7 +130,8 @@ def test_the_one_simulated_says_how_far_a_path_is_left(order, part, tmp_path):
 def test_a_program_too_large_for_its_control_is_parted_and_proved(part, tmp_path):
     """A step of 14 kB and two small ones for 16 kB: three programs, run one after the other on one blank."""
     machine = {"dialects": ["linuxcnc", "heidenhain"], "max_program_kb": 16}
-    report = pipeline.plan(part, parse_setup(json.dumps({**SETUP, "operations": {}, "machine": machine})), tmp_path, quiet)
+    setup = parse_setup(json.dumps({**SETUP, "operations": {}, "machine": machine}))
+    report = pipeline.plan(part, setup, tmp_path, quiet)
     assert report["state"] == "proved" and report["coverage"] == 1.0
     names = [f["name"] for f in report["files"] if f["kind"] == "program"]
     ends = ("linuxcnc.ngc", "heidenhain.h")

@@ -12,7 +12,8 @@ from service import pipeline
 from service.from_wire import parse_setup
 
 cq = pytest.importorskip("cadquery")
-pytestmark = pytest.mark.slow  # a job of a minute; what it is made of is in tests/unit/toolpath/strategies/test_curvature_matched.py
+# A job of a minute; its parts are tested in tests/unit/toolpath/strategies/test_curvature_matched.py.
+pytestmark = pytest.mark.slow
 
 TOOL = {"id": "T1", "kind": "bull", "corner_radius_mm": 1, "flutes": 3, "diameter_mm": 8, "flute_length_mm": 14,
         "neck_diameter_mm": 7.6, "neck_length_mm": 24, "shank_diameter_mm": 8, "stickout_mm": 40,

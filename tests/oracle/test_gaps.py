@@ -1,4 +1,6 @@
-"""Gaps of ``zones.features.channels`` and normals of ``zones.features.smooth_surface`` against closed forms and dense rays of exact surfaces.
+"""Gaps of ``zones.features.channels`` and normals of ``zones.features.smooth_surface``.
+
+They are compared with closed forms and dense rays of exact surfaces.
 
 The sides are parametric surfaces written down here; the program sees their nodes only, meshed in full-height triangles
 or in a few rows. The twin sends rays from a dense grid along the exact normal, solves for the exact foot with Newton's

@@ -1,9 +1,9 @@
 """What tools that lean or turn leave on the normals of samples, and which points their bodies take in.
 
-Notation as in ``pose`` and ``sweep``; samples lie in chunks of nested balls (``verify.material.point_tree``). One call works
-all moves in order through one chunk, so chunks can run side by side. Each piece of a move is a translation in the view
-of the tool, off by at most ``bow``; a ray turns against the tool while the piece lasts, by half its angle either way,
-so a root at t is looked for again from the point it was found at, until that is where the ray is met.
+Notation as in ``pose`` and ``sweep``; samples lie in chunks of nested balls (``verify.material.point_tree``). One
+call works all moves in order through one chunk, so chunks can run side by side. Each piece of a move is a translation
+in the view of the tool, off by at most ``bow``; a ray turns against the tool while the piece lasts, by half its angle
+either way, so a root at t is looked for again from the point it was found at, until that is where the ray is met.
 """
 
 from __future__ import annotations

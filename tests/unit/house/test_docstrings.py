@@ -3,33 +3,29 @@
 from __future__ import annotations
 
 import ast
-import re
+import importlib.util
+import sys
 from collections.abc import Iterator
 
 import pytest
 
-from tests.source_tree import modules
+from tests.source_tree import ROOT, modules
 
-ARRAY = re.compile(r"\b(NDArray|ndarray|F64|F32|I32|I64|U8|BOOL|Array)\b")
-SHAPE = re.compile(r"\(\s*[\w*+\-. ]+\s*,(\s*[\w*+\-. ]+\s*,?)*\s*\)")
-UNIT = re.compile(
-    r"\b(mm|rad|deg|min|unit|units|unitless|indices|index|bool|parameters?|rows?|counts?|fractions?|numbers?|ids?|mask"
-    r"|uint8|weights?|labels?)\b|mm[²³]|0\.\.1"
-)
+SPEC = importlib.util.spec_from_file_location("docstrings", ROOT / ".ci" / "docstrings.py")
+assert SPEC is not None and SPEC.loader is not None
+docstrings = importlib.util.module_from_spec(SPEC)
+sys.modules["docstrings"] = docstrings
+SPEC.loader.exec_module(docstrings)
+
+CASES = [(name, tree) for name, tree in modules() if "migrations" not in name]
+FILES = docstrings.chosen([])
 
 
 def public(tree: ast.Module) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef]:
+    """Public functions and classes of a module."""
     for node in tree.body:
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef) and not node.name.startswith("_"):
             yield node
-
-
-def array_parameters(node: ast.FunctionDef | ast.AsyncFunctionDef) -> list[str]:
-    every = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
-    return [a.arg for a in every if a.annotation is not None and ARRAY.search(ast.unparse(a.annotation))]
-
-
-CASES = [(name, tree) for name, tree in modules() if "migrations" not in name]
 
 
 @pytest.mark.parametrize(("name", "tree"), CASES, ids=[n for n, _ in CASES])
@@ -39,23 +35,29 @@ def test_module_and_everything_public_in_it_has_a_docstring(name, tree):
     assert not missing, f"{name}: no docstring on {', '.join(missing)}"
 
 
-@pytest.mark.parametrize(("name", "tree"), CASES, ids=[n for n, _ in CASES])
-def test_array_parameters_come_with_shape_and_unit(name, tree):
-    wrong = []
-    for node in public(tree):
-        if isinstance(node, ast.ClassDef) or not array_parameters(node):
-            continue
-        text = ast.get_docstring(node) or ""
-        if not SHAPE.search(text):
-            wrong.append(f"{node.name} (line {node.lineno}): no shape such as (n, 3)")
-        elif not UNIT.search(text):
-            wrong.append(f"{node.name} (line {node.lineno}): no unit")
-    assert not wrong, f"{name}: {'; '.join(wrong)}"
+@pytest.mark.parametrize("path", FILES, ids=[str(p.relative_to(ROOT)) for p in FILES])
+def test_arrays_have_shape_dtype_unit_and_frame_and_errors_their_class(path):
+    wrong = [f"{p.where}: {', '.join(p.missing)}" for p in docstrings.places(path) if p.missing]
+    assert not wrong, "\n".join(wrong)
 
 
-def test_the_rule_notices_what_it_should():
-    """A checker that cannot fail is none: a function without shape, without unit, and a right one."""
-    assert not SHAPE.search("points in mm") and SHAPE.search("points : (n, 3) float64, mm")
-    assert SHAPE.search("(m,) int32") and not UNIT.search("(n, 3) float64 normalised")
-    tree = ast.parse("def f(a: F64, b: int) -> F64:\n    return a\n")
-    assert array_parameters(next(public(tree))) == ["a"]
+def test_formulas_name_their_source():
+    assert sum(p.source for path in FILES for p in docstrings.places(path)) >= docstrings.LEAST_SOURCES
+
+
+def judge(source: str) -> tuple[str, ...]:
+    """What the rules find missing in the one function of a source."""
+    (node,) = ast.parse(source).body
+    assert isinstance(node, ast.FunctionDef)
+    return docstrings.judged(node, "", "x").missing
+
+
+def test_the_rules_notice_what_they_should():
+    """A checker that cannot fail is none."""
+    head = "def f(a: F64) -> None:\n    '''"
+    assert judge(f"{head}Do.'''") == ("no word on a", "no shape", "no dtype", "no unit")
+    assert judge(f"{head}a : (n, 3) float64, mm'''") == ("no frame",)
+    assert judge(f"{head}a : (n, 3) float64, mm, setup frame'''") == ()
+    assert judge(f"{head}a : (n, 3) float64, rows of the setup frame'''") == ("no unit",)
+    assert judge("def f():\n    '''Do.'''\n    raise InputError('x')") == ("no Raises for InputError",)
+    assert judge("def f():\n    '''Do.\n\n    Raises\n    ------\n    InputError\n    '''\n    raise InputError('x')") == ()

@@ -12,7 +12,8 @@ import pytest
 
 from tests.source_tree import PACKAGES, ROOT
 
-NAMED = re.compile(r"(?<![\w/.<*{-])((?:\.\./)*(?:[\w-]+/)+[\w.-]+\.(?:py|md|ts|mjs|html|yaml|toml|bib|json|sh|lock))(?![\w/])")
+ENDINGS = "py|md|ts|mjs|html|yaml|toml|bib|json|sh|lock"
+NAMED = re.compile(rf"(?<![\w/.<*{{-])((?:\.\./)*(?:[\w-]+/)+[\w.-]+\.(?:{ENDINGS}))(?![\w/])")
 BARE = re.compile(r"`{1,2}([a-z_0-9]+\.py)\b")
 MADE = re.compile(r"^(?:out|data|build|dist|tmp|\.venv|service/page|web/node_modules)/|(?:^|/)(?:NAME|[A-Z]+)\.|://")
 """What a run makes, and names that stand for many."""
@@ -28,8 +29,9 @@ def texts() -> Iterator[tuple[Path, str]]:
         for path in sorted((ROOT / package).rglob("*.py")):
             with tokenize.open(path) as file:
                 source = file.read()
-            words = [t.string for t in tokenize.generate_tokens(io.StringIO(source).readline)
-                     if t.type == tokenize.COMMENT or t.type == tokenize.STRING and t.string.lstrip("rbfRBF")[:3] == '"""']
+            tokens = tokenize.generate_tokens(io.StringIO(source).readline)
+            words = [t.string for t in tokens if t.type == tokenize.COMMENT
+                     or t.type == tokenize.STRING and t.string.lstrip("rbfRBF")[:3] == '"""']
             yield path, "\n".join(words)
     for path in sorted((ROOT / "web" / "src").rglob("*.ts")):
         if path.name != "wire.ts":
@@ -55,5 +57,6 @@ def test_named_files_exist(path: Path, text: str) -> None:
 
 
 def test_the_rule_notices_a_file_that_is_gone() -> None:
-    assert NAMED.findall("see `geometry/no_such.py: f` and zones/model.py.") == ["geometry/no_such.py", "zones/model.py"]
+    text = "see `geometry/no_such.py: f` and zones/model.py."
+    assert NAMED.findall(text) == ["geometry/no_such.py", "zones/model.py"]
     assert not exists("geometry/no_such.py", ROOT / "README.md") and exists("zones/model.py", ROOT / "README.md")

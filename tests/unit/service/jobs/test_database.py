@@ -75,7 +75,8 @@ def test_no_free_connection_is_a_database_that_is_away_and_stops_no_job():
         raise PoolTimeoutError("QueuePool limit of size 5 overflow 10 reached")
 
     store = SimpleNamespace(is_held=busy, renew=busy, progress=busy, resumed=busy)
-    attempt = _Attempt(store, None, WorkConfig("", "", ProcessLimits(1, 1), 20.0), {"id": "j", "attempt": 1}, "worker-1")
+    config = WorkConfig("", "", ProcessLimits(1, 1), 20.0)
+    attempt = _Attempt(store, None, config, {"id": "j", "attempt": 1}, "worker-1")
     assert attempt._keep() is True
     attempt._progress("asleep", 0.5)
     attempt._resumed({})
