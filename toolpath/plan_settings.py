@@ -14,6 +14,7 @@ from geometry.mesh import F64
 from geometry.move_timing import RATES, Rates
 from geometry.tool_body import ToolBody
 from toolpath.counterexamples import NONE, Counterexamples
+from toolpath.scallop_budget import ScallopBudget
 from toolpath.tool_deflection import MIN_FEED, DeflectionEstimate, DeflectionModel, effective_diameter
 from toolpath.workingsteps import CutDirection
 
@@ -147,3 +148,8 @@ class PlanSettings:
     planes: tuple[float, ...] = ()
     semi_finishing: bool = False
     leaned: ToolLean | None = None
+
+    @property
+    def budget(self) -> ScallopBudget:
+        """The shares of the scallop and of the chordal tolerance."""
+        return ScallopBudget(self.scallop_height, self.chordal_tolerance)

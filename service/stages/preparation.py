@@ -23,6 +23,7 @@ from service.from_wire import blank_error, face_numbers, no_stock_file
 from service.stages.blank_checks import check_against_part
 from service.stages.blank_model import Blank, blank_of
 from service.stages.job_inputs import JobInputs, mesh_chord, placement_of
+from toolpath.scallop_budget import ScallopBudget
 from zones.features.decomposition import decompose
 from zones.lattice import lattice_step
 from zones.machinable_area import machinable_faces
@@ -194,7 +195,8 @@ def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True
     seen_from = _seen_from(inputs, rotations, search)
     samples = planning_samples(first, decomposition, inputs, seen_from @ rotations[0].T)
     channels = ChannelPlan.of(first, decomposition)
-    lift = max(0.1 * inputs.quality.scallop_height_mm, 1.5 * part.chord)
+    quality = inputs.quality
+    lift = max(ScallopBudget(quality.scallop_height_mm, quality.chordal_tolerance_mm).reach, 1.5 * part.chord)
     views: list[View] = []
 
     def add_view(access: Access) -> None:

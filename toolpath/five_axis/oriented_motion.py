@@ -292,7 +292,7 @@ def free_parts(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Sur
     at = np.arange(len(met), dtype=np.float64)
     uphill = [] if piece.on_end else [p.reversed() for p in dense.parts(binary_dilation(down) & ~met, at, least)]
     parts = [*dense.parts(~(met | down), at, least), *(_begun_level(part, slope, least) for part in uphill)]
-    return [p.at(thinned_poses(p.tips, p.axes, p.reach, 0.25 * settings.chordal_tolerance).astype(np.float64))
+    return [p.at(thinned_poses(p.tips, p.axes, p.reach, settings.budget.rounding).astype(np.float64))
             for p in parts if p is not None]
 
 
@@ -330,7 +330,7 @@ def _descends(piece: Piece, slope: float, allowed: float) -> NDArray[np.bool_]:
 def with_ways(piece: Piece, tool: ToolBody, cut: CutData, settings: PlanSettings,
               around: Surroundings) -> tuple[Trajectory, ...] | str:
     """A pass with its ways in and out, or the reason why there is none."""
-    thick, chord = THICK * tool.diameter, 0.25 * settings.chordal_tolerance
+    thick, chord = THICK * tool.diameter, settings.budget.rounding
     walked = around.turning.along(piece.tips, piece.axes)
     if walked is None:
         return "the rotary axes cannot follow the pass"

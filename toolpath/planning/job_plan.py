@@ -33,7 +33,7 @@ from toolpath.plan_checkpoint import (
 )
 from toolpath.plan_settings import CutData, PlanSettings
 from toolpath.planning.depth_bands import largest_corner
-from toolpath.planning.zone_finishing import PASS_SHARE, Finish, ZonePlan, motions_of, step_of, turned
+from toolpath.planning.zone_finishing import Finish, ZonePlan, motions_of, step_of, turned
 from toolpath.roughing.engagement_limited_clearing import Clearing
 from toolpath.stock.cut_history import Depths, Walked
 from toolpath.stock.engagement import SKIN_SHARE, UNBOUNDED
@@ -147,7 +147,7 @@ class _Work:
                 for zone in job.zones:
                     yield 1, partial(job.finish, zone, plane)
                 for zone in job.zones:
-                    yield 0, partial(job.again, zone, PASS_SHARE * settings.scallop_height)
+                    yield 0, partial(job.again, zone, settings.budget.done)
         for job in self.jobs:  # another tool removed the stock in the way: worth a tool change for the rest
             for zone in job.zones:
                 yield 0, partial(job.again, zone, settings.scallop_height)
@@ -284,7 +284,7 @@ class _Layers:
         """
         field, cut, settings, tool, lat = self.field, self.cut, self.settings, self.field.tool, self.field.lattice
         linker = self._linker()
-        chord = 0.5 * settings.chordal_tolerance
+        chord = settings.budget.chord
         between: list[float] = []
         while self.left and self.left[0][0] >= lowest - 1e-9:
             z, below = self.left.pop(0)

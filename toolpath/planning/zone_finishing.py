@@ -15,6 +15,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,7 @@ from toolpath.passes.reach_border import beyond
 from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_checkpoint import FinishSnapshot
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
+from toolpath.planning.candidates import compared
 from toolpath.poses import Blocked
 from toolpath.stock.cut_history import Depths, Walked, still_to_walk
 from toolpath.stock.engagement import UNBOUNDED
@@ -57,13 +59,9 @@ from zones.machinable_area import AreaForm
 from zones.reach.tip_field import TipField
 from zones.zoning.zones import ZoneArea
 
-LAID_SHARE = 0.8  # of the allowed scallop, for passes whose envelope is measured; program and facets take the rest
-CUSP_SHARE = 0.55  # of the allowed scallop, for the distance between passes; reach and chord take the rest
 LINK_S = 1.2  # s for going up, over and down again: mean of the links of the demo part
-PASS_SHARE = 0.85  # a sample is done when the measured residual is within this share of the scallop
 REFINEMENTS = 4
 LEANING = frozenset((flank.NAME, curvature_matched.NAME, inclined_axis.NAME))  # strategies of a tool that leans
-UPRIGHT = 10  # parts in which the upright share of the way of a zone with a requested tilt is compared
 MIN_AGAIN = 4  # moves that a line repeats before they are left out
 AS_IT_IS = 1e-9  # mm, tolerance of a line that is thinned out already
 BORDER_SHARE = 0.1  # of the distance between passes on a plane: precision of the border of an area
@@ -175,7 +173,7 @@ class Finish:
         choice holds for the bands below. A zone in bands has no tilted passes.
         """
         every = np.ones(len(self.checks.points), np.bool_) if wanted is None else wanted
-        if not bool((every & (self.residual.residual > self._aims(PASS_SHARE * self.settings.scallop_height))).any()):
+        if not bool((every & (self.residual.residual > self._aims(self.settings.budget.done))).any()):
             return []
         if self.settled:
             return self._rounds(step_id, every)
@@ -194,37 +192,25 @@ class Finish:
             tries.append(self._copied(self.strategy))
             made.append(tries[-1]._led(step_id, name, runs, every))
             seconds.append(sum(step.seconds for step in made[-1]) + TURN_S * len(runs))
-        most = self._aims(self.settings.scallop_height)[:self.given]
-        left = [int((t.residual.residual[:self.given] > most).sum()) for t in tries]
+        limits = self._aims(self.settings.scallop_height)[:self.given]
+        left = [int((t.residual.residual[:self.given] > limits).sum()) for t in tries]
         tilts = leans and inclined_axis.requested_lean(self.settings.leaned, self.zone.form,
                                                        self.field.tool) is not None
-        way = [upright_way(steps) if tilts else 0.0 for steps in made]
-        upright = [0 if not tilts else round(UPRIGHT * w / max(*way, 1e-9)) if t.begun_with else UPRIGHT + 1
-                   for t, w in zip(tries, way, strict=True)]
-        best = min(range(len(tries)), key=lambda k: (not made[k], left[k], upright[k], seconds[k]))
-        rejected = [*tries[best].strategy.rejected, *refused]
-        for k, lost in enumerate(tries):
-            why: dict[str, object] = {"reason": "no pass can be cut", "value": 0, "limit": 0}
-            if made[k] and left[k] > left[best]:
-                why = {"reason": "more samples are left above the scallop", "value": left[k], "limit": left[best]}
-            elif made[k] and upright[k] > UPRIGHT >= upright[best]:
-                why = {"reason": "tool axis stayed upright although a tilt was requested, s",
-                       "value": round(seconds[k], 1), "limit": round(seconds[best], 1)}
-            elif made[k] and upright[k] > upright[best]:
-                why = {"reason": "more of the way is upright although a tilt was requested, mm",
-                       "value": round(way[k], 1), "limit": round(way[best], 1)}
-            elif made[k]:
-                why = {"reason": "takes longer at equal scallop, s", "value": round(seconds[k], 1),
-                       "limit": round(seconds[best], 1)}
-            if k != best:
-                rejected.append({"strategy": lost.begun_with or lost.strategy.name, **why})
-        stock, walked, depths, taken = self.stock, self.walked, self.depths, tries[best]
-        stock.become(taken.stock)
-        walked.become(taken.walked)
-        depths.become(taken.depths)
-        self.__dict__.update(taken.__dict__ | {"stock": stock, "walked": walked, "depths": depths,
-                                               "strategy": replace(taken.strategy, rejected=tuple(rejected))})
-        return made[best]
+        found = compared(tries, made, seconds, left, [upright_way(steps) for steps in made] if tilts else None)
+        best = min(found, key=attrgetter("key"))
+        rejected = [*best.finish.strategy.rejected, *refused]
+        rejected += [lost.rejected_for(best) for lost in found if lost is not best]
+        self._adopt(best.finish, tuple(rejected))
+        return best.steps
+
+    def _adopt(self, chosen: Finish, rejected: tuple[dict[str, object], ...]) -> None:
+        """Take over what a copy has cut; stock and history, which other zones share, keep their identity."""
+        self.stock.become(chosen.stock)
+        self.walked.become(chosen.walked)
+        self.depths.become(chosen.depths)
+        self.strategy = replace(chosen.strategy, rejected=rejected)
+        self.cut, self.residual, self.met = chosen.cut, chosen.residual, chosen.met
+        self.step, self.begun_with, self.passes = chosen.step, chosen.begun_with, chosen.passes
 
     def _leaning(self, max_seconds: float) -> tuple[list[TiltedPasses], tuple[dict[str, object], ...]]:
         """Passes of a tilted tool, by the name of their strategy, and reasons for missing ones.
@@ -288,7 +274,7 @@ class Finish:
         faces = [face for face in self.faces if not face.flat]
         if not (suited and faces and len(self.checks.points)):
             return None, ()
-        every, scallop = np.arange(len(self.checks.points)), LAID_SHARE * settings.scallop_height
+        every, scallop = np.arange(len(self.checks.points)), settings.budget.laid
         link = LINK_S * self.cut.feed / 60.0  # between passes that end elsewhere than the next begins
         way = sum(line.length + (0.0 if line.closed or not steep else link)
                   for lines in usual.rounds(0, every) for line in lines)
@@ -297,7 +283,7 @@ class Finish:
         least = self.given * self.checks.spacing**2 / level
         if least > WORTH_A_TRY * way:
             return None, (_not_taken("longer even on a plane, with links, mm", least, way),)
-        chord = 0.5 * settings.chordal_tolerance
+        chord = settings.budget.chord
         found = isoparametric.course(faces, self.checks, self.field, scallop, chord,
                                      self._flank() if steep else None)
         refused = _refused(found.refused)
@@ -351,7 +337,7 @@ class Finish:
     def _rounds(self, step_id: str, wanted: NDArray[np.bool_]) -> list[Workingstep]:
         """All rounds for the samples ``wanted``, as one workingstep."""
         linker = self._linker()
-        budget = self._aims(PASS_SHARE * self.settings.scallop_height)
+        budget = self._aims(self.settings.budget.done)
         failing = np.flatnonzero(wanted & (self.residual.residual > budget))
         for k in range(REFINEMENTS + 2):
             if not len(failing):
@@ -392,7 +378,7 @@ class Finish:
         """Cut lines of round k and measure them."""
         tool, settings = self.field.tool, self.settings
         floor = self.strategy.name == "planar_floor"
-        thin = min(0.5 * settings.chordal_tolerance, planar_floor.EXACT) if floor else None
+        thin = min(settings.budget.chord, planar_floor.EXACT) if floor else None
         skin, slope = SKIN * tool.diameter, RAMP_SHARE * math.tan(settings.ramp_angle)
         ordered = self.strategy.ordered and k <= REFINEMENTS
         if not ordered:
@@ -482,8 +468,8 @@ class _Strategy:
 def _strategy(zone: ZoneArea, checks: FinishTarget, field: TipField, cut: CutData,
               settings: PlanSettings) -> _Strategy:
     """The strategy of a zone."""
-    tool, chord, normals = field.tool, 0.5 * settings.chordal_tolerance, checks.normals
-    cusp = CUSP_SHARE * settings.scallop_height
+    tool, chord, normals = field.tool, settings.budget.chord, checks.normals
+    cusp = settings.budget.cusp
     if zone.form is AreaForm.STEEP:
         step = waterline.level_step(tool, normals, cusp, cut.step_down)
 
@@ -503,7 +489,7 @@ def _strategy(zone: ZoneArea, checks: FinishTarget, field: TipField, cut: CutDat
             return planar_floor.planes(field, checks.tips[failing], chord, k) if k <= planar_floor.MAX_FINER else []
 
         return _Strategy("planar_floor", 1.6 * (tool.radius - tool.corner_radius), planes, False)
-    promise = Promise(LAID_SHARE * settings.scallop_height, settings.chordal_tolerance, 0.3 * tool.radius,
+    promise = Promise(settings.budget.laid, settings.chordal_tolerance, 0.3 * tool.radius,
                       LINK_S * cut.feed / 60.0)
     layout = zigzag.laid(field, checks, promise, settings.pattern, settings.cut_direction.climbs)
 
@@ -564,7 +550,7 @@ def motions_of(cut: CutData, settings: PlanSettings) -> Motions:
     """
     skimmed = math.inf if cut.finish is None or cut.engaged >= UNBOUNDED else cut.finish.feed
     return Motions(cut.feed, cut.plunge_feed, cut.link_feed, settings.rates.rapid, settings.clearance,
-                   settings.rapid_floor, settings.ramp_angle, cut.step_down, 0.5 * settings.chordal_tolerance, skimmed)
+                   settings.rapid_floor, settings.ramp_angle, cut.step_down, settings.budget.chord, skimmed)
 
 
 def step_of(step_id: str, name: str, zone: str | None, zones: Sequence[ZoneArea], operation: str, strategy: str,

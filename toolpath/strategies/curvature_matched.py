@@ -33,8 +33,6 @@ from toolpath.poses import places_along
 
 NAME = "curvature_matched"
 MIN_TILT = math.radians(1.0)  # an end then cuts in front and is clear of the surface behind
-SHARE = 0.25  # of the chordal tolerance: depth of the nose, and error of leaving out poses
-LAID_SHARE = 0.8  # of the scallop, for the strips; chords and facets take the rest
 ALONG, UP = 65, 33  # places of a face that are compared with the target
 TRIED = 9  # places each way at which the tool is tried before passes are laid out
 MIN_FREE = 0.25  # share of the wanted places
@@ -86,8 +84,8 @@ def matched(faces: Sequence[Faces], target: FinishTarget, tool: ToolBody, cut: C
     allowance   : mm, to leave on the part
     max_seconds : s, time of the usual passes; slower passes are not laid out
     """
-    chord = SHARE * settings.chordal_tolerance
-    tolerances = MatchTolerances(LAID_SHARE * settings.scallop_height, chord, MIN_TILT, chord)
+    chord = settings.budget.rounding
+    tolerances = MatchTolerances(settings.budget.laid, chord, MIN_TILT, chord)
     ends = _Ends(tool, tolerances, around, allowance, settings.lift, cKDTree(target.points), target.spacing)
     found: list[tuple[str, Piece]] = []
     refused: list[str] = []

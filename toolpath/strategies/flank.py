@@ -36,7 +36,7 @@ def flanked(faces: Sequence[Faces], target: FinishTarget, tool: ToolBody, cut: C
     around    : Surroundings
     allowance : mm, to leave on the part
     """
-    chord = 0.25 * settings.chordal_tolerance
+    chord = settings.budget.rounding
     wanted = FlankTolerances(settings.scallop_height, chord, chord)
     near = cKDTree(target.points)
     found: list[tuple[str, Piece]] = []

@@ -32,8 +32,6 @@ from zones.machinable_area import AreaForm
 from zones.reach.tip_field import TipField
 
 NAME = "inclined_axis"
-LAID_SHARE = 0.8  # of the scallop, for the distance between passes; chords and facets take the rest
-CHORD_SHARE = 0.5  # of the chordal tolerance, for locations; leaving out poses takes a quarter
 LIMITS = AxisLimits(math.radians(45.0), math.radians(4.0))
 WARY = 0.3  # mm of additional clearance of neck, shank and holder at stations, for places between and stock of layers
 JOINED = math.radians(15.0)  # largest turn of the axis from the end of a pass to the beginning of the next
@@ -125,8 +123,8 @@ def inclined_passes(faces: Sequence[Faces], target: FinishTarget, field: TipFiel
     """
     tool, spare = field.tool, field.allowance
     grown = replace(tool, diameter=tool.diameter + 2.0 * spare, corner_radius=tool.corner_radius + spare)
-    nose = _Nose(tool, grown, around, wary, spare, settings.lift, LAID_SHARE * settings.scallop_height,
-                 CHORD_SHARE * settings.chordal_tolerance)
+    nose = _Nose(tool, grown, around, wary, spare, settings.lift, settings.budget.laid,
+                 settings.budget.chord)
     planned = course(faces, target, field, nose.scallop, nose.chord, None)
     refused = list(planned.refused)
     passes: list[list[Piece]] = []

@@ -60,4 +60,5 @@ def test_the_rules_notice_what_they_should():
     assert judge(f"{head}a : (n, 3) float64, mm, setup frame'''") == ()
     assert judge(f"{head}a : (n, 3) float64, rows of the setup frame'''") == ("no unit",)
     assert judge("def f():\n    '''Do.'''\n    raise InputError('x')") == ("no Raises for InputError",)
-    assert judge("def f():\n    '''Do.\n\n    Raises\n    ------\n    InputError\n    '''\n    raise InputError('x')") == ()
+    section = "Raises\n    ------\n    InputError"
+    assert judge(f"def f():\n    '''Do.\n\n    {section}\n    '''\n    raise InputError('x')") == ()

@@ -15,6 +15,7 @@ from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.plan_settings import Pattern
 from toolpath.planning.zone_finishing import Finish, _Strategy
+from toolpath.scallop_budget import ScallopBudget
 from toolpath.stock.cut_history import Depths, Walked
 from toolpath.strategies import isoparametric
 from toolpath.strategies.isoparametric import course, laid
@@ -158,7 +159,8 @@ def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_fast
     class Stub(Finish):
         def __init__(self):
             self.checks, self.given, self.walked = SimpleNamespace(points=np.zeros((4, 3))), 4, Walked()
-            self.settings = SimpleNamespace(scallop_height=0.02, found=NONE, turning=None)
+            self.settings = SimpleNamespace(scallop_height=0.02, found=NONE, turning=None,
+                                            budget=ScallopBudget(0.02, 0.002))
             self.zone, self.stock = SimpleNamespace(id="Z1"), SimpleNamespace(become=lambda _: None)
             self.residual = SimpleNamespace(residual=np.ones(4))
             self.strategy, self.depths = _Strategy("waterline", 1.0, None, False), Depths(Lattice(0.0, 0.0, 0.5, 12, 6))
@@ -175,6 +177,7 @@ def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_fast
             walked.add(ways[k].points)
             depths.cut(ways[k].points)
             return SimpleNamespace(strategy=strategy, begun_with="", stock=None, walked=walked, depths=depths,
+                                   cut=None, met=None, step=None, passes=0,
                                    residual=SimpleNamespace(residual=rest), _rounds=lambda _id, _wanted: steps)
 
     finish = Stub()
