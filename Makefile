@@ -80,7 +80,7 @@ test-cov: $(STAMP) page
 	$(BIN)/python -m pytest -q -m "not slow and not soak" -n 2 --dist worksteal --cov --cov-report=term $(if $(K),-k "$(K)")
 
 test-slow: $(STAMP)
-	$(BIN)/python -m pytest -q -m "slow and not soak" --ignore tests/contract/test_clients.py
+	$(BIN)/python -m pytest -q -m "slow and not soak" -n 2 --dist worksteal --durations 20 --ignore tests/contract/test_clients.py
 
 # The tests on the runtime lock, in an environment without cadquery; make test-runtime RUNTIME_TESTS=tests runs every
 # everyday test that draws no part itself. The development environment writes the parts beforehand.

@@ -1,0 +1,34 @@
+"""How test runs are cut into shares, and what they say of skipped tests."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from tests.shards import pytest_collection_modifyitems, shard_of
+from tests.skips import remedies
+
+
+def item(module: str, slow: bool) -> SimpleNamespace:
+    """A test as the hook sees it."""
+    return SimpleNamespace(nodeid=f"{module}::test_x", get_closest_marker=lambda name: slow or None)
+
+
+def test_every_slow_module_is_in_one_share_and_everyday_tests_in_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    config = SimpleNamespace(hook=SimpleNamespace(pytest_deselected=lambda items: None))
+    names = [f"tests/e2e/test_{k}.py" for k in range(40)]
+    seen: list[str] = []
+    for k in range(4):
+        items = [item(n, True) for n in names] + [item("tests/unit/test_quick.py", False)]
+        monkeypatch.setenv("ZONEMILL_SHARD", f"{k}/4")
+        pytest_collection_modifyitems(config, items)  # type: ignore[arg-type]
+        assert items[-1].nodeid.startswith("tests/unit/test_quick")
+        seen += [i.nodeid for i in items[:-1]]
+    assert sorted(seen) == sorted(f"{n}::test_x" for n in names)
+    assert {shard_of(n, 4) for n in names} == {0, 1, 2, 3}
+
+
+def test_skips_for_want_of_programs_name_the_commands_once() -> None:
+    reasons = ["rs274 is not installed", "needs Chromium", "no module opencamlib", "no rs274", "other"]
+    assert remedies(reasons) == (4, ["apt-get install chromium", "apt-get install linuxcnc-uspace", "make peers"])
