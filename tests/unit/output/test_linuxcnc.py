@@ -84,8 +84,8 @@ def test_long_labels_are_wrapped():
 
 def test_steps_are_named_with_zone_strategy_faces_and_depth():
     text = write_linuxcnc(plan())
-    assert "(S03 Z3 finishing zlevel T1: F12 F13; Z 10 down to 4)" in text
-    assert "(S01 several zones roughing layers T7: no faces" in text
+    assert "(S03 Z3 finishing waterline T1: F12 F13; Z 10 down to 4)" in text
+    assert "(S01 several zones roughing depth_layers T7: no faces" in text
 
 
 @pytest.mark.parametrize("seed", range(5))

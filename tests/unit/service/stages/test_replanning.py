@@ -23,7 +23,7 @@ from verify.model import Finding, FindingKind
 
 TOOL = SHORT_TOOLS["flat"]
 TILT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # setup frame -> access
-TEXT = "%\n(S01 several zones roughing layers T1: F1)\nG1 X1\n(S02 Z1 finishing flank T1: F1)\nG1 X2\nX3\n"
+TEXT = "%\n(S01 several zones roughing depth_layers T1: F1)\nG1 X1\n(S02 Z1 finishing flank T1: F1)\nG1 X2\nX3\n"
 
 
 def found(kind, line=3, tip=(1.0, 2.0, 3.0), depth=0.3, near=False):

@@ -28,7 +28,7 @@ TEXT = """G21 G17 G90 G94 G64 P0.001
 G54
 T1 M6
 G43 H1
-(S01 several zones roughing layers T1: F1)
+(S01 several zones roughing depth_layers T1: F1)
 S1000 M3
 G0 Z20
 G0 X0 Y0
@@ -38,7 +38,7 @@ G1 X20
 (F2 F3; Z 15 down to 0)
 G1 X30 Y0.05
 G0 Z20
-(S02 Z1 zlevel T1: F1)
+(S02 Z1 waterline T1: F1)
 G0 X5 Y5
 G1 Z4 F100
 G1 X9 F600
@@ -98,7 +98,7 @@ def test_moves_belong_to_the_steps_of_the_plan(way):
     assert [s["id"] for s in way.steps] == ["S01", "S02"] and [s["zone"] for s in way.steps] == [None, "Z1"]
     lines = TEXT.split("\n")
     for line, step in zip(way.line.tolist(), way.step.tolist(), strict=True):
-        assert step == (1 if line > lines.index("(S02 Z1 zlevel T1: F1)") else 0)
+        assert step == (1 if line > lines.index("(S02 Z1 waterline T1: F1)") else 0)
     assert (way.ended >= way.begun).all() and way.begun[0] == 0.0
     assert np.allclose(way.begun[1:], way.ended[:-1])
 
