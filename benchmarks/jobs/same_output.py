@@ -24,7 +24,7 @@ CONTROLS = {"siemens": "mpf", "linuxcnc": "ngc", "fanuc": "nc", "haas": "nc", "h
 PROSE = {"message", "remedy", "note", "notes", "text", "description", "hint"}
 DERIVED = {"version", "sha256"}  # of the files, which are compared themselves
 TEXTS = {".ngc", ".nc", ".mpf", ".h", ".stpnc"}
-MAPPED_AWAY = {".png", ".pdf", ".html"}  # pictures and sheets show prose
+MAPPED_AWAY = {".png", ".pdf", ".html", ".bin"}  # pictures, sheets and page data show prose and line numbers
 
 
 def run(*arguments: str) -> str:
@@ -69,21 +69,38 @@ def renamed(text: str) -> str:
         return word.upper() if match[1].isupper() else word  # some controls show capitals only
 
     words = "|".join(STRATEGIES)
-    return re.sub(rf"(?<=[ '_(,])(?<!between )({words})(?=[ ',:;)_])", new, text, flags=re.IGNORECASE)
+    return re.sub(rf"(?<=[ '(,])(?<!between )({words})(?=[ ',:;)])", new, text, flags=re.IGNORECASE)
 
 
 def plain(value: Any, key: str = "") -> Any:
     """A report without prose and version, strategy words as they are now."""
     if isinstance(value, dict):
-        return {k: plain(v, k) for k, v in value.items() if k not in PROSE | DERIVED}
+        prose = PROSE | {"reason"} if key == "rejected" else PROSE  # elsewhere a reason is a code
+        return {k: plain(v, k) for k, v in value.items() if k not in prose | DERIVED}
     if isinstance(value, list):
         return [plain(v, key) for v in value]
-    return STRATEGIES.get(value, value) if isinstance(value, str) and key == "strategy" else value
+    if isinstance(value, str) and key == "strategy":
+        return STRATEGIES.get(value, value)
+    return renamed(f" {value} ") if isinstance(value, str) and key == "name" else value
 
 
-def moves(text: str) -> list[str]:
-    """The lines of a program or STEP-NC file that are no prose; the version is left out."""
-    return [re.sub(r"zonemill [0-9][\w.+-]*", "zonemill", line) for line in renamed(text).splitlines()]
+def lines_of(text: str, suffix: str) -> tuple[list[str], list[str]]:
+    """The blocks of a program or STEP-NC file without comments and block numbers, and the words of its comments.
+
+    A longer word wraps a comment elsewhere and counts blocks on, which moves nothing. The version is left out.
+    """
+    text = re.sub(r"zonemill [0-9][\w.+-]*", "zonemill", renamed(text), flags=re.IGNORECASE)
+    if suffix == ".stpnc":
+        return text.splitlines(), []
+    blocks, words = [], []
+    for line in text.splitlines():
+        line = re.sub(r"^N?\d+ ", "", line)
+        comment = re.search(r"\((.*)\)|;(.*)", line)
+        if comment:
+            words += (comment[1] or comment[2] or "").split()
+            line = line.replace(comment[0], "")
+        blocks += [line.rstrip()] if line.strip() else []
+    return blocks, words
 
 
 def differences(before: Path, after: Path) -> list[str]:
@@ -99,10 +116,11 @@ def differences(before: Path, after: Path) -> list[str]:
             if a != b:
                 out += [f"{name}: {line}" for line in _where(a, b)]
         elif path.suffix in TEXTS:
-            a, b = moves(path.read_text()), moves(other.read_text())
-            out += [f"{name}: {len(a)} lines, {len(b)} after"] if len(a) != len(b) else []
-            unlike = [(k, x, y) for k, (x, y) in enumerate(zip(a, b, strict=False), 1) if x != y]
-            out += [f"{name}:{k}: {x!r} -> {y!r}" for k, x, y in unlike[:10]]
+            pairs = zip(*(lines_of(p.read_text(), path.suffix) for p in (path, other)), strict=True)
+            for what, (a, b) in zip(("block", "word"), pairs, strict=True):
+                out += [f"{name}: {len(a)} {what}s, {len(b)} after"] if len(a) != len(b) else []
+                unlike = [(k, x, y) for k, (x, y) in enumerate(zip(a, b, strict=False), 1) if x != y]
+                out += [f"{name}, {what} {k}: {x!r} -> {y!r}" for k, x, y in unlike[:10]]
         elif path.suffix not in MAPPED_AWAY and path.read_bytes() != other.read_bytes():
             out.append(f"{name}: other bytes")
     return out
