@@ -18,7 +18,7 @@ SLOTS = 2
 
 @pytest.fixture
 def service(make_client):
-    return make_client(workers=SLOTS, job_time_limit_s=6, job_memory_limit_mb=400)
+    return make_client(workers=SLOTS, job_time_limit_s=20, job_memory_limit_mb=400)
 
 
 @pytest.fixture

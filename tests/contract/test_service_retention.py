@@ -75,7 +75,7 @@ def test_a_worker_that_does_not_see_the_uploads_takes_no_job_up(make_client, pos
 
 
 def test_a_job_whose_uploads_are_gone_fails_by_name_and_is_not_claimed_for_ever(make_client, post, finish, monkeypatch):
-    monkeypatch.setattr(engine_module, "CLAIMS_IN_VAIN", 1)
+    monkeypatch.setattr(engine_module, "MAX_UNSTARTED_CLAIMS", 1)
     client = make_client(lease_s=0.2)
     busy = post(client, "sleep").json()
     finish(client, busy, until=("queued",))

@@ -12,6 +12,7 @@ from benchmarks.five_axis.five_axis_gain import MACHINE
 from examples.family.recipes import make_part
 from service import pipeline
 from service.from_wire import parse_setup
+from service.stages import plan_prove_loop
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
@@ -27,7 +28,7 @@ def _planned(folder: Path, told: list[float]) -> dict[str, Any]:
 def once(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """The report of the first plan alone."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, "PLANS", 1)
+        patch.setattr(plan_prove_loop, "MAX_PLANS", 1)
         return _planned(tmp_path_factory.mktemp("once"), [])
 
 

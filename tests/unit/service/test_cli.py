@@ -47,7 +47,7 @@ class FakeChain(types.ModuleType):
 def chain(monkeypatch):
     fake = FakeChain()
     monkeypatch.setitem(sys.modules, "service.pipeline", fake)
-    monkeypatch.setattr(service, "chain", fake, raising=False)
+    monkeypatch.setattr(service, "pipeline", fake, raising=False)
     return fake
 
 
