@@ -39,7 +39,7 @@ def play(service, post, finish, setup_json):
                 assert job["state"] == "failed" and job["error"]["code"] == POISON[do], job
             else:
                 assert (job["state"], job["attempt"]) == ("proved", 1), job
-        return [service.api.app.state.engine.jobs.get(job["id"]) for _, job in jobs]
+        return [service.app.state.engine.jobs.get(job["id"]) for _, job in jobs]
 
     return run
 
@@ -67,7 +67,7 @@ def test_healthy_jobs_are_proved_beside_poison_and_the_slots_come_back(service, 
             break
         time.sleep(0.02)
     assert states == ["running", "running"]
-    assert not [p for p in service.api.app.state.engine.artifacts.tmp.iterdir() if p.name.startswith("job-")][2:]
+    assert not [p for p in service.app.state.engine.artifacts.tmp.iterdir() if p.name.startswith("job-")][2:]
 
 
 @pytest.mark.soak

@@ -11,7 +11,7 @@ from zones.machinable_area import AreaForm
 from zones.model import Decomposition
 from zones.plan_view.regions import RegionLocator
 from zones.reach.access_view import View, access_rotation, turned, turned_samples
-from zones.zoning.cutting_planes import PLANE_MARGIN, snapped
+from zones.planes import PLANE_MARGIN, snapped
 from zones.zoning.zones import build_zones
 
 NOTHING = Decomposition((), (), ())
@@ -72,7 +72,7 @@ def heights(views, zone) -> np.ndarray:
 def test_no_plane_where_the_first_access_gets_the_whole_height() -> None:
     part, samples = slot(14.0)
     zones = build_zones(both_sides(part, samples, [ball(4, neck=30.0)]), NOTHING, 0.02, 0.002)
-    assert {z.access for z in zones.zones} == {"A1"} and zones.zoning.cutting_planes == () and zones.taken.all()
+    assert {z.access for z in zones.zones} == {"A1"} and zones.planes == () and zones.taken.all()
 
 
 def test_half_height_where_both_get_their_half() -> None:
@@ -80,7 +80,7 @@ def test_half_height_where_both_get_their_half() -> None:
     views = both_sides(part, samples, [ball(4, neck=13.0, shank=12.0)])
     zones = build_zones(views, NOTHING, 0.02, 0.002)
     assert zones.taken.all() and {z.form for z in zones.zones} == {AreaForm.STEEP}
-    plane = zones.zoning.cutting_planes[0]
+    plane = zones.planes[0]
     assert plane.reason == "between A1 and A2" and plane.height == pytest.approx(10.0, abs=0.1)
     upper, lower = zones.zones
     assert (upper.access, lower.access) == ("A1", "A2")
