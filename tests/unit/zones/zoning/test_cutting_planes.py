@@ -11,7 +11,7 @@ from zones.machinable_area import AreaForm
 from zones.model import Decomposition
 from zones.plan_view.regions import RegionLocator
 from zones.reach.access_view import View, access_rotation, turned, turned_samples
-from zones.planes import PLANE_MARGIN, snapped
+from zones.zoning.cutting_planes import PLANE_MARGIN, snapped
 from zones.zoning.zones import build_zones
 
 NOTHING = Decomposition((), (), ())
