@@ -173,4 +173,4 @@ def test_repeated_names_are_refused():
 def test_a_setup_that_is_no_object(text):
     with pytest.raises(CamError) as caught:
         parse_setup(text)
-    assert caught.value.message == "the setup is to be a JSON object"
+    assert caught.value.message == "the setup must be a JSON object"

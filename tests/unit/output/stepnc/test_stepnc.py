@@ -156,7 +156,7 @@ def test_aim_tools_list_their_operations_and_stock_is_a_block_in_class_two():
     tools = dict(re.findall(r"MACHINING_TOOL\('(\d+)','([^']*)'", text))
     assert tools == {"7": "bullnose endmill", "2": "endmill", "1": "ballnose endmill"}
     users = re.search(r"MACHINING_TOOL\('7','bullnose endmill',\(([^)]*)\)", text).group(1).split(",")
-    assert [data[int(u[1:])].split("'")[1] for u in users] == ["S01 roughing depth_layers", "S05 roughing layers"]
+    assert [data[int(u[1:])].split("'")[1] for u in users] == ["S01 roughing depth_layers", "S05 roughing depth_layers"]
     assert "NUMERIC_MEASURE(-12000.)" in text and "NUMERIC_MEASURE(600.)" in text
     assert "BLOCK_SHAPE_REPRESENTATION" in text and "'rawpiece'" in text
 

@@ -126,7 +126,7 @@ def test_only_what_is_wanted_is_walked(whole):
 def test_what_the_machine_cannot_take_is_left():
     stiff = replace(FREE, stands=lambda axes: np.zeros(len(axes), bool))
     runs, _ = found(turning=stiff)
-    assert not runs.runs and runs.refused == ("F2: the tool is hardly anywhere free with its end on it",)
+    assert not runs.runs and runs.refused == ("F2: the tool is almost nowhere free with its end on the face",)
 
 
 def test_slower_than_the_usual_passes_is_told_with_both_figures():

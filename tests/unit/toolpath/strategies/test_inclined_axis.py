@@ -190,7 +190,7 @@ def test_led_axes_leave_less_at_a_post_than_those_wanted_alone(past_a_post, monk
 
 def test_what_the_machine_cannot_take_is_left_with_the_reason():
     runs, _ = found(turning=replace(FREE, stands=lambda axes: np.zeros(len(axes), bool)), beyond=18.0)
-    assert not runs.runs and runs.refused == ("the tool is hardly anywhere free",)
+    assert not runs.runs and runs.refused == ("the tool is almost nowhere free",)
 
 
 def test_level_zones_and_tools_without_a_corner_are_not_asked_and_walls_only_by_name():
