@@ -168,6 +168,6 @@ def test_a_zone_knows_its_skins_as_it_measured_them():
     finish.residual.residual[:7] = 0.001
     skins = finish._surroundings().skins
     assert np.array_equal(skins.residual.residual, finish.residual.residual)
-    assert (skins.finished, skins.most) == (c.settings.scallop_height, c.stock_before.lattice.step)
+    assert (skins.finished, skins.thickest) == (c.settings.scallop_height, c.stock_before.lattice.step)
     skins.cut_leaning(zone.tips, np.tile(UPRIGHT, (len(zone.tips), 1)), zone.tool)
     assert not np.array_equal(skins.residual.residual, finish.residual.residual)
