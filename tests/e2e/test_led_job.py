@@ -81,7 +81,7 @@ def test_the_ball_leans_as_asked_where_it_cuts_the_hollow(job: tuple[Path, dict[
 
 def test_both_forms_of_stepnc_say_how_the_tool_leans(job: tuple[Path, dict[str, Any]]) -> None:
     aim, arm = ((job[0] / name).read_text() for name in ("job.stpnc", "job.arm.stpnc"))
-    assert "'tool axis'" in aim and "finishing led" in aim and "finishing led" in arm
+    assert "'tool axis'" in aim and "finishing inclined_axis" in aim and "finishing inclined_axis" in arm
 
 
 def cutting_axes(out: Path) -> tuple[F64, F64]:

@@ -228,7 +228,7 @@ def test_a_zone_that_stays_upright_although_asked_to_lean_is_a_caution_with_the_
     assert second.subjects == ("Z5", "T1") and "no pass lies on it" in second.message
     assert third.subjects == ("Z7", "T1")
     assert "along 31 of 61 mm of cut (no tilt near the requested one is free of collision)" in third.message
-    assert fourth.subjects == ("Z8", "T1") and "along 90 of 120 mm it cuts (too slow)" in fourth.message
+    assert fourth.subjects == ("Z8", "T1") and "along 90 of 120 mm of cut (too slow)" in fourth.message
     asked = ToolLean(0.0, 0.2, walls=1.0)
     assert [c.subjects[0] for c in upright(asked, zones, steps)] == ["Z2", "Z3", "Z5", "Z7", "Z8"]
     assert not upright(None, zones, steps)
