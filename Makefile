@@ -60,7 +60,7 @@ page: | $(BIN)/python
 
 # The linter of the page; it says so and goes on where the packages of the page are missing.
 lint-web:
-	@if [ -f web/node_modules/eslint/package.json ] && [ -f web/src/wire.ts ]; then $(PAGE_PATH) npm --prefix web run --silent lint; \
+	@if [ -f web/node_modules/eslint/package.json ] && [ -f web/src/wire.ts ]; then cd web && $(PAGE_PATH) npm run --silent lint; \
 	else echo "web/ is not linted: the packages of the page are not installed. Remedy: make web"; fi
 
 check: $(STAMP)

@@ -92,7 +92,7 @@ def cautions_section(report: Mapping[str, Any]) -> SheetSection:
                   none="No caution.")
     lists = (("Of the part and the plan", others), ("Notes of the proof", notes))
     more = [Lines(title, lines) for title, lines in lists if lines]
-    return SheetSection("mind", "To be minded", (table, *more))
+    return SheetSection("mind", "Cautions and notes", (table, *more))
 
 
 def findings_section(report: Mapping[str, Any]) -> SheetSection:
