@@ -14,7 +14,7 @@ PIP_OPTIONS = install --disable-pip-version-check --progress-bar off
 INSTALL = $(if $(UV),uv pip install --no-progress --python $(BIN)/python,$(BIN)/python -m pip $(PIP_OPTIONS))
 SHOW := $(PYTHON) .ci/progress.py
 
-.PHONY: setup hooks peers check types test test-cov test-slow test-runtime soak image clients audit kernels golden bench docs demo serve lock third-party clean
+.PHONY: setup hooks peers check types test test-cov test-slow limits test-runtime soak image clients audit kernels golden bench docs demo serve lock third-party clean
 
 # The page wants Node 20.19 or newer with npm; where there is none, that of a wheel is put into .venv.
 PAGE := service/page/index.html
@@ -81,6 +81,10 @@ test-cov: $(STAMP) page
 
 test-slow: $(STAMP)
 	$(BIN)/python -m pytest -q -m "slow and not soak" -n 2 --dist worksteal --durations 20 --ignore tests/contract/test_clients.py
+
+# The tests that watch the clock, with the limits of an idle machine; the everyday run allows 20 times as much.
+limits: $(STAMP)
+	ZONEMILL_LIMITS=1 $(BIN)/python -m pytest -q -m "not slow and not soak" $$(grep -rl "in_time(" tests --include='test_*.py')
 
 # The tests on the runtime lock, in an environment without cadquery; make test-runtime RUNTIME_TESTS=tests runs every
 # everyday test that draws no part itself. The development environment writes the parts beforehand.

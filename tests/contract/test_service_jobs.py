@@ -13,6 +13,7 @@ import pytest
 from schemas.setup import content_hash
 from service.from_wire import parse_setup
 from service.jobs.supervisor import JOB_MODULE
+from tests.time_limits import in_time
 
 STEP = runpy.run_path(str(Path(__file__).parent / "fakes" / "step_text.py"))["STEP"]
 
@@ -149,7 +150,7 @@ def test_same_content_is_computed_once(client, post, finish, setup_json):
     before = {p: p.stat().st_mtime_ns for p in results.rglob("*") if p.is_file()}
     started = time.monotonic()
     assert finish(client, post(client, setup=setup).json())["state"] == "proved"
-    assert time.monotonic() - started < 0.6
+    assert in_time(time.monotonic() - started, 0.6)
     assert {p: p.stat().st_mtime_ns for p in results.rglob("*") if p.is_file()} == before
 
 
@@ -165,7 +166,7 @@ def test_cancel_frees_the_worker_in_under_a_second(client, post, finish, setup_j
     cancelled = client.delete(job["links"]["self"])
     assert cancelled.status_code == 200 and cancelled.json()["state"] == "cancelled"
     finish(client, waiting, until=("queued",))
-    assert time.monotonic() - started < 1.0
+    assert in_time(time.monotonic() - started, 1.0)
     assert finish(client, waiting)["state"] == "proved"
     assert client.get(job["links"]["report"]).json()["code"] == "no_result"
     assert not [p for p in psutil.Process().children(recursive=True) if JOB_MODULE in " ".join(p.cmdline())]

@@ -15,6 +15,7 @@ import pytest
 
 from service.jobs.supervisor import JOB_MODULE
 from tests.contract.servers import free_port
+from tests.time_limits import in_time
 
 ROOT = Path(__file__).resolve().parents[2]
 FAKES = Path(__file__).parent / "fakes"
@@ -127,7 +128,7 @@ def test_a_stop_in_the_night_ends_streams_and_loses_nothing(serve, post, finish)
     process.send_signal(signal.SIGTERM)
     process.wait(timeout=15)
     thread.join(timeout=5)
-    assert time.monotonic() - started < 8 and not thread.is_alive() and not child.is_running()
+    assert in_time(time.monotonic() - started, 8) and not thread.is_alive() and not child.is_running()
     assert "event: progress" in "".join(seen) and "event: end" not in "".join(seen)
     _, client = serve(3)
     for each in (job, waiting):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.pocket_case import SETUP, TOOL, ZONES, block, program, scored, text
+from tests.time_limits import in_time
 from verify.material.machined_part import machined_stock
 from verify.material.tiles import run_tiles
 from verify.prove import prove
@@ -66,9 +67,9 @@ def test_a_cancelled_proof_ends_within_a_second(share):
 
     with pytest.raises(Stop):
         prove([("long", LONG)], PART, (TOOL,), SETUP, SCORED, ZONES, progress=progress)
-    assert time.monotonic() - asked[0] < 0.5
+    assert in_time(time.monotonic() - asked[0], 0.5)
     # a cancel can come at any time: it is seen when progress is told next
-    assert np.diff(silence).max() < 1.0
+    assert in_time(float(np.diff(silence).max()), 1.0)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.15, 0.5])
@@ -82,7 +83,7 @@ def test_a_cancelled_mesh_ends_within_a_second(share):
 
     with pytest.raises(Stop):
         machined_stock([("long", LONG)], PART, (TOOL,), SETUP, 0.15, progress=progress)
-    assert time.monotonic() - asked[0] < 0.5
+    assert in_time(time.monotonic() - asked[0], 0.5)
 
 
 def test_tiles_tell_while_one_runs_and_drop_what_waits():
@@ -99,7 +100,7 @@ def test_tiles_tell_while_one_runs_and_drop_what_waits():
     before = time.monotonic()
     with pytest.raises(Stop):
         run_tiles([job(k) for k in range(50)], 2, progress)
-    assert time.monotonic() - before < 0.55 and told == [0.0] * 3
+    assert in_time(time.monotonic() - before, 0.55) and told == [0.0] * 3
     time.sleep(0.8)
     assert len(started) <= 4
 

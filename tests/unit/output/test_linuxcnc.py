@@ -12,6 +12,7 @@ from output.gcode.dialects.linuxcnc import LinuxCnc
 from output.gcode.program_writer import path_tolerance
 from tests.golden_file import assert_golden
 from tests.synthetic_plan import BALL, CLEAR, FLAT, line, long_plan, plan, step, tiny, write_linuxcnc
+from tests.time_limits import in_time
 from toolpath.workingsteps import Trajectory, TrajectoryKind
 
 WORD = re.compile(r"([A-Z])(-?\d+\.?\d*)")
@@ -205,5 +206,5 @@ def test_half_a_million_points_in_seconds():
     big = long_plan(500_000)
     start = time.perf_counter()
     text = write_linuxcnc(big)
-    assert time.perf_counter() - start < 20.0  # 1.6 s when alone on one core
+    assert in_time(time.perf_counter() - start, 20.0)  # 1.6 s when alone on one core
     assert text.count("\n") > 490_000

@@ -10,6 +10,7 @@ from geometry.errors import CamError
 from geometry.sampling import sample_surface
 from tests.pocket_case import SETUP, TOOL, ZONES, block, program
 from tests.pocket_case import text as joined
+from tests.time_limits import in_time
 from verify.gcode.reader import FEED, RAPID, read_program
 from verify.model import FindingKind, ScoredSamples
 from verify.program.move_log import Log
@@ -257,4 +258,4 @@ def test_speed_of_plain_lines():
     body = "G1 Z-1 F200\n" + "".join(f"X{k % 60}.125 Y{k % 37}.5 Z-1.0625\n" for k in range(50_000))
     begin = time.perf_counter()
     assert len(read(body)) > 50_000
-    assert time.perf_counter() - begin < 2.0
+    assert in_time(time.perf_counter() - begin, 2.0)
