@@ -78,11 +78,21 @@ class PlannedJob:
 
 
 @pytest.fixture(scope="session")
-def demo_job(demo_files: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> PlannedJob:
-    """The demo part planned and proved once per run (half a minute or so)."""
+def demo_job(tmp_path_factory: pytest.TempPathFactory) -> PlannedJob:
+    """The demo part planned and proved once per run, by the first of the test processes that wants it."""
+    import fcntl
+
+    from examples.demo import write_demo
     from service.from_wire import read_setup
     from service.pipeline import plan
 
-    part, setup = demo_files
-    out = tmp_path_factory.mktemp("demo-out")
-    return PlannedJob(plan(part, read_setup(setup), out, lambda stage, fraction: None), part, setup, out)
+    base = tmp_path_factory.getbasetemp()
+    shared = (base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base) / "demo-job"
+    shared.mkdir(exist_ok=True)
+    report, out = shared / "returned.json", shared / "out"
+    with (shared / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        part, setup = write_demo(shared)
+        if not report.exists():
+            report.write_text(json.dumps(plan(part, read_setup(setup), out, lambda stage, fraction: None)))
+    return PlannedJob(json.loads(report.read_text()), part, setup, out)

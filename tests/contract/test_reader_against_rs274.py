@@ -100,6 +100,7 @@ def test_samples_are_read_as_linuxcnc_reads_them(tmp_path):
     assert len(moving) >= 15, moving
 
 
+@pytest.mark.slow
 def test_random_programs_run_as_linuxcnc_runs_them(tmp_path):
     """Arcs in three planes, helices, cycles, polar words, shifts, expressions, flow: every move and feed, in order."""
     same = 0

@@ -206,7 +206,7 @@ def _play(service, part, alone, fault, repeat, real, seconds):
           f"webhooks sent again {again}", flush=True)
 
 
-EVERY_DAY = ("worker", "scheduler", "api", "clock", "network")  # the others are in the slow set
+EVERY_DAY = ("worker", "api")  # the others are in the slow set
 
 
 @pytest.mark.parametrize("fault", [pytest.param(f, marks=() if f in EVERY_DAY else pytest.mark.slow)

@@ -56,6 +56,7 @@ def empty(rows):
     return [s - e for s, e in zip(starts[SLOTS:], ends, strict=False)]
 
 
+@pytest.mark.slow
 def test_healthy_jobs_are_proved_beside_poison_and_the_slots_come_back(service, play, post):
     deeds = [d for do in POISON for d in (do, "")]
     rows = play(deeds)

@@ -57,6 +57,7 @@ def test_from_a_standing_bar(part: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("direction", [pytest.param([0, 1, 0], marks=pytest.mark.slow), [0, 0.6, 0.8]])
+@pytest.mark.slow
 def test_from_a_bar_that_lies_or_leans_along_the_access(part: Path, tmp_path: Path, direction: list[float]) -> None:
     stock = {"kind": "cylinder", "cylinder_mm": BAR, "uncertainty_mm": 0.1}
     report = planned(part, tmp_path, stock=stock, access=[{"direction": direction}])
@@ -64,6 +65,7 @@ def test_from_a_bar_that_lies_or_leans_along_the_access(part: Path, tmp_path: Pa
     assert report["coverage"] > 0.3 and report["reach_coverage"] > 0.95
 
 
+@pytest.mark.slow
 def test_from_a_bar_on_a_machine_that_leans_its_table(part: Path, tmp_path: Path) -> None:
     """From above and from the side of the step, one after the other from the same bar, proved on the grid."""
     stock = {"kind": "cylinder", "cylinder_mm": {**BAR, "bottom": -3, "height": 8}, "uncertainty_mm": 0.1}
@@ -86,6 +88,7 @@ def on_command_line(command: str, part: Path, folder: Path, setup: dict[str, Any
     return CliRunner().invoke(app, [command, str(part), "--setup", str(path), *more])
 
 
+@pytest.mark.slow
 def test_from_a_casting_in_a_step_file_on_the_command_line(part: Path, tmp_path: Path) -> None:
     """Planned and proved, the blank named from the folder of the setup; not proved of a casting that is 9 mm higher."""
     casting(tmp_path / "casting.step")
@@ -106,12 +109,14 @@ def test_from_a_casting_in_a_step_file_on_the_command_line(part: Path, tmp_path:
 
 
 @pytest.mark.parametrize("direction", [[0, 1, 0], [0, 0.6, 0.8]])
+@pytest.mark.slow
 def test_from_a_casting_seen_from_aside(part: Path, tmp_path: Path, direction: list[float]) -> None:
     report = planned(part, tmp_path, stock={"kind": "step", "uncertainty_mm": 0.2}, access=[{"direction": direction}],
                      blank=casting(tmp_path / "casting.step"))
     assert report["state"] == "proved" and report["findings"] == [] and report["reach_coverage"] > 0.95
 
 
+@pytest.mark.slow
 def test_from_a_casting_on_a_machine_that_leans_its_table(part: Path, tmp_path: Path) -> None:
     report = planned(part, tmp_path, stock={"kind": "step", "uncertainty_mm": 0.2}, machine=LEANING,
                      access=[{}, {"id": "A2", "direction": [0, -0.8, 0.6]}], blank=casting(tmp_path / "casting.step"))

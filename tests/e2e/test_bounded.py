@@ -8,6 +8,8 @@ from schemas.setup import Setup
 from service import pipeline
 from tests.step_files import write_step
 
+pytestmark = pytest.mark.slow
+
 cq = pytest.importorskip("cadquery")
 
 FLAT = {"id": "T1", "kind": "flat", "diameter_mm": 4, "flute_length_mm": 8, "stickout_mm": 20}

@@ -72,6 +72,7 @@ def test_named_parts(recipe: str, seed: int, tmp_path: Path) -> None:
     compare(recipe, seed, tmp_path)
 
 
+@pytest.mark.slow
 def test_two_mixed_walls(tmp_path: Path) -> None:
     compare_mixed(7, tmp_path)
 

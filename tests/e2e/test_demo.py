@@ -153,6 +153,7 @@ def lowered(program, report):
     return "\n".join(lines), at + 1
 
 
+@pytest.mark.slow
 def test_one_lowered_move_is_found_on_its_line(demo_job, report, program, tmp_path):
     text, line = lowered(program, report)
     file = tmp_path / "lowered.ngc"

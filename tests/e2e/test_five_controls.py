@@ -118,6 +118,7 @@ def test_nothing_is_delivered_where_one_of_them_differs(part, tmp_path, monkeypa
 
 
 @pytest.mark.parametrize("order", [["fanuc", "linuxcnc"], ["fanuc", "heidenhain", "haas"], ["fanuc"]], ids=str)
+@pytest.mark.slow
 def test_the_one_simulated_says_how_far_a_path_is_left(order, part, tmp_path):
     """In whatever order the machine names them; what it says is in the error bound."""
     report = pipeline.plan(part, parse_setup(json.dumps({**SETUP, "machine": {"dialects": order}})), tmp_path, quiet)
@@ -127,6 +128,7 @@ def test_the_one_simulated_says_how_far_a_path_is_left(order, part, tmp_path):
     assert (report["proof"]["error_bound_mm"] > 0.0015) == (len(order) > 1)
 
 
+@pytest.mark.slow
 def test_a_program_too_large_for_its_control_is_parted_and_proved(part, tmp_path):
     """A step of 14 kB and two small ones for 16 kB: three programs, run one after the other on one blank."""
     machine = {"dialects": ["linuxcnc", "heidenhain"], "max_program_kb": 16}

@@ -19,6 +19,8 @@ from service.stages.programs import turning_of
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
 
+pytestmark = pytest.mark.slow
+
 cq = pytest.importorskip("cadquery")
 
 TOOL = {"id": "T1", "kind": "bull", "corner_radius_mm": 1, "flutes": 3, "diameter_mm": 6, "flute_length_mm": 14,

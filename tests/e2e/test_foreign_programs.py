@@ -21,6 +21,7 @@ needs_samples = pytest.mark.skipif(ROOT is None, reason="LinuxCNC's samples are 
 @pytest.mark.parametrize(("name", "step", "plunges"), [("hole-circle", 0.3, {10}),
                                                        pytest.param("spiral", 0.3, {6}, marks=pytest.mark.slow),
                                                        ("flowsnake", 0.02, {34})])
+@pytest.mark.slow
 def test_samples_are_found_as_brute_force_finds_them(name, step, plunges):
     case = replace(BY_NAME[name], step=step)
     r = run(case, ROOT, samples=20_000)

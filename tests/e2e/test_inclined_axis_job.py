@@ -15,6 +15,8 @@ from service.from_wire import parse_setup
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
 
+pytestmark = pytest.mark.slow
+
 cq = pytest.importorskip("cadquery")
 
 R, DEEP = 2.0, 60.0

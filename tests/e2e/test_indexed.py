@@ -16,6 +16,8 @@ from service.stages.preparation import prepare
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
 
+pytestmark = pytest.mark.slow
+
 cq = pytest.importorskip("cadquery")
 
 BALL = {"id": "T1", "kind": "ball", "flutes": 2, "diameter_mm": 3, "flute_length_mm": 8, "neck_diameter_mm": 2.8,

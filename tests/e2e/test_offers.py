@@ -14,6 +14,8 @@ from service.report.report import dry_report
 from service.stages.preparation import prepare
 from tests.step_files import write_step
 
+pytestmark = pytest.mark.slow
+
 cq = pytest.importorskip("cadquery")
 
 HOLDER = [{"diameter_mm": 16, "diameter_top_mm": 22, "length_mm": 20}, {"diameter_mm": 22, "length_mm": 20}]

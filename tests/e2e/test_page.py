@@ -118,6 +118,7 @@ def test_a_key_is_asked_for_and_kept_in_the_tab_alone(drive, tmp_path):
 
 
 @pytest.mark.parametrize("size", [(1280, 800), (390, 844)], ids=["desk", "phone"])
+@pytest.mark.slow
 def test_a_finding_the_slider_and_a_section(drive, unproved, size):
     with shown(unproved) as url:
         said = drive("look", url, *size)

@@ -11,7 +11,7 @@ from service.api.server import background, settings_with
 from tests.e2e.test_page import driven, shown
 from tests.e2e.test_withheld import call, part  # noqa: F401
 
-pytestmark = [pytest.mark.timeout(600), pytest.mark.network]
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600), pytest.mark.network]
 
 
 def test_a_job_is_seen_on_bad_days(part, tmp_path):  # noqa: F811

@@ -17,6 +17,8 @@ from toolpath.workingsteps import TrajectoryKind
 from verify.gcode import block_motion
 from verify.gcode.reader import read_program
 
+pytestmark = pytest.mark.slow
+
 cq = pytest.importorskip("cadquery")
 
 CHORDAL = 0.005

@@ -66,6 +66,7 @@ def test_verify_keeps_the_least_coverage_asked_for(part, tmp_path):
     assert got.exit_code == 3 and found["limit"] == 0.9 and found["depth"] == free["coverage"] < 0.9
 
 
+@pytest.mark.slow
 def test_roughing_alone_is_proved_and_the_rest_is_named(part, tmp_path):
     got = run("plan", part, tmp_path, {**SETUP, "operations": {"finishing": False}}, "--out", str(tmp_path / "out"))
     report = json.loads(got.stdout)
@@ -76,6 +77,7 @@ def test_roughing_alone_is_proved_and_the_rest_is_named(part, tmp_path):
     assert left == pytest.approx(missing * report["machinable_area_mm2"], rel=0.02) and left > 100
 
 
+@pytest.mark.slow
 def test_a_zone_that_is_gone_over_again_is_proved_and_written_as_two_workingsteps(tmp_path):
     # shank and holder come down beside a low wall while stock of the high one's zones still stands there
     def box(x, y, z, at):

@@ -14,6 +14,8 @@ from service.stages.preparation import prepare
 from service.stages.wall_support import FREE_RATIO, PLANNED_RATIO, band_planes
 from tests.decomposition_shapes import box
 
+pytestmark = pytest.mark.slow
+
 cq = pytest.importorskip("cadquery")
 
 FLAT, BALL = tool(1, "flat", 4.0, 12.0), tool(2, "ball", 2.0, 12.0)

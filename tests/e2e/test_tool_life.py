@@ -10,6 +10,8 @@ from examples.demo import write_small
 from service import pipeline
 from service.from_wire import parse_setup
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("cadquery")
 
 

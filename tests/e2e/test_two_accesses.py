@@ -12,6 +12,8 @@ from schemas.setup import Setup
 from service import pipeline
 from service.from_wire import parse_setup
 
+pytestmark = pytest.mark.slow
+
 cq = pytest.importorskip("cadquery")
 
 BALL = {"kind": "ball", "flutes": 2, "shank_diameter_mm": 8, "stickout_mm": 26,

@@ -37,7 +37,7 @@ def test_they_are_package_data():
     assert sorted(p.stem for p in demo.PARTS.glob("*.step")) == sorted(DRAWN)
 
 
-@pytest.mark.parametrize("name", DRAWN)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow if n == "demo" else ()) for n in DRAWN])
 def test_the_generator_draws_the_same_solid(name, tmp_path):
     """Geometry is compared: the text depends on the version of the kernel that wrote it."""
     pytest.importorskip("cadquery")

@@ -146,6 +146,7 @@ LONG = ("engaged limit", "short neck")
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in JOBS])
+@pytest.mark.slow
 def test_a_plan_cut_off_after_every_act_ends_as_one_that_was_not(name):
     job = JOBS[name]()
     states, kept, plan, end = job.whole()

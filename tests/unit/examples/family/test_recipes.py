@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -19,52 +20,53 @@ from examples.family.walls import LEFT, RIGHT, WallSpec
 
 cq = pytest.importorskip("cadquery")
 
-CASES = [("demo", 0), ("narrow", 1), ("leaning_pair", 1), ("three_walls", 1), ("impeller", 1), ("random", 12)]
+EVERY_DAY = [("narrow", 1), ("leaning_pair", 1)]
+CASES = [pytest.param(c, id=f"{c[0]}-{c[1]}", marks=() if c in EVERY_DAY else pytest.mark.slow)
+         for c in (("demo", 0), *EVERY_DAY, ("three_walls", 1), ("impeller", 1), ("random", 12))]
 
 
-@pytest.fixture(scope="module")
-def parts() -> dict[tuple[str, int], FamilyPart]:
-    return {(name, seed): make_part(seed, name) for name, seed in CASES}
+@cache
+def part_of(case: tuple[str, int]) -> FamilyPart:
+    name, seed = case
+    return make_part(seed, name)
 
 
-@pytest.fixture(scope="module")
-def bridges(parts) -> dict[tuple[str, int], list]:
+@cache
+def bridges_of(case: tuple[str, int]) -> list:
     """Of every connection: the walls it overlaps, what is left of it outside walls and base, and the walls around."""
-    out = {}
-    for case, part in parts.items():
-        walls, base = [w.solid() for w in part.layout.walls], part.layout.base.solid()
-        out[case] = []
-        for spec in part.layout.connections:
-            solid = spec.solid()
-            near = [k for k, w in enumerate(walls) if w.distance(solid) < 1e-6]
-            overlaps = {k for k in near if walls[k].intersect(solid).Volume() > 1e-3}
-            out[case].append((overlaps, set(near), solid.cut(*(walls[k] for k in near), base), walls))
+    layout, out = part_of(case).layout, []
+    walls, base = [w.solid() for w in layout.walls], layout.base.solid()
+    for spec in layout.connections:
+        solid = spec.solid()
+        near = [k for k, w in enumerate(walls) if w.distance(solid) < 1e-6]
+        overlaps = {k for k in near if walls[k].intersect(solid).Volume() > 1e-3}
+        out.append((overlaps, set(near), solid.cut(*(walls[k] for k in near), base), walls))
     return out
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda c: f"{c[0]}-{c[1]}")
-def test_every_part_is_one_closed_solid_on_its_seat(parts, case):
-    solid = parts[case].shape
+@pytest.mark.parametrize("case", CASES)
+def test_every_part_is_one_closed_solid_on_its_seat(case):
+    solid = part_of(case).shape
     assert solid.isValid() and solid.Volume() > 0 and len(solid.Solids()) == 1
     assert all(shell.wrapped.Closed() for shell in solid.Shells())
     assert solid.BoundingBox().zmin == pytest.approx(0.0, abs=1e-6)
-    tops = max(w["z"][1] for w in parts[case].truth["walls"])
+    tops = max(w["z"][1] for w in part_of(case).truth["walls"])
     assert solid.BoundingBox().zmax >= tops - 1e-6
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda c: f"{c[0]}-{c[1]}")
-def test_every_connection_bridges_exactly_its_two_walls(parts, bridges, case):
-    for spec, (overlaps, near, visible, walls) in zip(parts[case].layout.connections, bridges[case], strict=True):
+@pytest.mark.parametrize("case", CASES)
+def test_every_connection_bridges_exactly_its_two_walls(case):
+    for spec, (overlaps, near, visible, walls) in zip(part_of(case).layout.connections, bridges_of(case), strict=True):
         assert overlaps == near == set(spec.indices)
         assert len(visible.Solids()) == 1, "what is left outside the walls is one piece"
         assert all(visible.distance(walls[k]) < 1e-5 for k in near)
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda c: f"{c[0]}-{c[1]}")
-def test_z_range_and_void_below_each_connection(parts, bridges, case):
-    part = parts[case]
+@pytest.mark.parametrize("case", CASES)
+def test_z_range_and_void_below_each_connection(case):
+    part = part_of(case)
     base = part.layout.base.solid()
-    for truth, (_, _, visible, _) in zip(part.truth["connections"], bridges[case], strict=True):
+    for truth, (_, _, visible, _) in zip(part.truth["connections"], bridges_of(case), strict=True):
         box = visible.BoundingBox(1e-4)
         assert (box.zmin, box.zmax) == pytest.approx(truth["z"], abs=0.3)
         assert (visible.distance(base) < 1e-6) == truth["floor_contact"]
@@ -75,9 +77,9 @@ def test_z_range_and_void_below_each_connection(parts, bridges, case):
         assert part.shape.isInside(cq.Vector(x, y, floor - 0.1))
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda c: f"{c[0]}-{c[1]}")
-def test_gap_is_the_distance_between_the_wall_solids(parts, case):
-    part = parts[case]
+@pytest.mark.parametrize("case", CASES)
+def test_gap_is_the_distance_between_the_wall_solids(case):
+    part = part_of(case)
     for channel in part.truth["channels"]:
         if not channel["primary"]:
             continue
@@ -113,24 +115,27 @@ def test_side_normals_point_out_of_the_material():
             assert solid.isInside(cq.Vector(*(q - 1e-3 * m)), 1e-7)
 
 
-def test_the_leaning_pair_is_undercut_on_one_side_only(parts):
-    for wall in parts["leaning_pair", 1].layout.walls:
+def test_the_leaning_pair_is_undercut_on_one_side_only():
+    for wall in part_of(("leaning_pair", 1)).layout.walls:
         up = {side: wall.side_normal(side, np.array([0.5]), np.array([0.5]))[0, 2] for side in (LEFT, RIGHT)}
         assert min(up.values()) < -0.02 < 0.02 < max(up.values())
 
 
-def test_narrow_is_narrow_and_demo_is_small(parts):
-    assert parts["narrow", 1].truth["channels"][0]["gap_min"] == pytest.approx(0.8, rel=0.02)
-    demo = parts["demo", 0]
+@pytest.mark.slow
+def test_narrow_is_narrow_and_demo_is_small():
+    assert part_of(("narrow", 1)).truth["channels"][0]["gap_min"] == pytest.approx(0.8, rel=0.02)
+    demo = part_of(("demo", 0))
     assert demo.shape.Area() < 9000 and len(demo.truth["walls"]) == 3 and len(demo.truth["connections"]) == 3
 
 
+@pytest.mark.slow
 def test_fillets_keep_one_solid():
     part = make_part(0, "wavy", fillet=0.8)
     assert part.truth["fillet"] == 0.8 and part.shape.isValid()
     assert "TORUS" in {f.geomType() for f in part.shape.Faces()} or len(part.shape.Faces()) > 30
 
 
+@pytest.mark.slow
 def test_same_seed_same_bytes(tmp_path):
     first = [p.read_bytes() for p in make_part(3, "narrow").write(tmp_path / "a")]
     again = [p.read_bytes() for p in make_part(3, "narrow").write(tmp_path / "b")]
@@ -141,25 +146,27 @@ def test_same_seed_same_bytes(tmp_path):
     assert other != first[0]
 
 
-def test_the_step_file_reads_back_with_the_same_volume(tmp_path, parts):
-    step, truth, setup = parts["demo", 0].write(tmp_path)
+@pytest.mark.slow
+def test_the_step_file_reads_back_with_the_same_volume(tmp_path):
+    step, truth, setup = part_of(("demo", 0)).write(tmp_path)
     read = cq.importers.importStep(str(step)).val()
-    assert read.Volume() == pytest.approx(parts["demo", 0].shape.Volume(), rel=1e-6)
+    assert read.Volume() == pytest.approx(part_of(("demo", 0)).shape.Volume(), rel=1e-6)
     assert json.loads(truth.read_text())["recipe"] == "demo"
     assert json.loads(setup.read_text())["tools"]
 
 
-def test_setups_are_valid_and_their_lengths_consistent(tmp_path, parts):
+@pytest.mark.parametrize("case", CASES)
+def test_setups_are_valid_and_their_lengths_consistent(tmp_path, case):
     from schemas.setup import Setup
 
-    setups = [p.setup for p in parts.values()] + [json.loads(write_demo(tmp_path)[1].read_text())]
-    for setup in setups:
+    for setup in (part_of(case).setup, json.loads(write_demo(tmp_path)[1].read_text())):
         Setup.model_validate(setup)
         for tool in setup["tools"]:
             assert 0 < tool["flute_length_mm"] < tool["neck_length_mm"] < tool["stickout_mm"]
             assert tool["neck_diameter_mm"] < tool["diameter_mm"] <= tool["shank_diameter_mm"]
 
 
+@pytest.mark.slow
 def test_overrides_and_refusals():
     layout = draw_layout(5, walls=3, connections=0, gap=(2.0, 4.0))
     assert len(layout.walls) == 3 and layout.connections == []
@@ -170,6 +177,7 @@ def test_overrides_and_refusals():
         check(PartLayout("bad", Plate((-30, -10, 30, 10), 4.0), [block]))
 
 
+@pytest.mark.slow
 def test_every_recipe_is_drawn_for_several_seeds():
     for name in RECIPES:
         for seed in range(2):
@@ -237,6 +245,7 @@ def test_closed_profiles_run_round_once(kind, ups):
         assert sum(turn > 30 for turn in inside) == ups
 
 
+@pytest.mark.slow
 def test_mixed_parts_are_one_solid_and_their_truth_is_on_it(mixed):
     for part in mixed:
         solid, truth = part.shape, part.truth
@@ -268,6 +277,7 @@ def ring(radius: float) -> FreeWall:
     return FreeWall("closed", profile.control, 4.0, 10.0, (2.0, 2.0), profile=profile)
 
 
+@pytest.mark.slow
 def test_gap_of_nested_rings_and_of_a_ring_with_itself():
     outer, inner = ring(20.0), ring(12.0)
     far = np.hypot(*outer.side_curve(LEFT).T).min() - np.hypot(*inner.side_curve(RIGHT).T).max()
@@ -276,6 +286,7 @@ def test_gap_of_nested_rings_and_of_a_ring_with_itself():
     assert found[1, 1] == pytest.approx(2 * np.hypot(*inner.side_curve(LEFT).T).min(), abs=1e-2)
 
 
+@pytest.mark.slow
 def test_a_wall_that_rays_only_graze_stops_them():
     def straight(a: tuple[float, float], b: tuple[float, float]) -> FreeWall:
         line = DrawnProfile(None, np.linspace(a, b, 10))
@@ -367,6 +378,7 @@ def test_joins_find_the_other_stretch_of_the_same_wall():
     assert spec.indices == (0, 0)
 
 
+@pytest.mark.slow
 def test_reach_of_a_part_is_a_share_with_its_error(tmp_path):
     part = make_part(7, "mixed")
     _, truth, _ = part.write(tmp_path, reach=True)

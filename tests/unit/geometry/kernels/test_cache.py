@@ -70,6 +70,7 @@ def _hits(lines):
 # ----------------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_an_edit_compiles_what_depends_on_it_and_nothing_else(tree, tmp_path):
     home = tmp_path / "home"
     first = _run(tree, home)
@@ -83,6 +84,7 @@ def test_an_edit_compiles_what_depends_on_it_and_nothing_else(tree, tmp_path):
     assert last[0] == "4.0 8.0" and _hits(last) == ["1", "0"]  # what it was before is still there
 
 
+@pytest.mark.slow
 def test_without_our_locator_numba_answers_with_the_machine_code_of_before(tree, tmp_path):
     (tree / "verify" / "kernels" / "__init__.py").write_text("")
     given = tmp_path / "given"
@@ -91,6 +93,7 @@ def test_without_our_locator_numba_answers_with_the_machine_code_of_before(tree,
     assert _run(tree, tmp_path, given)[0] == "4.0 2.0"
 
 
+@pytest.mark.slow
 def test_another_checkout_takes_the_same_machine_code(tree, tmp_path):
     home, given = tmp_path / "home", tmp_path / "given"
     first = _run(tree, home)
@@ -101,6 +104,7 @@ def test_another_checkout_takes_the_same_machine_code(tree, tmp_path):
     assert _hits(asked) == ["0", "0"] and [line.split()[1] for line in asked[1:]] == [str(given)] * 2
 
 
+@pytest.mark.slow
 def test_without_a_home_the_folder_is_in_the_tree(tree, tmp_path):
     (tmp_path / "home").write_text("a file")
     lines = _run(tree, tmp_path / "home")

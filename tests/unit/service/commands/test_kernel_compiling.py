@@ -57,6 +57,7 @@ def outer(x):
 
 
 @pytest.mark.timeout(1800)
+@pytest.mark.slow
 def test_the_list_holds_all_that_the_small_part_calls():
     run = subprocess.run([sys.executable, "-c", USED], cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)},
                          capture_output=True, text=True, timeout=1500)

@@ -137,6 +137,7 @@ def test_care_and_bars_are_round_the_place_and_of_the_tool():
     assert told.care(other, np.zeros((1, 3))) == 1.0 and not told.bars(other, line.points).any()
 
 
+@pytest.mark.slow
 def test_accesses_before_the_first_that_is_told_something_are_planned_once(tmp_path, monkeypatch):
     """Two sides of a small part; of a proof that has something to say of the second only that is planned again."""
     part, setup_file = write_small(tmp_path)

@@ -34,9 +34,14 @@ def with_normals(mesh, keep, density):
     return samples.subset(keep(samples) & (samples.normals[:, 2] > 0.3))
 
 
+EVERY_DAY = ("dome", "walls")  # the other surfaces are in the slow set
+
+
 @pytest.mark.parametrize("body", [ball(3.0), tool(3.0, 0.6)], ids=kind)
-@pytest.mark.parametrize(("name", "pattern"), [(n, p) for n in SURFACES for p in (Pattern.ZIGZAG, Pattern.ONE_WAY)]
-                         + [(n, Pattern.SPIRAL) for n in ("dome", "valley")])
+@pytest.mark.parametrize(("name", "pattern"),
+                         [pytest.param(n, p, marks=() if n in EVERY_DAY else pytest.mark.slow)
+                          for n, p in [*((n, p) for n in SURFACES for p in (Pattern.ZIGZAG, Pattern.ONE_WAY)),
+                                       ("dome", Pattern.SPIRAL), ("valley", Pattern.SPIRAL)]])
 def test_passes_run_on_the_tip_limit_and_keep_the_scallop(name, body, pattern):
     tol, h = 0.004, 0.03
     field = field_of(SURFACES[name](), body)

@@ -62,6 +62,7 @@ def bytes_of(c: Case) -> list[bytes]:
     return [p.tobytes() for _, p in c.moves(*TrajectoryKind)]
 
 
+@pytest.mark.slow
 def test_a_later_round_walks_only_what_no_earlier_one_has():
     """Rounds ask for the first six tenths of a line, for its first four, and for all of it."""
     c = case("walls")
@@ -161,6 +162,7 @@ def test_steps_are_numbered_and_named_after_zone_strategy_tool_and_faces(name):
             assert (s.top, s.bottom) == (z.top, z.bottom)
 
 
+@pytest.mark.slow
 def test_a_name_holds_a_dozen_faces_and_the_step_all_of_them():
     xs, heights = np.arange(0.0, 26.0), np.where(np.arange(25) % 2, 4.0, 2.0)
     c = plan_part(terraces(xs, [0, 4], [heights]), [ball(0.9)], roughing=False, density=6.0, scallop=0.05)
@@ -256,6 +258,7 @@ def test_finishing_switched_off_leaves_the_layers_alone():
     assert replanned(full, roughing=False, finishing=False).plan.steps == ()
 
 
+@pytest.mark.slow
 def test_layers_alone_take_walls_to_size_as_they_go_down():
     """What a finish would take off goes in every layer, so that a wall is never cut free before it is to size."""
     plans = [replanned(case("walls"), finishing=finishing).plan for finishing in (True, False)]
@@ -299,6 +302,7 @@ def test_zones_no_sample_of_which_is_judged_get_no_passes(pattern):
 # -- what is left -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_what_no_pass_gets_to_is_told_and_nothing_else():
     c = case("dome")
     buried = np.arange(0, 40)
@@ -385,6 +389,7 @@ def test_stock_above_the_part_is_taken_in_layers_too():
     assert deepest_layer(high, 0.4) <= 1.0 + 1e-6
 
 
+@pytest.mark.slow
 def test_a_short_neck_beside_a_wide_block_never_meets_what_stands_there():
     body = ball(3.0, neck=4.5, shank=8.0)
     c = plan_part(corner(), [body], near_net=False, spare=6.0, density=8.0, scallop=0.05)
@@ -429,6 +434,7 @@ def test_semi_finishing_is_a_workingstep_after_the_layers_of_its_tool():
     assert all(s.operation != "semi_finishing" for s in replanned(c).plan.steps)
 
 
+@pytest.mark.slow
 def test_walls_that_layers_take_to_size_are_fed_as_in_a_finish():
     """Once a flute length layers follow walls with nothing left; what bends the tool there stays on the part."""
     c = case("walls")

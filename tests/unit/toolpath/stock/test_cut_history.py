@@ -69,6 +69,7 @@ def test_a_copy_is_added_to_on_its_own_until_it_is_taken_over():
     assert not w.fresh(line(0, 1, 2)).any()
 
 
+@pytest.mark.slow
 def test_nothing_is_measured_as_walked_that_no_pass_of_the_tool_went_over(monkeypatch):
     """Short tools in tall blocks, whose lines are cut and topped: what the plan measured, from its own cuts again."""
     import toolpath.planning.job_plan as planner

@@ -159,6 +159,7 @@ def test_surroundings_become_those_of_a_copy():
     assert not around.met(one.tips, one.axes, TOOL, 0.18).any()
 
 
+@pytest.mark.slow
 def test_a_zone_knows_its_skins_as_it_measured_them():
     c = plan_part(low_walls(), [ball(2.5), ball(1.5, "T2")])
     zone = next(z for z in c.zones if z.form is AreaForm.STEEP)

@@ -64,6 +64,7 @@ def test_a_hollow_is_cut_to_the_scallop_and_no_deeper(whole):
     assert left.max() <= SCALLOP and left.min() > -0.002
 
 
+@pytest.mark.slow
 def test_an_allowance_is_left_on_all_of_it():
     runs, _ = found(allowance=0.2)
     left = measured(SURFACE, BULL, cuts(runs)) - 0.2
@@ -101,6 +102,7 @@ def test_each_pass_comes_down_along_its_axis_the_last_skin_of_it_at_the_plunge_f
         assert np.linalg.norm(ways[-1].points[0] - ways[-1].points[-1]) >= SKIN * BULL.diameter or len(ways) == 1
 
 
+@pytest.mark.slow
 def test_a_pass_ends_at_what_stands_in_its_way():
     """A post on the hollow: no pose comes into it, and away from it the surface is cut all the same."""
     mesh = joined(HOLLOW, box_mesh([4, 4, -1], [9, 9, 30]))
@@ -117,6 +119,7 @@ def test_a_pass_ends_at_what_stands_in_its_way():
     assert left[near].min() > 0.5
 
 
+@pytest.mark.slow
 def test_only_what_is_wanted_is_walked(whole):
     runs, _ = found(part=lambda p: p[:, 0] > 8.0)
     tips = np.vstack([t for t, _ in cuts(runs)])

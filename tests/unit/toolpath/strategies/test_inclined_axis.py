@@ -159,6 +159,7 @@ def test_an_allowance_is_left_on_all_of_it():
     assert left.max() <= SCALLOP and left.min() > -0.002
 
 
+@pytest.mark.slow
 def test_a_bull_nose_leaves_no_more_in_the_middle_and_cuts_no_deeper():
     body = tool(8.0, 1.0)
     left = measured(SURFACE, body, cuts(found(LEADING, body=body, beyond=8.0)[0])).reshape(120, 120)
@@ -166,6 +167,7 @@ def test_a_bull_nose_leaves_no_more_in_the_middle_and_cuts_no_deeper():
     assert asked.max() <= SCALLOP and left.min() > -0.01
 
 
+@pytest.mark.slow
 def test_it_goes_round_a_post_and_never_into_it(past_a_post):
     runs, around = past_a_post
     for tips, axes in cuts(runs):
@@ -177,6 +179,7 @@ def test_it_goes_round_a_post_and_never_into_it(past_a_post):
     assert lean.max() < 15.0 + np.degrees(inclined_axis.LIMITS.cone) + 1.0
 
 
+@pytest.mark.slow
 def test_led_axes_leave_less_at_a_post_than_those_wanted_alone(past_a_post, monkeypatch):
     def uncut(runs):
         g = (np.arange(120) + 0.5) / 120 * 40.0 - 20.0

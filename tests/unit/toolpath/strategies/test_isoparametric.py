@@ -120,6 +120,7 @@ def test_a_face_with_a_pole_is_named_and_the_plan_goes_on():
 
 @pytest.mark.parametrize(("a", "b", "loop"), [
     (0.05, -0.03, SQUARE), pytest.param(0.08, 0.05, SQUARE, marks=pytest.mark.slow), (0.03, 0.03, DISC)])
+@pytest.mark.slow
 def test_the_faster_strategy_is_taken_and_the_other_told_with_its_figure(a, b, loop):
     mesh, face = bowl(a, b, loop)
     case = plan_part(mesh, [ball(3.0)], scallop=SCALLOP, chord=CHORD, faces={2}, trimmed=(face,))
@@ -135,6 +136,7 @@ def test_the_faster_strategy_is_taken_and_the_other_told_with_its_figure(a, b, l
         assert told[-1]["value"] == pytest.approx(seconds[1], abs=0.06)
 
 
+@pytest.mark.slow
 def test_who_asks_for_a_pattern_gets_it():
     mesh, face = bowl(0.05, -0.03)
     case = plan_part(mesh, [ball(3.0)], scallop=SCALLOP, faces={2}, trimmed=(face,), pattern=Pattern.ZIGZAG)
