@@ -23,12 +23,12 @@ class Limits(ReportModel):
     job_time_s: Annotated[float, Field(description="Longest time of one attempt, s.")]
     job_memory_bytes: int
     attempts: Annotated[int, Field(description="How often a job starts at most when its process is lost.")]
-    submissions: Annotated[str, Field(description="Most submissions of one principal "
-                                                  "in a period.", examples=["120/minute"])]
-    queued: Annotated[int, Field(description="Most waiting jobs.")]
-    queued_each: Annotated[int, Field(description="Most waiting jobs of one principal.")]
+    submissions: Annotated[str, Field(description="Largest number of submissions of one principal in a period.",
+                                      examples=["120/minute"])]
+    queued: Annotated[int, Field(description="Largest number of waiting jobs.")]
+    queued_each: Annotated[int, Field(description="Largest number of waiting jobs of one principal.")]
     deadline_s: Annotated[list[float], Field(
-        min_length=2, max_length=2, description="Least and greatest value of deadline_s.")]
+        min_length=2, max_length=2, description="Smallest and largest value of deadline_s.")]
     retention_days: Annotated[float | None, Field(description="Days that the files of a job are "
                                                               "kept after its end.")] = None
 

@@ -34,9 +34,9 @@ class JobSummary(ReportModel):
 
     complete: Annotated[bool | None, Field(description="True where the remainder is empty; "
                                                        "null for a verification.")] = None
-    coverage: Annotated[float | None, Field(description="Proved share of the machinable area.")] = None
+    coverage: Annotated[float | None, Field(description="Proved area divided by machinable area.")] = None
     reach_coverage: Annotated[float | None, Field(
-        description="Proved share of the area that some tool and axis can reach.")] = None
+        description="Proved area divided by the machinable area that some tool of the setup reaches.")] = None
     findings: Annotated[int, Field(ge=0, description="Number of findings of the proof.")] = 0
     machining_time_s: float | None = None
 
@@ -55,7 +55,7 @@ class JobWebhook(ReportModel):
 
     url: str
     state: Annotated[Literal["pending", "delivered", "given_up"], Field(
-        description="pending until the job has ended and the receiver has answered 2xx.")]
+        description="pending: not delivered yet. delivered: the receiver answered 2xx. given_up: no more attempts.")]
     attempts: Annotated[int, Field(ge=0)] = 0
     next_attempt_at: Annotated[str | None, Field(description="UTC, ISO 8601; null where no attempt is planned.")] = None
     problem: Annotated[str | None, Field(description="Error of the last attempt.")] = None
@@ -64,8 +64,8 @@ class JobWebhook(ReportModel):
 class JobResumed(ReportModel):
     """Results that an attempt took over from earlier attempts. The final result is the same, byte for byte."""
 
-    plans: Annotated[int, Field(ge=0, description="Number of planned accesses taken over, counted for each plan of the "
-                                                  "job.")] = 0
+    plans: Annotated[int, Field(ge=0, description="Number of access plans taken over. A job that is planned several "
+                                                  "times counts each plan.")] = 0
     steps: Annotated[int, Field(ge=0, description="Number of workingsteps taken over from unfinished plans.")] = 0
     proofs: Annotated[int, Field(ge=0, description="Number of proofs taken over.")] = 0
 
@@ -80,7 +80,8 @@ class Job(ReportModel):
                                                  "a zones job, which has no proof.")]
     stage: Annotated[str, Field(description="Current stage, in words.", examples=["finishing"])]
     progress: Annotated[float, Field(
-        ge=0, le=1, description="Share done, 0 to 1. It never decreases during an attempt.")]
+        ge=0, le=1, description="Share done, 0 to 1. It never decreases during an attempt. A new attempt starts "
+                                "again from 0.")]
     attempt: Annotated[int, Field(ge=0, description="Number of starts.")]
     resumed: Annotated[JobResumed | None, Field(description="Results that the newest attempt took over from earlier "
                                                             "ones; null where it took none.")] = None

@@ -28,7 +28,7 @@ class NewKey(WireModel):
 class Key(ReportModel):
     """A key without its secret."""
 
-    id: Annotated[str, Field(description="Second part of the text of the key.", examples=["0a1b2c3d4e5f"])]
+    id: Annotated[str, Field(description="The part of the key between zm_ and the secret.", examples=["0a1b2c3d4e5f"])]
     principal: str
     scopes: list[KeyScope]
     note: str = ""
@@ -42,7 +42,7 @@ class Key(ReportModel):
 class MadeKey(ReportModel):
     """A new key with its text, which is shown only once."""
 
-    key: Annotated[str, Field(description="Value for the header Authorization: Bearer.")]
+    key: Annotated[str, Field(description="The key. Send it in the header Authorization: Bearer KEY.")]
     about: Key
 
 

@@ -22,14 +22,14 @@ class Machine(WireModel):
         "kind": "3-axis", "dialects": ["linuxcnc"], "max_rpm": 18000, "rapid_mm_min": 10000}]}}
 
     kind: Annotated[Literal["3-axis", "5-axis"], Field(
-        description="A 5-axis machine gets fixed tool axes (3+2), all in one program. With machine.simultaneous the "
-                    "axes also move in the cut, for example to finish walls with the flank of a tool.")] = "3-axis"
+        description="5-axis: one program with fixed tool axes (3+2). With machine.simultaneous the axes also move "
+                    "during the cut, for example to finish walls with the flank of a tool.")] = "3-axis"
     kinematics: Annotated[Literal["table-table-AC", "table-table-BC", "head-table-BC", "head-head-BC",
                                   "head-head-AC"] | None, Field(
-        description="Rotary axes of a 5-axis machine, required there: what carries them, and their letters, the "
-                    "tilting one first. null on a 3-axis machine. A table turns the part by Rz(C) and then Rx(A) or "
-                    "Ry(B), as LinuxCNC's xyzac-trt does. A head turns the tool by "
-                    "Rx(A) or Ry(B) and then Rz(C).")] = None
+        description="Rotary axes: whether each turns the table or the head, and its letter; the tilting axis comes "
+                    "first. Required on a 5-axis machine, null on a 3-axis machine. A table turns the part by Rz(C) "
+                    "and then Rx(A) or Ry(B), as LinuxCNC's xyzac-trt does. A head turns the tool by Rx(A) or Ry(B) "
+                    "and then Rz(C).")] = None
     iso_axes: Annotated[list[Literal["A", "B", "C"]], Field(
         max_length=2,
         description="Table axes that follow ISO 841: a positive angle turns the tool right-handed as seen from the "
@@ -37,8 +37,8 @@ class Machine(WireModel):
                     "LinuxCNC's do. This holds for planned programs, verified programs and rotary_deg.")] = []
     tcp: Annotated[bool, Field(description="true: the control keeps the tool tip during rotary moves. false: programs "
                                            "contain positions of the linear joints, and pivots_mm is required. No "
-                                           "effect on a 3-axis machine, nor on a verified program, which states it by "
-                                           "G43.4 or M428.")] = True
+                                           "effect on a 3-axis machine. No effect on a verified program, whose own "
+                                           "words decide: M428, G43.4, G234, TRAORI or M128.")] = True
     dialects: Annotated[list[str], Field(
         min_length=1, max_length=8,
         description=f"Controls that need a program: {', '.join(DIALECT_ENDINGS)}. Each gets its own program. The first "
@@ -46,17 +46,17 @@ class Machine(WireModel):
     restart_points: Annotated[bool, Field(
         description="true: the program can be started at every step. Each step has a label and then states tool, "
                     "length, zero, speed, coolant and tool centre point control, as after a tool change. On a 5-axis "
-                    "machine the axes return to 0 between steps. false: only steps after a tool change do so, without "
-                    "labels.")] = True
+                    "machine the axes return to 0 between steps. false: no labels; only steps after a tool change "
+                    "state these.")] = True
     max_program_kb: Annotated[Number | None, Field(
         ge=1, le=1e6, description="Largest program that the control accepts, in 1000 bytes. A larger program is split, "
                                   "at tool changes where possible, into programs that run in order: "
                                   "program.linuxcnc.ngc, program.part2.linuxcnc.ngc, each with its STEP-NC. null: no "
                                   "limit.")] = None
     coolant: Annotated[Literal["flood", "off"], Field(
-        description="true: programs and STEP-NC turn the coolant on with the spindle (M8). false: they state that it "
-                    "is off (M9). Default cutting data are for flood coolant; a dry machine needs cutting data of its "
-                    "own.")] = "flood"
+        description="flood: programs and STEP-NC turn the coolant on with the spindle (M8). off: they state that the "
+                    "coolant is off (M9). The default cutting data assume flood coolant, so give a dry machine its own "
+                    "cutting data.")] = "flood"
     high_speed: Annotated[bool, Field(
         description="Use fast contouring where a control has it as an option: G05.1 "
                     "Q1 on fanuc, CYCLE832 on siemens.")] = False
@@ -75,16 +75,17 @@ class Machine(WireModel):
                     "quality.chordal_tolerance_mm of the planned path; the plan uses the other half. Steps with a "
                     "moving tool axis keep straight moves.")] = False
     travel_mm: Annotated[Triple | None, Field(
-        description="Largest extent of the moves of a program in X, Y and Z, mm. In Z the gauge lengths of its tools "
-                    "count. The work offset decides where on the machine that is. null: no limit.")] = None
+        description="Largest extent of the moves of a program in X, Y and Z, mm. In Z it is the extent of the spindle "
+                    "face, so gauge lengths count. Only the extent is checked, not where it lies on the machine. "
+                    "null: no limit.")] = None
     rotary_deg: Annotated[list[AngleRange] | None, Field(
-        min_length=2, max_length=2, description="Least and greatest angle of the rotary axes, deg, the tilting one "
-                                                "first; null: no limits. null on a 3-axis machine.")] = None
+        min_length=2, max_length=2, description="Smallest and largest angle of each rotary axis, deg, the tilting axis "
+                                                "first. null: no limit. Leave it null on a 3-axis machine.")] = None
     table_z_mm: Annotated[BoundedNumber | None, Field(
         description="Height of the table, or of the fixture under the part, mm, in the setup frame with the rotary "
-                    "axes at 0. No tool comes near it. A spindle nose wider than the holder belongs into "
-                    "tools[].holder. null: a tilted tool stays above the bottom of the blank. null on a 3-axis "
-                    "machine.")] = None
+                    "axes at 0. Tools stay clearance_mm.rapid above it. Add a spindle nose that is wider than the "
+                    "holder as the last segment of tools[].holder. null: tilted tools stay above the bottom of the "
+                    "blank. Leave it null on a 3-axis machine.")] = None
     orientations: Annotated[Literal["find", "given"], Field(
         description="find: a 5-axis machine also uses other tool axes for areas that the accesses of the setup do not "
                     "reach. given: it uses those accesses only. No effect on a 3-axis machine.")] = "find"
@@ -92,15 +93,16 @@ class Machine(WireModel):
         description="true: the rotary axes move while the tool cuts. false: they turn between cuts only (3+2). No "
                     "effect on a 3-axis machine, nor on a verified program.")] = True
     rotary_rate_deg_min: Annotated[Number | None, Field(
-        ge=1, le=1e7, description="Fastest turn of a rotary axis, deg/min, in feed moves and for the times of rapids. "
-                                  "null: no limit, and 7200 for the times of rapids. null on a 3-axis machine.")] = None
+        ge=1, le=1e7, description="Highest rotary speed, deg/min: a limit on feed moves, and the speed with which "
+                                  "rapids are timed. null: no limit, and rapids are timed with 7200. Leave it null on "
+                                  "a 3-axis machine.")] = None
     pivots_mm: Annotated[list[Triple] | None, Field(
         min_length=1, max_length=2,
         description="Pivots of the rotary axes, mm, in the frame of the program with both axes at 0. table-table: a "
                     "point on the tilting axis and one on the turning axis. head-table: [0, 0, distance from the "
-                    "spindle face up to the swivel] and a point on the turning axis. head-head: the first alone. null: "
-                    "the travel of the linear axes is not checked, and programs without tool centre point control are "
-                    "refused off 0. null on a 3-axis machine.")] = None
+                    "spindle face up to the swivel] and a point on the turning axis. head-head: only [0, 0, distance]. "
+                    "null: the travel of the linear axes is not checked, and programs that turn the axes away from 0 "
+                    "without tool centre point control are refused. Leave it null on a 3-axis machine.")] = None
     max_rpm: Annotated[Number | None, Field(
         ge=1, le=1e6, description="Highest spindle speed, 1/min. null: plans stay at or below 18000; verified programs "
                                   "have only the limits of their tools.")] = None
@@ -116,7 +118,7 @@ class Machine(WireModel):
                     "speed, so the path is not straight. A rapid of several axes is then a finding unless it stays "
                     "clearance_mm.rapid above part, stock and fixtures.")] = "linear"
     ap238: Annotated[Literal["cc1", "cc2", "integrated_cnc"], Field(
-        description="Purpose of job.stpnc. cc1: tool paths, conformance class 1. cc2: class 2, which adds part and "
+        description="Conformance class of job.stpnc. cc1: class 1, tool paths. cc2: class 2, which adds part and "
                     "blank as shapes, strategies and setup instructions. integrated_cnc: as cc1, under the schema name "
                     "of the first edition, INTEGRATED_CNC_SCHEMA, for readers that know only that one.")] = "cc1"
 

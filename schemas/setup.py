@@ -80,8 +80,8 @@ class Cylinder(WireModel):
     x: Annotated[Number, Field(ge=-1e6, le=1e6, description="Position of its axis, mm.")] = 0.0
     y: Annotated[Number, Field(ge=-1e6, le=1e6, description="Position of its axis, mm.")] = 0.0
     bottom: Annotated[Number, Field(ge=-1e6, le=1e6, description="Height of its lower end, mm.")]
-    diameter: Annotated[Number, Field(gt=0, le=1e6, description="mm.")]
-    height: Annotated[Number, Field(gt=0, le=1e6, description="mm.")]
+    diameter: Annotated[Number, Field(gt=0, le=1e6, description="Diameter, mm.")]
+    height: Annotated[Number, Field(gt=0, le=1e6, description="Height, mm.")]
 
 
 class Stock(WireModel):
@@ -102,10 +102,10 @@ class Stock(WireModel):
                     "enlarged by margin_mm at the side and on top.")] = None
     step_file: Annotated[str | None, Field(
         min_length=1, max_length=1000, pattern=r"^[^\x00-\x1f\x7f]*$",
-        description="STEP file of a blank with kind step: one closed solid in the coordinates of the part's file. On "
-                    "the command line it is a path, relative to the folder of the setup. Over HTTP the request sends "
-                    "the file as part 'stock', and this name is ignored. The bytes of the file count in the content "
-                    "hash of a job, its name does not.")] = None
+        description="STEP file of a blank with kind step: one closed solid in the coordinates of the part's file. "
+                    "Command line: a path, relative to the folder of the setup. HTTP: the request sends the file as "
+                    "form field 'stock', and this name is ignored. The content hash of a job contains the bytes of the "
+                    "file, not its name.")] = None
 
     @model_validator(mode="after")
     def _check(self) -> Stock:
@@ -132,12 +132,12 @@ class Fixture(WireModel):
 
 
 class Clearance(WireModel):
-    """Radial distances to the part and to the stock, mm."""
+    """Smallest allowed radial distances to part, stock and fixtures, mm."""
 
-    neck: Annotated[Number, Field(ge=0, le=100, description="Neck, mm.")] = 0.05
-    shank: Annotated[Number, Field(ge=0, le=100, description="Shank, mm.")] = 0.2
-    holder: Annotated[Number, Field(ge=0, le=100, description="Holder, mm.")] = 1.0
-    rapid: Annotated[Number, Field(ge=0, le=100, description="The whole tool during a rapid, mm.")] = 1.0
+    neck: Annotated[Number, Field(ge=0, le=100, description="Of the neck, mm.")] = 0.05
+    shank: Annotated[Number, Field(ge=0, le=100, description="Of the shank, mm.")] = 0.2
+    holder: Annotated[Number, Field(ge=0, le=100, description="Of the holder, mm.")] = 1.0
+    rapid: Annotated[Number, Field(ge=0, le=100, description="Of the whole tool during a rapid, mm.")] = 1.0
 
 
 class Quality(WireModel):
@@ -156,14 +156,14 @@ class Quality(WireModel):
 
 
 class Lean(WireModel):
-    """Lead and tilt of ball and bull-nose tools, from the normal of the face that they finish."""
+    """Lead and tilt angles of ball and bull-nose tools, measured from the normal of the finished face."""
 
     lead_deg: Annotated[Number, Field(
-        ge=0, le=60, description="Lead: angle forward along the pass, degrees. Above 7 the tool retracts between "
-                                 "passes of opposite directions.")] = 0.0
+        ge=0, le=60, description="Lead: angle forward along the pass, degrees. Above 7 degrees the tool retracts "
+                                 "before a pass in the opposite direction.")] = 0.0
     tilt_deg: Annotated[Number, Field(
-        ge=0, le=60, description="Tilt: angle across the pass, degrees, to the side where "
-                                 "more of the passes is free.")] = 0.0
+        ge=0, le=60, description="Tilt: angle across the pass, degrees, toward the side on which the tool can stay "
+                                 "tilted over more of the passes.")] = 0.0
     walls_tilt_deg: Annotated[Number | None, Field(
         ge=0, le=89, description="Tilt on walls, degrees, without a lead; null: walls are cut upright or with the "
                                  "flank of the tool.")] = None
@@ -179,8 +179,8 @@ class Operations(WireModel):
 
     roughing: Annotated[bool, Field(description="Remove the stock in layers first.")] = True
     semi_finishing: Annotated[bool, Field(
-        description="After its layers a tool also cuts the steps between them, so that inclined walls and floors keep "
-                    "even stock. It varies by at most a quarter of the deepest layer.")] = False
+        description="After roughing, the same tool also cuts the terraces between its layers. The stock left on "
+                    "inclined walls and floors then varies by at most a quarter of the deepest layer.")] = False
     finishing: Annotated[bool, Field(description="Finish the zones.")] = True
     faces: Annotated[list[FaceId] | None, Field(description="Faces to machine; null: all faces within reach.")] = None
     exclude_faces: Annotated[list[FaceId], Field(description="Faces to leave uncut.")] = []
@@ -189,18 +189,18 @@ class Operations(WireModel):
     pattern: Annotated[Literal["auto", "zigzag", "one_way", "spiral"], Field(
         description="Pattern of passes on shallow areas. auto: zigzag or spiral, whichever is shorter.")] = "auto"
     lean: Annotated[Lean, Field(
-        description="On a 5-axis machine, ball and bull-nose tools are tilted by these angles from the normal of faces "
-                    "that are not level, so that their centre does not rub. Where the tool would collide, it takes the "
-                    "nearest free axis, up to 45 degrees away, and turns evenly. Flank milling and curvature-matched "
-                    "passes come first where they are faster and leave as little area upright. The tool stays upright "
-                    "where no axis is free, and on level faces. Without lead and tilt, tools are tilted where that is "
-                    "faster.")] = Lean()
+        description="Angles: on a 5-axis machine ball and bull-nose tools are tilted by them from the normal of faces "
+                    "that are not level, so that the tool centre does not rub. Obstacles: where the tool would "
+                    "collide, it takes the nearest free axis, up to 45 degrees away, and turns evenly. Upright: the "
+                    "tool stays upright on level faces and where no axis is free. Other strategies: flank milling and "
+                    "curvature-matched passes come first where they are faster and leave as little area upright. "
+                    "Default, no angles: tools are tilted for these two strategies only, where "
+                    "they are faster.")] = Lean()
     walls_in_turn: Annotated[bool, Field(
-        description="true: both sides of a wall that is more than 10 times as high as thick are finished in "
-                    "alternating bands of depth. Where it is finished, no more than 10 times its thickness stands "
-                    "free. A program of one access on a 3-axis machine that breaks this rule is not proved; other "
-                    "programs get a warning. false: such walls are supported by other means, and the plan has a "
-                    "warning.")] = True
+        description="true: a wall that is more than 10 times as high as thick is finished on both sides in alternating "
+                    "bands of depth. No more than 10 times its thickness may stand unsupported where it is finished. "
+                    "On a 3-axis machine with one access, breaking this rule is a finding; elsewhere it is a warning. "
+                    "false: such walls are supported by other means, and the plan has a warning.")] = True
 
     @model_validator(mode="after")
     def _check(self) -> Operations:
@@ -215,7 +215,8 @@ class Operations(WireModel):
 
 Labels = Annotated[dict[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}$")],
                         Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]],
-                   Field(max_length=32, description="Passed through to job, report, program header and STEP-NC.")]
+                   Field(max_length=32, description="Your own keys and values. They appear in job, report, program "
+                                                    "header and STEP-NC.")]
 
 
 def _describe(schema: dict[str, Any]) -> None:

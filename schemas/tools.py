@@ -75,17 +75,17 @@ class Tool(WireModel):
         ge=1, le=1e6, description="Highest spindle speed of the tool, 1/min; null: no limit.")] = None
     max_engagement_deg: Annotated[Number | None, Field(
         ge=30, le=180, description="Largest engagement of the front half of the cutter, deg, at depths of more than a "
-                                   "twentieth of its radius. 180 is a slot. At least 30, since the proof resolves 11. "
-                                   "null: no limit.")] = None
+                                   "twentieth of its radius. 180 is a slot. At least 30, since the proof resolves "
+                                   "engagement to about 11 degrees. null: no limit.")] = None
     life_min: Annotated[Number | None, Field(
-        gt=0, le=1e6, description="Tool life in cut, min. Plans request a fresh cutter between two passes before it "
-                                  "ends. null: not counted.")] = None
+        gt=0, le=1e6, description="Tool life in cut, min. The program stops for a fresh cutter between two passes "
+                                  "before this time is used up. null: not counted.")] = None
     spindle_rpm: Annotated[Number | None, Field(
         ge=1, le=1e6, description="Spindle speed of all its steps, 1/min, at most max_rpm and machine.max_rpm. null: "
-                                  "from the material.")] = None
+                                  "computed from the material.")] = None
     feed_mm_min: Annotated[Number | None, Field(
         ge=0.1, le=1e6, description="Cutting feed of all its steps, mm/min, at most machine.max_feed_mm_min. null: "
-                                    "from material, flutes and speed.")] = None
+                                    "computed from material, flutes and speed.")] = None
     plunge_feed_mm_min: Annotated[Number | None, Field(
         ge=0.1, le=1e6, description="Downward feed into stock, mm/min: the feed of a plunge, and the downward part of "
                                     "the feed on ramps and helices. At most machine.max_feed_mm_min. null: 0.3 of the "

@@ -72,8 +72,8 @@ class SideProfile(ReportModel):
     wall: Annotated[str, Field(examples=["W1"])]
     profile: Annotated[str | None, Field(description="C1 to C10; null: straight.")] = None
     level: Level
-    margin: Annotated[float, Field(ge=0, le=1, description="Smallest relative change of a measure that would change "
-                                                           "the type.")]
+    margin: Annotated[float, Field(ge=0, le=1, description="How clear the type is: the smallest relative change of a "
+                                                           "measured size that would give another type.")]
 
 
 class ApproachCone(ReportModel):
@@ -94,19 +94,22 @@ class Patch(ReportModel):
 
 
 class ZoneFacts(ReportModel):
-    """A machinable zone with its tool, axis and depth. Only a report has the figures of passes and proof."""
+    """A machinable zone with its tool, axis and depth. report.json adds the figures of passes and proof."""
 
     id: Annotated[str, Field(examples=["Z3"])]
     kind: Annotated[Literal["SCZ", "SCZI"] | None, Field(
-        description="SCZ: split computable zone; SCZI: the same on, under or over a connection.")] = None
+        description="SCZI: a zone on, under or over a connection. SCZ: any other zone.")] = None
     profile: Annotated[str | None, Field(description="Profile type C1 to C10 of the most complex side; null: straight, "
                                                      "or no wall.")] = None
     level: Annotated[Level | None, Field(description="Complexity of the profile; null: no wall.")] = None
-    profiles: Annotated[list[SideProfile], Field(description="The sides of walls on which the zone lies.")] = []
-    open: Annotated[bool | None, Field(description="Passes can leave the zone sideways at their level.")] = None
+    profiles: Annotated[list[SideProfile], Field(description="Profiles of the wall sides in this zone.")] = []
+    open: Annotated[bool | None, Field(
+        description="true: over nearly all of the zone the tool can leave the part sideways at the level of its "
+                    "passes. false: walls or connections close the zone.")] = None
     region: Annotated[str | None, Field(examples=["H1", "H1.2", "H1 over C2", "W1", "C2", "top", "floor",
                                                   "free"])] = None
-    merged: Annotated[list[str], Field(description="Cells over or under connections that were merged into it.")] = []
+    merged: Annotated[list[str], Field(
+        description="Regions over or under connections that are part of this zone.")] = []
     form: Literal["level", "shallow", "steep"] | None = None
     faces: list[Any] = []
     patches: Annotated[list[Patch], Field(description="The same area as trimmed faces.")] = []
@@ -127,12 +130,12 @@ class ComputableZone(ReportModel):
 
     access: str
     tool: str
-    area_mm2: Annotated[float, Field(description="Area that it touches with shank and holder clear.")]
-    cutter_area_mm2: Annotated[float, Field(description="Area that its cutting part touches.")]
+    area_mm2: Annotated[float, Field(description="Area that the tool touches while shank and holder stay clear.")]
+    cutter_area_mm2: Annotated[float, Field(description="Area that the cutting part alone touches.")]
 
 
 class CuttingPlane(ReportModel):
-    """Lowest height of a tool, or of an access, in a region."""
+    """Height in a region below which a tool, or every tool from one access, does not cut."""
 
     access: str
     z_mm: Annotated[float, Field(description="Height along the access direction, mm.")]
@@ -155,8 +158,11 @@ class Remainder(ReportModel):
 
     faces: list[Any]
     area_mm2: float
-    reason: Annotated[str, Field(description="undercut, undercut behind connection C2, fixture, pass, shank, holder, "
-                                             "gap, corner or sharp corner; see the glossary.")]
+    reason: Annotated[str, Field(
+        description="undercut: material of the part covers the area from every access. undercut behind connection C2: "
+                    "that connection covers it. fixture: a fixture covers it or blocks the tools. pass: a tool reaches "
+                    "it, but no pass cuts it. shank, holder: a cutter of the setup fits, but this body would collide. "
+                    "gap, corner: only a thinner or sharper cutter fits. sharp corner: no rotating tool fits.")]
     would_need: Annotated[dict[str, Any], Field(
         description="The tool that would reach it, in available sizes: kind, diameter_mm, corner_radius_mm, "
                     "neck_length_mm, shank_diameter_mm, stickout_mm, like (the tool of the setup with the same holder) "
@@ -185,7 +191,8 @@ class ProposedTool(ReportModel):
     like: Annotated[str | None, Field(description="Tool of the setup with the same holder.")] = None
     access: str
     area_mm2: Annotated[float, Field(
-        description="Area of the remainder that zones with this tool cover, mm2. It is used for nothing else.")]
+        description="Area of the remainder that zones with this tool cover, mm2. The tool is proposed for this area "
+                    "only.")]
     tool: Annotated[Tool | None, Field(description="The same tool as a complete entry for tools of the setup.")] = None
 
 
@@ -195,11 +202,12 @@ class Proposal(ReportModel):
     tools: list[ProposedTool]
     emptied_mm2: float
     stays_mm2: Annotated[dict[str, float], Field(
-        description="By reason: undercut, fixture, sharp corner, slender, pass, too little.")]
+        description="Area by reason, mm2. undercut, fixture, sharp corner, pass: as in remainder. slender: only a neck "
+                    "longer than 20 diameters reaches it. too little: the area is not worth a tool.")]
 
 
 class Zones(ReportModel):
-    """zones.json."""
+    """zones.json: walls, connections, channels, zones and remainder."""
 
     part: PartFacts
     walls: list[WallFacts]
@@ -209,8 +217,8 @@ class Zones(ReportModel):
     mcz: list[ComputableZone] = []
     cutting_planes: list[CuttingPlane] = []
     machinable_area_mm2: Annotated[float | None, Field(
-        description="Area of all requested faces. In zones.json the areas of zones and remainder add up to it; in a "
-                    "report those of proved area, findings and remainder.")] = None
+        description="Area of all requested faces. In zones.json it is the sum of zones and remainder; in report.json "
+                    "it is the sum of proved area, findings and remainder.")] = None
     machinable_by_role_mm2: Annotated[dict[str, float], Field(
         description="The same by the role of the faces: wall, connection, floor, base, fillet, free.")] = {}
     zones: list[ZoneFacts]

@@ -26,8 +26,8 @@ from service.version import VERSION
 
 DESCRIPTION = """Turns a STEP file and a list of tools into G-code and STEP-NC that a simulator has verified.
 
-POST a part with its setup, follow the events, fetch report and files. Lengths are mm; the name of every number ends
-in its unit. Errors are application/problem+json."""
+POST a part with its setup, follow the events, fetch report and files. Lengths are mm, angles degrees, times seconds,
+unless the name of a field says otherwise. Errors are application/problem+json."""
 
 
 def create_app(settings: Settings | None = None, chain: str = "service.pipeline") -> FastAPI:

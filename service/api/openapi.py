@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
 from fastapi import FastAPI
@@ -15,6 +16,8 @@ from schemas.setup import Setup
 from service.api.openapi_examples import add_samples
 
 TEMPLATE = "#/components/schemas/{model}"
+SECTION = re.compile(r"\n\s*\n[A-Z][A-Za-z ]*\n-{3,}\n.*", re.DOTALL)
+"""The sections of a docstring, such as Raises, which are for readers of the code."""
 
 
 def document(app: FastAPI) -> dict[str, Any]:
@@ -30,6 +33,7 @@ def document(app: FastAPI) -> dict[str, Any]:
         schemas.pop(unused, None)
     found["components"]["schemas"] = dict(sorted(schemas.items()))
     _plain(found)
+    _words(found)
     add_samples(found)
     return found
 
@@ -58,6 +62,18 @@ def _plain(node: Any) -> None:
     elif isinstance(node, list):
         for value in node:
             _plain(value)
+
+
+def _words(node: Any) -> None:
+    """Make descriptions that come from docstrings plain Markdown: no sections, and one backtick around code."""
+    if isinstance(node, dict):
+        if isinstance(text := node.get("description"), str):
+            node["description"] = SECTION.sub("", text).replace("``", "`")
+        for value in node.values():
+            _words(value)
+    elif isinstance(node, list):
+        for value in node:
+            _words(value)
 
 
 def _is_plain(kind: dict[str, Any]) -> bool:

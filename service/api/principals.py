@@ -22,8 +22,8 @@ from service.jobs.api_keys import ADMIN, METRICS, READ, SCOPES, SUBMIT, Identity
 from service.settings import Settings, is_loopback
 
 LOCAL = Identity("local", frozenset(SCOPES))
-bearer = HTTPBearer(auto_error=False, description="A key from zonemill keys create. Required beyond loopback, and on "
-                                                  "loopback once a key exists.")
+bearer = HTTPBearer(auto_error=False, description="A key from zonemill keys create. Required for requests from other "
+                                                  "hosts, and for local requests once a key exists.")
 
 
 def keys_wanted(request: Request) -> bool:

@@ -1,6 +1,7 @@
 """openapi.yaml stands for the running application."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,8 +11,9 @@ import yaml
 
 from schemas.setup import Setup
 from service.api.app import create_app
-from service.api.openapi import as_yaml
+from service.api.openapi import SECTION, as_yaml
 from service.errors import ERROR_TABLE
+from verify.model import FindingKind
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -79,6 +81,36 @@ def test_every_operation_and_every_problem_has_an_example_that_fits_its_schema(d
     for each in problems.values():
         fits(each["value"], {"$ref": "#/components/schemas/Problem"})
     Setup.model_validate(document["components"]["schemas"]["Setup"]["examples"][0])
+
+
+def test_words_are_for_readers_of_the_interface(document):
+    """No section of a docstring, no mark-up of Sphinx, no default of the framework."""
+    texts = []
+
+    def collect(node):
+        for key, value in node.items() if isinstance(node, dict) else enumerate(node):
+            if key in ("description", "summary") and isinstance(value, str):
+                texts.append(value)
+            elif isinstance(value, dict | list):
+                collect(value)
+
+    collect(document)
+    assert len(texts) > 300
+    assert not [t for t in texts if "------" in t or "``" in t or t == "Successful Response"]
+    for item in document["paths"].values():
+        for operation in item.values():
+            assert not operation["summary"].istitle(), "the default of the framework: give the route a summary"
+
+
+def test_a_section_of_a_docstring_is_left_out():
+    text = "What it does.\n\nMore.\n\nRaises\n------\nRateError\n    Too many."
+    assert SECTION.sub("", text) == "What it does.\n\nMore."
+
+
+def test_the_description_of_findings_names_every_kind(document):
+    text = document["components"]["schemas"]["Report"]["properties"]["findings"]["description"]
+    kinds = text.split("kind: ")[1].split(". message")[0]
+    assert set(re.findall("[a-z_]+", kinds)) >= {*FindingKind, "nothing_cut", "coverage"}
 
 
 def test_every_field_says_its_unit_or_has_a_description(document):

@@ -26,7 +26,7 @@ STEPNC = ("AP238", "ISO 14649")
 
 
 @router.get("", operation_id="capabilities", summary="What the service can do",
-            responses=responses(UnauthorizedError))
+            response_description="The capabilities.", responses=responses(UnauthorizedError))
 def capabilities(request: Request, caller: Caller) -> Capabilities:
     """Dialects, tools, machines, materials, limits, version, and the principal of the key. Any key may read it."""
     settings: Settings = request.app.state.settings

@@ -14,13 +14,16 @@ from service.errors import UnauthorizedError
 router = APIRouter(tags=["operation"])
 
 
-@router.get("/healthz", operation_id="healthz")
+@router.get("/healthz", operation_id="healthz", summary="Check the process",
+            response_description="The process answers.")
 async def healthz() -> Health:  # without a thread: all threads may wait for the database
-    """The process answers."""
+    """Answer ok. It needs neither database nor disk."""
     return Health(status="ok")
 
 
-@router.get("/readyz", operation_id="readyz", responses={503: {"model": Health, "description": "Not ready."}})
+@router.get("/readyz", operation_id="readyz", summary="Check the service",
+            response_description="The service is ready.",
+            responses={503: {"model": Health, "description": "Not ready."}})
 def readyz(request: Request, response: Response) -> Health:
     """Check database, engine, data folder and free disk space; 503 names what fails."""
     checks = request.app.state.engine.ready()
@@ -30,8 +33,8 @@ def readyz(request: Request, response: Response) -> Health:
     return Health(status="unready", checks=checks)
 
 
-@router.get("/metrics", operation_id="metrics", response_class=PlainTextResponse,
-            responses=responses(UnauthorizedError))
+@router.get("/metrics", operation_id="metrics", summary="Counters of the service", response_description="The counters.",
+            response_class=PlainTextResponse, responses=responses(UnauthorizedError))
 def metrics(request: Request, _: Watcher) -> Response:
     """Counters in the Prometheus text format."""
     text = request.app.state.metrics.render(request.app.state.engine)

@@ -49,8 +49,10 @@ RESULT = responses(UnauthorizedError, NotFoundError, RequestError, NotReadyError
 Labels = Annotated[list[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}:[^\x00-\x1f\x7f]{0,200}$")]],
                    Query(max_length=8, description="KEY:VALUE of a label; several labels must all match.",
                          examples=[["order:4711"]])]
-Time = Annotated[datetime | None, Query(description="Time of posting: from this time on, or before it; ISO 8601, UTC "
-                                                    "where no time zone is given.")]
+From = Annotated[datetime | None, Query(description="Only jobs posted at or after this time; ISO 8601, UTC where no "
+                                                    "time zone is given.")]
+Until = Annotated[datetime | None, Query(description="Only jobs posted before this time; ISO 8601, UTC where no time "
+                                                     "zone is given.")]
 
 
 def _seconds(time: datetime | None) -> float | None:
@@ -59,12 +61,12 @@ def _seconds(time: datetime | None) -> float | None:
     return (time if time.tzinfo else time.replace(tzinfo=UTC)).timestamp()
 
 
-@router.get("", operation_id="listJobs", summary="Your jobs, newest first", responses=responses(UnauthorizedError,
-                                                                                              RequestError))
+@router.get("", operation_id="listJobs", summary="Your jobs, newest first", response_description="A page of jobs.",
+            responses=responses(UnauthorizedError, RequestError))
 def list_jobs(request: Request, principal: Principal, limit: Annotated[int, Query(ge=1, le=200)] = 50,
               cursor: Annotated[str | None, Query(max_length=100)] = None, state: JobState | None = None,
               kind: JobKind | None = None, label: Labels = [],  # noqa: B006
-              created_from: Time = None, created_to: Time = None) -> JobPage:
+              created_from: From = None, created_to: Until = None) -> JobPage:
     """A page of jobs that match all filters. Pages do not shift when jobs are added."""
     before = decode_cursor(cursor) if cursor is not None else None
     rows = request.app.state.engine.jobs.page(
@@ -74,16 +76,18 @@ def list_jobs(request: Request, principal: Principal, limit: Annotated[int, Quer
     return JobPage(items=[job_resource(r) for r in rows[:limit]], next_cursor=following)
 
 
-@router.get("/{job_id}", operation_id="getJob", summary="One job", responses=ONE)
+@router.get("/{job_id}", operation_id="getJob", summary="One job", response_description="The job.", responses=ONE)
 def get_job(request: Request, principal: Principal, job_id: str) -> Job:
     """State, stage, progress and links."""
     return job_resource(request.app.state.engine.jobs.get(job_id, principal))
 
 
-@router.delete("/{job_id}", operation_id="cancelJob", summary="Cancel a job", responses=ONE)
+@router.delete("/{job_id}", operation_id="cancelJob", summary="Cancel a job",
+               response_description="The job after the request.", responses=ONE)
 def cancel_job(request: Request, principal: Submitter, job_id: str, purge: Annotated[bool, Query(
-        description="Also delete the files of the job, even where it has ended before. They answer 410 at once and are "
-                    "removed within hours, unless another job has the same files.")] = False) -> Job:
+        description="Also delete the files of the job, even if the job ended earlier. Requests for them get 410 at "
+                    "once. Within hours the service removes them, unless another job has the same "
+                    "files.")] = False) -> Job:
     """Cancel a job that has not ended. A job that has ended is returned unchanged."""
     jobs = request.app.state.engine.jobs
     jobs.get(job_id, principal)
@@ -93,21 +97,22 @@ def cancel_job(request: Request, principal: Submitter, job_id: str, purge: Annot
     return job_resource(jobs.get(job_id, principal))
 
 
-@router.get("/{job_id}/zones", operation_id="getZones", summary="zones.json", responses=RESULT | SENT,
-            response_model=Zones)
+@router.get("/{job_id}/zones", operation_id="getZones", summary="zones.json", response_description="The zones.",
+            responses=RESULT | SENT, response_model=Zones)
 def get_zones(request: Request, principal: Principal, job_id: str) -> Response:
     """Walls, connections, channels, zones and remainder."""
     return _document(request, principal, job_id, "zones.json")
 
 
-@router.get("/{job_id}/report", operation_id="getReport", summary="report.json", responses=RESULT | SENT,
-            response_model=Report | Verification)
+@router.get("/{job_id}/report", operation_id="getReport", summary="report.json", response_description="The report.",
+            responses=RESULT | SENT, response_model=Report | Verification)
 def get_report(request: Request, principal: Principal, job_id: str) -> Response:
     """The plan and its proof; for a verification, its findings."""
     return _document(request, principal, job_id, "report.json")
 
 
-@router.get("/{job_id}/files", operation_id="listFiles", summary="Files of a job", responses=RESULT)
+@router.get("/{job_id}/files", operation_id="listFiles", summary="Files of a job",
+            response_description="The list of files.", responses=RESULT)
 def get_files(request: Request, principal: Principal, job_id: str) -> JobFiles:
     """All files that can be downloaded."""
     row = request.app.state.engine.jobs.get(job_id, principal)

@@ -28,7 +28,8 @@ Name = Annotated[str, Path(pattern=NAME_PATTERN, description="Name of the entry;
 MaterialName = Annotated[str, Path(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,63}$",
                                    description="Name as in GET /v1/materials; built-in names may have spaces.")]
 Version = Annotated[int | None, Query(ge=1, le=10**9, description="Version of the entry; default: the newest.")]
-Shared = Annotated[bool, Query(description="The entry that all principals share, not your own; for admins.")]
+Shared = Annotated[bool, Query(description="true: the entry shared by all principals (needs scope admin). false: your "
+                                           "own.")]
 READ = responses(UnauthorizedError)
 ONE = responses(UnauthorizedError, NotFoundError, RequestError)
 WRITE = responses(UnauthorizedError, RequestError, TooLargeError) | {201: {"description": "The name is new."}}
@@ -69,64 +70,74 @@ def _material(entry: Entry) -> MaterialEntry:
     return MaterialEntry(**_about(entry), entry=Material.model_validate(entry.value))
 
 
-@router.get("/tools", operation_id="listTools", responses=READ)
+@router.get("/tools", operation_id="listTools", summary="All tools",
+            response_description="All tools that you can use.", responses=READ)
 def list_tools(request: Request, principal: Principal) -> ToolList:
     """The newest version of every tool that you can use."""
     return ToolList(items=[_tool(e) for e in _library(request).all(principal, "tools")])
 
 
-@router.get("/tools/{name}", operation_id="getTool", responses=ONE)
+@router.get("/tools/{name}", operation_id="getTool", summary="One tool", response_description="The tool.",
+            responses=ONE)
 def get_tool(request: Request, principal: Principal, name: Name, version: Version = None) -> ToolEntry:
     """One tool: your own with that name, otherwise the shared one."""
     return _tool(_library(request).get(principal, "tools", name, version))
 
 
-@router.put("/tools/{name}", operation_id="putTool", responses=WRITE)
+@router.put("/tools/{name}", operation_id="putTool", summary="Write a tool",
+            response_description="The tool is written.", responses=WRITE)
 def put_tool(request: Request, response: Response, caller: Caller, name: Name, tool: Tool,
              shared: Shared = False) -> ToolEntry:
     """Write a tool. A change creates the next version."""
     return ToolEntry(**_put(request, response, caller, "tools", name, shared, tool), entry=tool)
 
 
-@router.delete("/tools/{name}", operation_id="deleteTool", status_code=204, responses=ONE)
+@router.delete("/tools/{name}", operation_id="deleteTool", summary="Delete a tool",
+               response_description="The tool is deleted.", status_code=204, responses=ONE)
 def delete_tool(request: Request, caller: Caller, name: Name, shared: Shared = False) -> None:
     """Delete a tool with all its versions. Jobs keep the versions that they used."""
     _library(request).delete(_owner(caller, shared), "tools", name)
 
 
-@router.get("/machines", operation_id="listMachines", responses=READ)
+@router.get("/machines", operation_id="listMachines", summary="All machines",
+            response_description="All machines that you can use.", responses=READ)
 def list_machines(request: Request, principal: Principal) -> MachineList:
     """The newest version of every machine that you can use."""
     return MachineList(items=[_machine(e) for e in _library(request).all(principal, "machines")])
 
 
-@router.get("/machines/{name}", operation_id="getMachine", responses=ONE)
+@router.get("/machines/{name}", operation_id="getMachine", summary="One machine",
+            response_description="The machine.", responses=ONE)
 def get_machine(request: Request, principal: Principal, name: Name, version: Version = None) -> MachineEntry:
     """One machine: your own with that name, otherwise the shared one."""
     return _machine(_library(request).get(principal, "machines", name, version))
 
 
-@router.put("/machines/{name}", operation_id="putMachine", responses=WRITE)
+@router.put("/machines/{name}", operation_id="putMachine", summary="Write a machine",
+            response_description="The machine is written.", responses=WRITE)
 def put_machine(request: Request, response: Response, caller: Caller, name: Name, machine: Machine,
                 shared: Shared = False) -> MachineEntry:
     """Write a machine. A change creates the next version."""
     return MachineEntry(**_put(request, response, caller, "machines", name, shared, machine), entry=machine)
 
 
-@router.delete("/machines/{name}", operation_id="deleteMachine", status_code=204, responses=ONE)
+@router.delete("/machines/{name}", operation_id="deleteMachine", summary="Delete a machine",
+               response_description="The machine is deleted.", status_code=204, responses=ONE)
 def delete_machine(request: Request, caller: Caller, name: Name, shared: Shared = False) -> None:
     """Delete a machine with all its versions. Jobs keep the versions that they used."""
     _library(request).delete(_owner(caller, shared), "machines", name)
 
 
-@router.get("/materials", operation_id="listMaterials", responses=READ)
+@router.get("/materials", operation_id="listMaterials", summary="All materials",
+            response_description="All materials that you can use.", responses=READ)
 def list_materials(request: Request, principal: Principal) -> MaterialList:
     """Built-in materials, then the newest version of every material that you can use."""
     own = [_material(e) for e in _library(request).all(principal, "materials")]
     return MaterialList(items=[MaterialEntry(name=n, entry=m, built_in=True) for n, m in MATERIALS.items()] + own)
 
 
-@router.get("/materials/{name}", operation_id="getMaterial", responses=ONE)
+@router.get("/materials/{name}", operation_id="getMaterial", summary="One material",
+            response_description="The material.", responses=ONE)
 def get_material(request: Request, principal: Principal, name: MaterialName, version: Version = None) -> MaterialEntry:
     """One material: your own with that name, otherwise the shared one, otherwise the built-in one."""
     try:
@@ -137,14 +148,16 @@ def get_material(request: Request, principal: Principal, name: MaterialName, ver
     return MaterialEntry(name=name, entry=MATERIALS[name], built_in=True)
 
 
-@router.put("/materials/{name}", operation_id="putMaterial", responses=WRITE)
+@router.put("/materials/{name}", operation_id="putMaterial", summary="Write a material",
+            response_description="The material is written.", responses=WRITE)
 def put_material(request: Request, response: Response, caller: Caller, name: Name, material: Material,
                  shared: Shared = False) -> MaterialEntry:
     """Write a material. A change creates the next version."""
     return MaterialEntry(**_put(request, response, caller, "materials", name, shared, material), entry=material)
 
 
-@router.delete("/materials/{name}", operation_id="deleteMaterial", status_code=204, responses=ONE)
+@router.delete("/materials/{name}", operation_id="deleteMaterial", summary="Delete a material",
+               response_description="The material is deleted.", status_code=204, responses=ONE)
 def delete_material(request: Request, caller: Caller, name: Name, shared: Shared = False) -> None:
     """Delete a material with all its versions. Jobs keep the versions that they used."""
     _library(request).delete(_owner(caller, shared), "materials", name)

@@ -28,7 +28,8 @@ router = APIRouter(prefix="/v1", tags=["submissions"], dependencies=[Depends(sub
 
 IdempotencyKey = Annotated[str | None, Header(
     alias="Idempotency-Key", min_length=1, max_length=255,
-    description="Optional. The same key with the same content answers the same job; with other content 422.")]
+    description="Optional. A repeat with the same key and content returns the same job. With other content the answer "
+                "is 422.")]
 ERRORS = responses(ServiceError, StepError, SetupError, ProgramError, RequestError, KeyConflictError, TooLargeError,
                    UnauthorizedError, RateError, MethodError, UnavailableError)
 ACCEPTED: dict[int | str, dict[str, Any]] = {202: {
@@ -64,12 +65,13 @@ def multipart(with_program: bool) -> dict[str, Any]:
                            "offset on; 0: none."}
     properties["deadline_s"] = {
         "type": "number", "minimum": DEADLINE_S[0], "maximum": DEADLINE_S[1],
-        "description": "Seconds from now until which the job must end. A job that takes longer is stopped and fails "
-                       "with deadline_exceeded. Not part of the content hash."}
+        "description": "Time limit for the whole job, in seconds from the request. A job that takes longer is stopped "
+                       "and fails with deadline_exceeded. Not part of the content hash."}
     properties["webhook_url"] = {
         "type": "string", "format": "uri", "maxLength": 2000,
-        "description": "Receives one signed POST when the job has ended, repeated until the answer is 2xx "
-                       "(docs/service.md). The service must allow its origin. Not part of the content hash."}
+        "description": "The service sends a signed POST to this URL when the job has ended. It retries for about 20 "
+                       "hours until the answer is 2xx or 410 (docs/service.md). The service must allow the origin of "
+                       "the URL. Not part of the content hash."}
     schema = {"type": "object", "title": "VerificationSubmission" if with_program else "Submission",
               "properties": properties, "required": required, "additionalProperties": False}
     return {"requestBody": {"required": True, "content": {"multipart/form-data": {
@@ -99,7 +101,7 @@ async def create_job(request: Request, response: Response, principal: Submitter,
              summary="Quick check of a part", responses=ACCEPTED | ERRORS, openapi_extra=multipart(False))
 async def create_zones(request: Request, response: Response, principal: Submitter,
                        key: IdempotencyKey = None) -> Job:
-    """Queue only the decomposition: reachable area, remainder, and the tools to add."""
+    """Queue a check without tool paths: zones, uncut area, and the tools that would cut it."""
     return await _submit(request, response, "zones", principal, key)
 
 
