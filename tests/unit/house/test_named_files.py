@@ -1,4 +1,4 @@
-"""Every file of the project that a page, a docstring, a comment or the page's source names exists."""
+"""Every file and folder of the project that a page, a docstring, a comment or the page's source names exists."""
 
 from __future__ import annotations
 
@@ -12,8 +12,11 @@ import pytest
 
 from tests.source_tree import PACKAGES, ROOT
 
+TOPS = (*PACKAGES, "tests", "benchmarks", "docs", "web")
 ENDINGS = "py|md|ts|mjs|html|yaml|toml|bib|json|sh|lock"
 NAMED = re.compile(rf"(?<![\w/.<*{{-])((?:\.\./)*(?:[\w-]+/)+[\w.-]+\.(?:{ENDINGS}))(?![\w/])")
+FOLDER = re.compile(rf"(?<![\w/.<*{{:~$-])((?:{'|'.join(TOPS)})/(?:[\w.-]+/)*)(?![\w/.<*{{$-])")
+"""A folder that begins with one of the top level and ends in a slash."""
 BARE = re.compile(r"`{1,2}([a-z_0-9]+\.py)\b")
 MADE = re.compile(r"^(?:out|data|build|dist|tmp|\.venv|service/page|web/node_modules)/|(?:^|/)(?:NAME|[A-Z]+)\.|://")
 """What a run makes, and names that stand for many."""
@@ -53,6 +56,7 @@ def test_named_files_exist(path: Path, text: str) -> None:
     gone = [n for n in NAMED.findall(text) if not MADE.search(n) and not n.startswith(NOT_OURS)
             and not exists(n, path)]
     gone += [n for n in BARE.findall(text) if n not in FILES]
+    gone += [n for n in FOLDER.findall(text) if not MADE.search(n) and not exists(n, path)]
     assert not gone, f"{path.relative_to(ROOT)} names files that are not there: {sorted(set(gone))}"
 
 
@@ -60,3 +64,6 @@ def test_the_rule_notices_a_file_that_is_gone() -> None:
     text = "see `geometry/no_such.py: f` and zones/model.py."
     assert NAMED.findall(text) == ["geometry/no_such.py", "zones/model.py"]
     assert not exists("geometry/no_such.py", ROOT / "README.md") and exists("zones/model.py", ROOT / "README.md")
+    text = "| a route | `service/routes/` | in `verify/gcode/dialects/`, tests/golden/; geometry/kernels/cache.py"
+    assert FOLDER.findall(text) == ["service/routes/", "verify/gcode/dialects/", "tests/golden/"]
+    assert not exists("service/routes/", ROOT / "README.md") and exists("verify/gcode/", ROOT / "README.md")

@@ -1,0 +1,30 @@
+"""Every kind of finding has its place in the documentation."""
+
+from __future__ import annotations
+
+import re
+
+from tests.source_tree import ROOT
+from verify.model import FindingKind
+
+OF_THE_JOB = {"coverage", "nothing_cut"}
+"""Kinds that ``service/report/report.py`` makes for the whole job."""
+ALL = {*map(str, FindingKind), *OF_THE_JOB}
+
+
+def test_verify_has_a_row_for_each_kind_in_order_of_gravity() -> None:
+    text = (ROOT / "docs" / "verify.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `([a-z_]+)` \|", text[:text.index("## What it prints")], re.MULTILINE)
+    assert rows[:len(FindingKind)] == list(map(str, FindingKind))
+    assert set(rows) == ALL and len(rows) == len(ALL)
+
+
+def test_the_glossary_names_each_kind() -> None:
+    text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+    (row,) = re.findall(r"^\| kind of finding \| (.*) \|$", text, re.MULTILINE)
+    assert set(re.findall(r"`([a-z_]+)`", row)) == ALL
+
+
+def test_the_report_makes_the_kinds_of_the_whole_job() -> None:
+    source = (ROOT / "service" / "report" / "report.py").read_text(encoding="utf-8")
+    assert set(re.findall(r'_of_job\("([a-z_]+)"', source)) == OF_THE_JOB
