@@ -21,6 +21,7 @@ from toolpath.tool_deflection import DeflectionEstimate
 from toolpath.workingsteps import TrajectoryKind, Workingstep
 from verify.model import Proof
 from zones.plan_view.regions import Labels
+from zones.remainder.reasons import Reason
 from zones.remainder.remainder import RemainderEntry, explain
 from zones.zoning.zones import ZoneArea, is_open
 
@@ -183,7 +184,7 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
     area = dense.area
     total, done = float(area.sum()), float(area[proved].sum())
     # area that a tool of the setup can touch: proved, with a zone, or left by the passes although a tool reaches it
-    reach = float(area[proved | (zone > 0)].sum()) + sum(i.area for i in items if i.reason == "pass")
+    reach = float(area[proved | (zone > 0)].sum()) + sum(i.area for i in items if i.reason == Reason.PASS)
     coverage = done / total if total > 0 else 0.0
     remainder = _remainder(ready, items)
     unmet = _unmet(ready, made, coverage, remainder)

@@ -17,6 +17,7 @@ from zones.reach.access_reach import Reach
 from zones.reach.access_view import View
 from zones.reach.tip_field import TipField, touchable
 from zones.remainder.obstructions import in_sight
+from zones.remainder.reasons import ProposalVerdict
 from zones.remainder.tool_proposal import ToolProposal, ToolToAdd, propose
 from zones.remainder.tool_requirements import ToolRequirement
 from zones.zoning.zones import LEAST_ZONE_MM2, Zoning, build_zones
@@ -152,9 +153,9 @@ def _stays(proposals: Sequence[tuple[View, NDArray[np.int64], ToolProposal]], ar
     stays: dict[str, float] = {}
     for _, mine, proposal in proposals:
         rows = mine[proposal.rows]
-        why = np.where(proposal.why == "taken", "too little", proposal.why)
+        why = np.where(proposal.why == ProposalVerdict.TAKEN, ProposalVerdict.TOO_LITTLE, proposal.why)
         weight = float(area[mine].sum()) / max(float(area[rows].sum()), 1e-300)
-        for reason in sorted(set(why[~taken[rows]].tolist())):
+        for reason in sorted(set(map(str, why[~taken[rows]]))):
             stays[reason] = stays.get(reason, 0.0) + weight * float(area[rows[~taken[rows] & (why == reason)]].sum())
     whole = sum(stays.values())
     return {k: v * total / whole for k, v in sorted(stays.items())} if whole > 0.0 else {}

@@ -14,6 +14,7 @@ from service.api.app import create_app
 from service.api.openapi import SECTION, as_yaml
 from service.errors import ERROR_TABLE
 from verify.model import FindingKind
+from zones.remainder.reasons import ProposalVerdict, Reason
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -111,6 +112,14 @@ def test_the_description_of_findings_names_every_kind(document):
     text = document["components"]["schemas"]["Report"]["properties"]["findings"]["description"]
     kinds = text.split("kind: ")[1].split(". message")[0]
     assert set(re.findall("[a-z_]+", kinds)) >= {*FindingKind, "nothing_cut", "coverage"}
+
+
+def test_the_descriptions_of_reasons_name_every_reason(document):
+    schemas = document["components"]["schemas"]
+    reason = schemas["Remainder"]["properties"]["reason"]["description"]
+    assert not [r for r in Reason if not re.search(rf"(^|[ ,.]){r}[:,]", reason)]
+    stays = schemas["Proposal"]["properties"]["stays_mm2"]["description"]
+    assert not [r for r in (ProposalVerdict.SLENDER, ProposalVerdict.TOO_LITTLE) if f"{r}:" not in stays]
 
 
 def test_every_field_says_its_unit_or_has_a_description(document):

@@ -29,13 +29,14 @@ from zones.reach.access_view import View
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import TipField
 from zones.remainder.obstructions import above, covered
+from zones.remainder.reasons import Reason
 from zones.remainder.tool_catalogue import MAX_SLENDERNESS
 from zones.remainder.tool_requirements import DOES, CuttingPart, ToolRequirement
 from zones.zoning.zones import LEAST_ZONE_MM2
 
 MAX_SAMPLES = 6000  # samples to check one by one; their areas are scaled so that they represent all
-# degree of obstruction of a sample along an access direction, least first; 'undercut ...' comes last
-GRAVITY = {"pass": 0, "holder": 1, "shank": 2, "fixture": 3, "gap": 4, "corner": 5, "sharp corner": 6}
+GRAVITY = {reason: degree for degree, reason in enumerate(Reason) if reason is not Reason.UNDERCUT}
+"""Degree of obstruction of a sample along an access direction; 'undercut', with or without a connection, is worse."""
 NO_PASS, TOO_LITTLE = "no pass gets there", "less than a zone is made of"
 
 
@@ -44,8 +45,7 @@ class RemainderEntry:
     """Area of one region that remains for one reason, and the one tool that reaches it.
 
     faces        : face numbers; area : mm²
-    reason       : 'undercut', 'undercut behind connection C2', 'fixture', 'shank', 'holder', 'gap', 'corner',
-                   'sharp corner' or 'pass'
+    reason       : a ``Reason``, or 'undercut behind connection C2'
     would_need   : the tool or other measure that reaches it; empty where none does
     at           : a point of it, mm
     tool_at_hand : id of the tool of the setup that touches it ('pass'), or touches it without the fixtures; else ''
@@ -124,10 +124,10 @@ def explain(samples: SurfaceSamples, labels: Labels, views: Sequence[View], deco
     why = _of_views(few, requirements, decomposition)
     if given_up is not None:
         lost = given_up[examined]
-        why.left[lost & (why.reason == "pass")] = NO_PASS
-        lost &= np.isin(why.reason, ("gap", "corner", "sharp corner"))
+        why.left[lost & (why.reason == Reason.PASS)] = NO_PASS
+        lost &= np.isin(why.reason, (Reason.GAP, Reason.CORNER, Reason.SHARP_CORNER))
         blank = _Why.blank(len(few), 0)
-        blank.reason[:], blank.left[:] = "pass", NO_PASS
+        blank.reason[:], blank.left[:] = Reason.PASS, NO_PASS
         why.take(blank, np.flatnonzero(lost))
     groups: dict[tuple[str, ...], list[int]] = {}
     for row in range(len(few)):
@@ -150,9 +150,9 @@ def _needs(few: SurfaceSamples, why: _Why, rows: NDArray[np.int64],
     reason, tool, at = str(why.reason[rows[0]]), str(why.tool[rows[0]]), int(why.view[rows[0]])
     requirement = requirements[at]
     access: dict[str, object] = {"access": requirement.view.id} if len(requirements) > 1 else {}
-    if reason.startswith("undercut"):
+    if reason.startswith(Reason.UNDERCUT):
         yield rows, {"kind": "other access"}
-    elif reason == "fixture":
+    elif reason == Reason.FIXTURE:
         yield rows, {"kind": "other clamping", **access}
     elif why.cutter[rows[0]] is None or tool:
         yield rows, {}
@@ -236,24 +236,25 @@ def _reasons(few: SurfaceSamples, requirement: ToolRequirement, decomposition: D
     roof = above(few, view.tree)
     for k in np.flatnonzero((few.normals[:, 2] <= SEEN) | (roof >= 0)):
         c = owner.get(int(part.mesh.face_ids[roof[k]])) if roof[k] >= 0 else None
-        reason[k] = f"undercut behind connection {c}" if c and c != owner.get(int(few.face[k])) else "undercut"
+        behind = bool(c) and c != owner.get(int(few.face[k]))
+        reason[k] = f"{Reason.UNDERCUT} behind connection {c}" if behind else Reason.UNDERCUT
     if requirement.clamped:
-        reason[covered(few, view.obstacles) & (reason == "")] = "fixture"
-    _at_hand(few, view.fields, requirement, out, "pass")
-    out.left[reason == "pass"] = TOO_LITTLE
+        reason[covered(few, view.obstacles) & (reason == "")] = Reason.FIXTURE
+    _at_hand(few, view.fields, requirement, out, Reason.PASS)
+    out.left[reason == Reason.PASS] = TOO_LITTLE
     if requirement.clamped and bool((reason == "").any()):  # these limits are dear
-        _at_hand(few, requirement.unclamped, requirement, out, "fixture")
+        _at_hand(few, requirement.unclamped, requirement, out, Reason.FIXTURE)
     left = np.flatnonzero(reason == "")
     wants = requirement.wants(few.subset(left))
     reason[left], out.cutter[left], out.slenderness[left] = wants.reason, wants.cutter, wants.slenderness
-    reason[reason == ""] = "sharp corner"
+    reason[reason == ""] = Reason.SHARP_CORNER
     return out
 
 
 def _at_hand(few: SurfaceSamples, fields: Mapping[str, TipField], requirement: ToolRequirement, out: _Why,
-             word: str) -> None:
-    """Set ``word`` as the reason of open samples that one of these tools touches, and note the stoutest such tool."""
+             reason: Reason) -> None:
+    """Set ``reason`` as the reason of open samples that one of these tools touches, and note the stoutest such tool."""
     left = np.flatnonzero(out.reason == "")
     tool = requirement.touched_by(few.subset(left), fields)
     out.tool[left] = tool
-    out.reason[left[tool != ""]] = word
+    out.reason[left[tool != ""]] = reason

@@ -19,6 +19,7 @@ from geometry.mesh import F64
 from geometry.sampling import SurfaceSamples
 from geometry.tool_body import HolderFrustum, ToolBody
 from zones.remainder.obstructions import covered, in_sight
+from zones.remainder.reasons import ProposalVerdict, Reason
 from zones.remainder.tool_catalogue import BULL_CORNER, DIAMETERS, MAX_SLENDERNESS, nearest
 from zones.remainder.tool_requirements import CuttingPart, ToolRequirement
 from zones.zoning.zones import LEAST_ZONE_MM2
@@ -61,10 +62,9 @@ class ToolProposal:
 
     tools : stoutest first
     rows  : (n,) int64, index of the samples that were examined
-    why   : (n,) str of each of these: 'taken' where a tool of the list takes it, else the reason why it remains:
-            'undercut', 'pass' (a tool at hand touches it), 'slender' (only a neck longer than the limit in diameters
-            reaches it), 'sharp corner' (no round tool), 'too little' (not worth a tool), 'fixture' (a fixture lies
-            above it, or blocks the tools at hand that touch it on the bare part)
+    why   : (n,) object, of each of these: TAKEN, SLENDER or TOO_LITTLE of ``ProposalVerdict``, or a ``Reason``:
+            UNDERCUT, PASS (a tool at hand touches it), SHARP_CORNER (no round tool) or FIXTURE (a fixture lies above
+            it, or blocks the tools at hand that touch it on the bare part)
     """
 
     tools: tuple[ToolToAdd, ...]
@@ -107,16 +107,16 @@ def propose(samples: SurfaceSamples, requirement: ToolRequirement) -> ToolPropos
     left = np.flatnonzero(why == "")
     candidates, why[left] = _candidates(few.subset(left), requirement)
     tools = []
-    for c in sorted(_fewest(candidates, np.where(why[left] == "tool", area[left], 0.0)),
+    for c in sorted(_fewest(candidates, np.where(why[left] == ProposalVerdict.TOOL, area[left], 0.0)),
                     key=lambda c: (-c.body.diameter, c.body.neck_length)):
-        mine = why[left[c.rows]] == "tool"
+        mine = why[left[c.rows]] == ProposalVerdict.TOOL
         if mine.any():
-            why[left[c.rows[mine]]] = "taken"
+            why[left[c.rows[mine]]] = ProposalVerdict.TAKEN
             tools.append(_named(c, c.need[mine]))
-    why[why == "tool"] = "too little"
+    why[why == ProposalVerdict.TOOL] = ProposalVerdict.TOO_LITTLE
     if requirement.clamped:
-        rest = np.flatnonzero(np.isin(why, ("slender", "sharp corner")))
-        why[rest[requirement.touched_by(few.subset(rest), requirement.unclamped) != ""]] = "fixture"
+        rest = np.flatnonzero(np.isin(why, (ProposalVerdict.SLENDER, Reason.SHARP_CORNER)))
+        why[rest[requirement.touched_by(few.subset(rest), requirement.unclamped) != ""]] = Reason.FIXTURE
     return ToolProposal(tuple(tools), rows, why)
 
 
@@ -125,10 +125,10 @@ def _known(few: SurfaceSamples, requirement: ToolRequirement) -> NDArray[np.obje
     view = requirement.view
     why = np.full(len(few), "", dtype=object)
     if requirement.clamped:
-        why[covered(few, view.obstacles)] = "fixture"
-    why[~in_sight(few, view.tree)] = "undercut"
+        why[covered(few, view.obstacles)] = Reason.FIXTURE
+    why[~in_sight(few, view.tree)] = Reason.UNDERCUT
     open_to = np.flatnonzero(why == "")
-    why[open_to[requirement.touched_by(few.subset(open_to), view.fields) != ""]] = "pass"
+    why[open_to[requirement.touched_by(few.subset(open_to), view.fields) != ""]] = Reason.PASS
     return why
 
 
@@ -147,15 +147,15 @@ def _cutters(requirement: ToolRequirement) -> list[CuttingPart]:
 
 
 def _candidates(samples: SurfaceSamples, requirement: ToolRequirement) -> tuple[list[_Candidate], NDArray[np.object_]]:
-    """Every tool that takes some of the samples, and for each sample 'tool', 'slender' or 'sharp corner'."""
-    why = np.full(len(samples), "sharp corner", dtype=object)
+    """Every tool that takes some of the samples, and for each sample TOOL, SLENDER or SHARP_CORNER."""
+    why = np.full(len(samples), Reason.SHARP_CORNER, dtype=object)
     out: list[_Candidate] = []
     for cutter in _cutters(requirement):
         rows, tips = requirement.touches(cutter, samples)
         need = requirement.need(cutter, tips)
         short = cutter.sold_on(need[:, 0])
-        why[rows[~short & (why[rows] != "tool")]] = "slender"
-        why[rows[short]] = "tool"
+        why[rows[~short & (why[rows] != ProposalVerdict.TOOL)]] = ProposalVerdict.SLENDER
+        why[rows[short]] = ProposalVerdict.TOOL
         out.extend(_levels(cutter, requirement.body(cutter), rows[short], need[short]))
     return out, why
 

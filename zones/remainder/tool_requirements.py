@@ -23,6 +23,7 @@ from zones.reach.access_view import View
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField, touchable
 from zones.remainder.obstructions import over_the_part
+from zones.remainder.reasons import Reason
 from zones.remainder.tool_catalogue import DIAMETERS, MAX_SLENDERNESS, Lengths, catalogue, nearest, sold
 
 ALL_BUT = 0.98  # of the samples: share that a named tool is long enough for; the rest may need a neck twice as long
@@ -46,7 +47,7 @@ class CuttingPart:
 
 @dataclass(frozen=True, eq=False)
 class CutterNeeds:
-    """For n samples: reason (object, '' where unknown), stoutest CuttingPart (object, None), neck in diameters (n,)."""
+    """For n samples: Reason (object, '' where unknown), stoutest CuttingPart (object, None), neck in diameters (n,)."""
 
     reason: NDArray[np.object_]
     cutter: NDArray[np.object_]
@@ -124,7 +125,7 @@ class ToolRequirement:
             out.reason[rows] = _stopped_by(field, tips)
         ahead = np.asarray(first_hits(self.view.obstacles, samples.points, samples.normals, 1e-3, 1e6)[0])
         thinnest = min(self.tools.values(), key=lambda t: t.diameter)
-        reason = np.where(ahead < thinnest.diameter * GAP, "gap", "corner").astype(object)
+        reason = np.where(ahead < thinnest.diameter * GAP, Reason.GAP, Reason.CORNER).astype(object)
         for d in (thinnest.diameter, *(d for d in DIAMETERS if d < thinnest.diameter and 0.5 * d > self.cusp)):
             for corner in (d / 2, 0.0):
                 left = np.flatnonzero(out.reason == "")
@@ -172,7 +173,7 @@ class ToolRequirement:
 
 
 def _stopped_by(field: TipField, tips: F64) -> NDArray[np.object_]:
-    """'shank' or 'holder', the body of a tool at hand that lacks more clearance at tips (k, 3), mm.
+    """Reason.SHANK or Reason.HOLDER, the body of a tool at hand that lacks more clearance at tips (k, 3), mm.
 
     The search covers a cell diagonal around, as the look-up does.
     """
@@ -180,4 +181,4 @@ def _stopped_by(field: TipField, tips: F64) -> NDArray[np.object_]:
     for d in field.discs:
         limit = field.disc_limit(d, drop_tips(field.tree, tips[:, :2], field.disc_radius(d, 1.0), 0.0))
         short[d.name] = np.maximum(short[d.name], limit - tips[:, 2] + 2 * LEVEL_TOLERANCE)
-    return np.where(short["holder"] >= short["shank"], "holder", "shank").astype(object)
+    return np.where(short["holder"] >= short["shank"], Reason.HOLDER, Reason.SHANK).astype(object)

@@ -1,4 +1,4 @@
-"""Every kind of finding has its place in the documentation."""
+"""Every kind of finding and every reason of the remainder has its place in the documentation."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 
 from tests.source_tree import ROOT
 from verify.model import FindingKind
+from zones.remainder.reasons import Reason
 
 OF_THE_JOB = {"coverage", "nothing_cut"}
 """Kinds that ``service/report/report.py`` makes for the whole job."""
@@ -28,3 +29,10 @@ def test_the_glossary_names_each_kind() -> None:
 def test_the_report_makes_the_kinds_of_the_whole_job() -> None:
     source = (ROOT / "service" / "report" / "report.py").read_text(encoding="utf-8")
     assert set(re.findall(r'_of_job\("([a-z_]+)"', source)) == OF_THE_JOB
+
+
+def test_the_glossary_names_each_reason() -> None:
+    text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+    (row,) = re.findall(r"^\| reason \| (.*) \|$", text, re.MULTILINE)
+    words = re.split(r", | or | \(", row.split(": ")[1])
+    assert set(words[:-1]) == set(map(str, Reason))
