@@ -35,7 +35,7 @@ from zones.remainder.tool_requirements import DOES, CuttingPart, ToolRequirement
 from zones.zoning.zones import LEAST_ZONE_MM2
 
 MAX_SAMPLES = 6000  # samples to check one by one; their areas are scaled so that they represent all
-GRAVITY = {reason: degree for degree, reason in enumerate(Reason) if reason is not Reason.UNDERCUT}
+GRAVITY: dict[str, int] = {reason: degree for degree, reason in enumerate(Reason) if reason is not Reason.UNDERCUT}
 """Degree of obstruction of a sample along an access direction; 'undercut', with or without a connection, is worse."""
 NO_PASS, TOO_LITTLE = "no pass gets there", "less than a zone is made of"
 
