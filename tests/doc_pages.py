@@ -12,8 +12,9 @@ from pathlib import Path
 from tests.source_tree import ROOT
 
 LEFT_OUT = {"CHANGELOG.md": "its entries are about earlier releases"}
-PAGES = sorted(path for pattern in ("*.md", ".github/**/*.md", "docs/**/*.md", "examples/**/README*", "tests/**/README*")
-               for path in ROOT.glob(pattern) if path.name not in LEFT_OUT and "node_modules" not in path.parts)
+PLACES = ("*.md", ".github/**/*.md", "docs/**/*.md", "examples/**/README*", "tests/**/README*")
+PAGES = sorted(path for pattern in PLACES for path in ROOT.glob(pattern)
+               if path.name not in LEFT_OUT and not {"node_modules", "target"} & set(path.parts))
 
 FENCE = re.compile(r"^ {0,3}```[^\S\n]*([^\s`]*)[^\S\n]*([^\n`]*)\n(.*?)^ {0,3}```[^\S\n]*$", re.MULTILINE | re.DOTALL)
 SPAN = re.compile(r"(?<!`)(`+)(?!`)((?:(?!\n\s*\n).)+?)(?<!`)\1(?!`)", re.DOTALL)
