@@ -37,13 +37,18 @@ class Fence:
 
 @dataclass(frozen=True)
 class Command:
-    """One command line as a page has it, with the output that a transcript shows."""
+    """One command line as a page has it, with the output that a transcript shows.
+
+    inline : it stands in running text
+    unit   : it stands in a unit of systemd
+    """
 
     page: Path
     line: int
     text: str
     output: str = ""
     inline: bool = False
+    unit: bool = False
 
     def __str__(self) -> str:
         return f"{self.page.relative_to(ROOT)}:{self.line}: {self.text}"
@@ -80,7 +85,7 @@ def lines_of(fence: Fence) -> list[Command]:
         k += 1
         if fence.language == "ini":
             if line.startswith("ExecStart="):
-                out.append(Command(fence.page, at, line.partition("=")[2].removeprefix("/opt/zonemill/"), inline=True))
+                out.append(Command(fence.page, at, line.partition("=")[2].removeprefix("/opt/zonemill/"), unit=True))
             continue
         if fence.language == "console":
             if not line.startswith("$ "):

@@ -74,6 +74,8 @@ NOT_IN_CI = {
     "serve": ("run as it stands by tests/unit/house/test_doc_commands.py", {}),
     "test-cov": ("the everyday tests once more, with the figures of pytest-cov",
                  {"pyproject.toml": ("[tool.coverage.run]", "pytest-cov")}),
+    "limits": ("wants an idle machine; the everyday tests run the same with wider limits",
+               {"tests/time_limits.py": ("ZONEMILL_LIMITS",)}),
     "soak": ("takes longer than CI waits; the same tests run once, shorter, in the slow set",
              {"tests/contract/test_service_faults.py": ("pytest.mark.soak", "pytest.mark.slow")}),
     "golden": ("rewrites the expected files; the everyday tests compare them",
@@ -86,7 +88,7 @@ NOT_IN_CI = {
 }
 """Targets of make that CI does not call, by the reason and texts of our files that bear it out."""
 
-TOOLS = ("cat", "cd", "curl", "export", "jq", "openssl", "sha256sum", "sqlite3", "openapi-python-client")
+TOOLS = ("cat", "cd", "curl", "export", "jq", "openssl", "sha256sum", "sqlite3")
 """Programs that are run where a page has them."""
 ABROAD = ("apt-get", "bash", "chrt", "dask", "docker", "git", "go", "kubectl", "mvn", "node", "npm", "npx", "pip",
           "pip3", "pre-commit", "pytest", "ruff", "mypy", "systemctl", "uv", "sh", *TOOLS)
@@ -159,13 +161,16 @@ def _way(part: Simple, command: Command) -> Way:
         raise UnknownCommand(f"{command}: a command in a fence works as it stands; write .venv/bin/{words[0]}")
     if name == "zonemill":
         verb, complete = parsed(part)
+        if command.unit:
+            return Way.RULE  # no test machine has the user and the folder of a unit; the page runs the same beside it
         return Way.RULE if not complete else Way.EVERYDAY if verb in QUICK or verb.startswith("--") else Way.SLOW
     if name == "make":
         return Way.SLOW if words[1:] in (["demo"], ["serve"]) and not command.inline else Way.RULE
-    if name == "python" and words[1] == "-c" or name == "python" and not words[1].startswith("-") and (
-            not SCRIPT.fullmatch(words[1])):
+    if name == "python" and words[1] == "-c":
         return Way.EVERYDAY
-    if name == "python" or script_of(part):
+    if name == "openapi-python-client" or name == "python" and re.fullmatch(r"\w+\.py", words[1]):
+        return Way.SLOW  # tests/contract/test_openapi.py generates and uses this client every day
+    if script_of(part) or words[1:3] == ["-m", "pytest"]:
         return Way.RULE
     if name in TOOLS or name == "export":
         return Way.EVERYDAY
@@ -176,9 +181,15 @@ def _way(part: Simple, command: Command) -> Way:
     raise UnknownCommand(f"{command}: nothing runs {words[0]}; add a rule or a reason to tests/doc_rules.py")
 
 
+@cache
+def zonemill() -> Any:
+    """The command line, with its commands below it."""
+    return typer.main.get_command(app)
+
+
 def fragment_of_zonemill(words: list[str]) -> bool:
     """Whether the words are a command of zonemill without its name, such as ``plan --mesh-step``."""
-    return words[0] in typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    return words[0] in zonemill().commands
 
 
 def parsed(part: Simple) -> tuple[str, bool]:
@@ -189,7 +200,7 @@ def parsed(part: Simple) -> tuple[str, bool]:
     UnknownCommand
         There is no such command, option or value.
     """
-    command: Any = typer.main.get_command(app)
+    command = zonemill()
     words, verb = part.words[1:], []
     while hasattr(command, "commands") and words and not words[0].startswith("-"):
         if words[0] not in command.commands:
@@ -205,7 +216,7 @@ def parsed(part: Simple) -> tuple[str, bool]:
     try:
         command.make_context("zonemill", list(words))
     except UsageError as error:
-        if type(error).__name__ == "MissingParameter":
+        if type(error).__name__ in ("MissingParameter", "BadOptionUsage"):
             return " ".join(verb), False
         raise UnknownCommand(f"zonemill {' '.join(part.words[1:])}: {error.format_message()}") from None
     return " ".join(verb), True
@@ -219,7 +230,7 @@ def script_of(part: Simple) -> tuple[Path, list[str]] | None:
     words = part.words[1:] if part.program in ("python", "python3") else part.words
     if words[:1] == ["-m"] and len(words) > 1:
         path = ROOT / Path(*words[1].split(".")).with_suffix(".py")
-        return (path, words[2:]) if words[1] != "pytest" else None
+        return (path, words[2:]) if (ROOT / words[1].partition(".")[0]).is_dir() else None
     if words and SCRIPT.fullmatch(words[0]):
         return ROOT / words[0], words[1:]
     if words and re.fullmatch(r"\w+\.py", words[0]):
@@ -330,7 +341,7 @@ def lone_options(page: Path) -> list[Command]:
 @cache
 def options_of_zonemill() -> frozenset[str]:
     """Every option of every command of zonemill."""
-    todo: list[Any] = [typer.main.get_command(app)]
+    todo = [zonemill()]
     out = {"--help"}
     while todo:
         command = todo.pop()

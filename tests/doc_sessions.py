@@ -143,7 +143,8 @@ def _open(url: str, key: str = ""):  # type: ignore[no-untyped-def]
 def compare(command: Command, said: str) -> None:
     """Hold a transcript against what came: its status, its keys, and whether it is a refusal."""
     refused = "urn:zonemill:problem"
-    assert (refused in said) == (refused in command.output), f"{command}\n{said}"
+    asks = any(part.program == "curl" or part.program.endswith(".sh") for part in simple(command.text))
+    assert not asks or (refused in said) == (refused in command.output), f"{command}\n{said}"
     first = re.match(r"HTTP/1\.1 \d+", command.output)
     assert not first or first[0] in said, f"{command}\n{said}"
     gone = [k for k in re.findall(r'"(\w+)":', command.output) if f'"{k}":' not in said]
