@@ -403,10 +403,13 @@ def reader(desk: Path, given: Path) -> Iterator[Session]:
     session.close()
 
 
+PLAN = ".venv/bin/zonemill plan part.step --setup setup.json --out out/part"
+
+
 @pytest.fixture(scope="module")
 def proved(reader: Session) -> Path:
     """Folder with the files of the small part, planned and proved by the command line."""
-    reader.run(Command(ROOT / "README.md", 0, ".venv/bin/zonemill plan part.step --setup setup.json --out out/part"))
+    reader.run(Command(ROOT / "README.md", 0, PLAN))
     return reader.checkout / "out" / "part"
 
 
@@ -418,6 +421,8 @@ def test_long_commands_in_running_text(text: str, reader: Session, proved: Path)
     assert proved.is_dir()
     command = Command(INLINE[text].page, INLINE[text].line, f".venv/bin/{ready(text)}")
     want(command)
+    if command.text == PLAN:
+        return  # that is how they were proved
     if serves(command):
         reader.start(command)
         reader.stop()
