@@ -7,6 +7,7 @@ page of another site sends.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import socket
 import webbrowser
@@ -133,4 +134,5 @@ def show_folder(folder: Path, port: int, *, open_browser: bool) -> None:
     say(f"{url} until Ctrl-C")
     if open_browser:
         webbrowser.open(url)
-    uvicorn.Server(uvicorn.Config(app, log_level="error", access_log=False)).run(sockets=[listener])
+    with contextlib.suppress(KeyboardInterrupt):  # uvicorn raises it again once it has stopped
+        uvicorn.Server(uvicorn.Config(app, log_level="error", access_log=False)).run(sockets=[listener])
