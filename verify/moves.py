@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from geometry.errors import VerificationError
 from geometry.mesh import F64, I32
 from geometry.tool_body import ToolBody
+from verify.kernels.tables import MoveArrays
 from verify.tool_axes import ToolAxes
 
 Progress = Callable[[float], None]
@@ -35,6 +36,11 @@ class Moves:
 
     def __len__(self) -> int:
         return len(self.start)
+
+    @property
+    def arrays(self) -> MoveArrays:
+        """The moves for kernels, without axes."""
+        return MoveArrays(np.ascontiguousarray(self.start), np.ascontiguousarray(self.end), self.feed, self.tool)
 
     def only(self, chosen: NDArray[np.bool_]) -> Moves:
         """The moves where ``chosen`` (m,) bool is true."""

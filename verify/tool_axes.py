@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from verify.kernels.engaged import carried_frames
+from verify.kernels.tables import AxisArrays
 
 STILL = 1e-9  # rad: an axis that turns by less stands still; that is 1e-7 mm at 100 mm
 
@@ -51,6 +52,10 @@ class ToolAxes:
         """(m, 3) float64, unit, setup frame: axes half way along the great circle [Shoemake1985]."""
         half = 0.5 * self.angle[:, None]
         return np.asarray(np.cos(half) * self.axis + np.sin(half) * np.cross(self.about, self.axis))
+
+    def arrays(self, bow: float) -> AxisArrays:
+        """The axes for kernels. bow : mm, error allowed where the tool turns."""
+        return AxisArrays(self.axis, self.about, self.angle, bow)
 
     def only(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> ToolAxes:
         """The axes where ``chosen``, (m,) bool, is true, or those of its rows, (k,) int64, index."""

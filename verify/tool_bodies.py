@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from verify.kernels.stock import HOLDER, NECK, SHANK
+from verify.kernels.tables import ToolArrays
 from verify.model import ProofSetup
 
 NO_HOLDER = 200.0  # mm, length of shank above the stickout where the setup names no holder
@@ -41,6 +42,14 @@ class Bodies:
                 rows.append((z0, z1, r0 + clearance, r1 + clearance, clearance, part))
             first.append(len(rows))
         return cls(np.array(rows, dtype=np.float64).reshape(-1, 6), np.array(first, dtype=np.int64))
+
+    def arrays(self, cutters: F64, ends: F64) -> ToolArrays:
+        """The tools for kernels.
+
+        cutters : (k, 3) float64, mm, as ``cutter_table``
+        ends    : (k,) float64, mm, as ``end_radii``
+        """
+        return ToolArrays(cutters, ends, self.reach(cutters), self.rows, self.first)
 
     def reach(self, cutters: F64) -> F64:
         """Largest distance of each assembly from its tip.

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
+from zones.kernels.lattice import LatticeFrame
 
 
 def lattice_step(tool: ToolBody) -> float:
@@ -51,6 +52,11 @@ class Lattice:
         lower = np.floor((bounds[0, :2] - margin) / step)
         nx, ny = (np.ceil((bounds[1, :2] + margin) / step) - lower + 1).astype(int).tolist()
         return cls(float(lower[0] * step), float(lower[1] * step), float(step), nx, ny)
+
+    @property
+    def frame(self) -> LatticeFrame:
+        """Places of the nodes, for kernels."""
+        return LatticeFrame(self.x0, self.y0, self.step)
 
     def within(self, other: Lattice) -> tuple[slice, slice] | None:
         """Rows and columns of this lattice in another one of the same multiples; None where some are missing there."""

@@ -8,7 +8,7 @@ import pytest
 from geometry.tool_body import HolderFrustum, ToolBody
 from tests.oracle.turning_twin import random_moves, seen, signed
 from verify.kernels.clash import TOUCHING, is_lift
-from verify.kernels.frustum import contact
+from verify.kernels.frustum import Frustum, contact
 from verify.kernels.stock import CUTTER, FIXTURE, HOLDER, NECK, SHANK
 from verify.material.collision import FIXTURE_SPACING, MAX_FIXTURE_POINTS, fixture_points, run_clashes
 from verify.model import ProofSetup
@@ -162,7 +162,8 @@ def test_the_depth_in_one_body_is_the_deepest_of_many_places(grow):
         body = np.array([2.0, 6.0, 3.0 + 0.3, 3.0 + 1.5 * (case % 2) + 0.3, 0.3, SHANK])
         d = rng.normal(size=3) * np.array([[2, 2, 2], [2, 2, 0], [0, 0, 2], [0, 0, 0]][case % 4])
         q = rng.uniform([-5, -5, 0], [5, 5, 8])
-        got = contact(*q, *d, 2.0, 6.0, body[2] + grow, body[3] + grow, body[4] + grow, TOUCHING, 0.0, False)
+        grown = Frustum(2.0, 6.0, body[2] + grow, body[3] + grow)
+        got = contact(*q, *d, grown, body[4] + grow, TOUCHING, 0.0, False)
         w = q - s[:, None] * d
         rho, h = np.hypot(w[:, 0], w[:, 1])[None], w[:, 2][None]
         least, most = (float(body_depth(rho, h, body, grow, TOUCHING, off)[0]) for off in (-1e-6, 1e-3))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from geometry.kernels.cutter_sizes import CutterSizes
 from verify.kernels.rays import new_left
 from verify.kernels.sweep import _disc_nearest
 
@@ -28,5 +29,5 @@ def test_a_bull_nose_whose_flat_end_just_passes_over_leaves_nothing():
     """A ray 0.8 µm inside the flat of a bull nose (R 2, r 0.5) that passes 6.6 mm of it; 0.018 mm were told as left."""
     d = (0.7568586214809795, 6.532449095636578, 2.598069071380049e-06)
     q = (0.8645836449266626, 4.818492435225797, -6.051286743108397e-06)
-    left = new_left(*q, 0.0, 0.0, 1.0, *d, d[0] ** 2 + d[1] ** 2, 2.0, 0.5, 4.0, 0.05)
+    left = new_left(*q, 0.0, 0.0, 1.0, *d, d[0] ** 2 + d[1] ** 2, CutterSizes(2.0, 0.5, 4.0), 0.05)
     assert 0.0 <= left < 1e-5

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from verify.kernels.frustum import contact, contact_of_ball, no_deeper, overlap, penetration
+from verify.kernels.frustum import Frustum, contact, contact_of_ball, no_deeper, overlap, penetration
 
 Z0, Z1 = 2.0, 6.0
 STEPS = np.linspace(0, 1, 4001)
@@ -40,8 +40,8 @@ def test_closed_forms_are_the_deepest_of_many_standing_ones(r0, r1, column):
             continue
         met += 1
         off = 0.5 / 4000 * np.linalg.norm(d) * (1.0 + abs(r1 - r0) / (Z1 - Z0)) + 1e-9
-        assert aside - 1e-9 <= overlap(*w, *d, Z0, Z1, r0, r1, column) <= aside + 2 * off
-        got = penetration(*w, *d, Z0, Z1, r0, r1, column)
+        assert aside - 1e-9 <= overlap(*w, *d, Frustum(Z0, Z1, r0, r1), column) <= aside + 2 * off
+        got = penetration(*w, *d, Frustum(Z0, Z1, r0, r1), column)
         assert max(lesser, 0.0) - 1e-9 <= got <= max(lesser, 0.0) + 2 * off
     assert met > 150
 
@@ -53,8 +53,8 @@ def test_a_place_that_is_passed_over_is_no_deeper_than_what_is_known(r0, r1):
     passed = 0
     for w, d in moves(2000, 9):
         clearance, known = float(rng.uniform(0, 0.5)), float(rng.uniform(0, 2))
-        depth = contact(*w, *d, Z0, Z1, r0, r1, clearance, 1e-3, 0.0, False)
-        again = contact(*w, *d, Z0, Z1, r0, r1, clearance, 1e-3, known, False)
+        depth = contact(*w, *d, Frustum(Z0, Z1, r0, r1), clearance, 1e-3, 0.0, False)
+        again = contact(*w, *d, Frustum(Z0, Z1, r0, r1), clearance, 1e-3, known, False)
         assert again in (0.0, depth) and (again == depth or depth <= known)
         if no_deeper(*w, *d, Z0, Z1, max(r0, r1), clearance, known):
             passed += depth > 0.0
@@ -77,12 +77,12 @@ def test_a_ball_is_as_deep_as_the_deepest_place_in_it(r0, r1):
         aside = np.where(met, r0 + (r1 - r0) * (high - Z0) / (Z1 - Z0) - rho, -np.inf)
         bare = max(np.minimum(aside - clearance, np.where(met, high - Z0, -np.inf)).max(), 0.0)
         want = clearance + bare if bare > 1e-3 else min(max(aside.max(), 0.0), clearance)
-        got = contact_of_ball(*w, *d, Z0, Z1, r0, r1, v, clearance, 1e-3, 0.0)
+        got = contact_of_ball(*w, *d, Frustum(Z0, Z1, r0, r1), v, clearance, 1e-3, 0.0)
         # half a step of the stands and of the places
         off = (0.5 / 160 * np.linalg.norm(d) + 2e-3 * v) * (1.0 + abs(r1 - r0) / (Z1 - Z0)) + 1e-3
         assert want - 1e-3 <= got + 1e-9 and got <= want + off, (w, d, v)
         told += got > 0.0
         for known in (0.5 * got, got):
-            again = contact_of_ball(*w, *d, Z0, Z1, r0, r1, v, clearance, 1e-3, known)
+            again = contact_of_ball(*w, *d, Frustum(Z0, Z1, r0, r1), v, clearance, 1e-3, known)
             assert again == got or (again == 0.0 and got <= known)
     assert told > 15

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from geometry.kernels.cutter_sizes import CutterSizes
 from verify.kernels.sweep import cutter_interval
 
 
@@ -32,7 +33,7 @@ def test_interval_is_the_union_of_standing_tools(tool):
         n = rng.normal(size=3) * np.array([[1, 1, 1], [1, 1, 0], [0, 0, 1]][case % 3])
         n /= np.linalg.norm(n)
         q = rng.uniform([-2.5, -2.5, -1], [2.5, 2.5, 5])
-        lo, hi = cutter_interval(*q, *n, *d, *tool)
+        lo, hi = cutter_interval(*q, *n, *d, CutterSizes(*tool))
         tlo, thi = swept_twin(q, n, d, tool, 61)
         if np.isinf(tlo):
             continue

@@ -14,11 +14,15 @@ Every point returned is free.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit, prange
+from numpy.typing import NDArray
 
+from geometry.kernels.bvh import TreeArrays
 from geometry.kernels.drop import is_blocked
-from zones.kernels.lattice import noncut_at
+from zones.kernels.lattice import LatticeFrame, noncut_at
 
 # For each of the 16 corner patterns (bit 0: (i,j), 1: (i,j+1), 2: (i+1,j+1), 3: (i+1,j) blocked) up to two
 # segments as (from, to); sides 0 bottom, 1 right, 2 top, 3 left; -1: none.
@@ -31,6 +35,25 @@ SEGMENTS = np.array([
 
 HALVINGS = 5  # of a chord
 MOST_PER_CHORD = 2 ** HALVINGS
+
+
+class TipLimits(NamedTuple):
+    """What keeps the tip of one tool up, in the access frame.
+
+    tree      : TreeArrays of the obstacles
+    noncut    : (ny, nx) float64, mm, tip limit of shank and holder
+    frame     : LatticeFrame of ``noncut``
+    radius    : float, mm, of the cutting part, grown by the allowance
+    corner    : float, mm, its corner radius, grown by the allowance
+    allowance : float, mm, material that stays on the part
+    """
+
+    tree: TreeArrays
+    noncut: NDArray[np.float64]
+    frame: LatticeFrame
+    radius: float
+    corner: float
+    allowance: float
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
@@ -94,19 +117,19 @@ def trace(blocked, active, segments):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def stands_blocked(tree, noncut, row, x, y, z, radius, corner, allowance):
+def stands_blocked(limits: TipLimits, x, y, z):
     """Whether the assembly cannot stand with its tip at (x, y, z)."""
-    if noncut_at(noncut, row, x, y) > z:
+    if noncut_at(limits.noncut, limits.frame, x, y) > z:
         return True
-    return is_blocked(tree, x, y, z - allowance, radius, corner)
+    return is_blocked(limits.tree, x, y, z - limits.allowance, limits.radius, limits.corner)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _bisect(tree, noncut, row, fx, fy, bx, by, z, radius, corner, allowance, rounds):
+def _bisect(limits, fx, fy, bx, by, z, rounds):
     """Last free place between a free point f and a blocked point b."""
     for _ in range(rounds):
         mx, my = 0.5 * (fx + bx), 0.5 * (fy + by)
-        if stands_blocked(tree, noncut, row, mx, my, z, radius, corner, allowance):
+        if stands_blocked(limits, mx, my, z):
             bx, by = mx, my
         else:
             fx, fy = mx, my
@@ -114,9 +137,10 @@ def _bisect(tree, noncut, row, fx, fy, bx, by, z, radius, corner, allowance, rou
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True, parallel=True)
-def place_crossings(tree, noncut, row, ids, blocked, x0, y0, step, z, radius, corner, allowance, rounds, out):
+def place_crossings(limits: TipLimits, ids, blocked, frame: LatticeFrame, z, rounds, out):
     """Exact place (n, 2) of every crossing, on its free side."""
     nx = blocked.shape[1]
+    x0, y0, step = frame
     for k in prange(len(ids)):
         node = ids[k] // 2
         i, j = node // nx, node % nx
@@ -125,11 +149,11 @@ def place_crossings(tree, noncut, row, ids, blocked, x0, y0, step, z, radius, co
         bx, by = x0 + step * j2, y0 + step * i2
         if blocked[i, j]:
             ax, ay, bx, by = bx, by, ax, ay
-        out[k, 0], out[k, 1] = _bisect(tree, noncut, row, ax, ay, bx, by, z, radius, corner, allowance, rounds)
+        out[k, 0], out[k, 1] = _bisect(limits, ax, ay, bx, by, z, rounds)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _true_place(tree, noncut, row, px, py, qx, qy, z, radius, corner, allowance, tol, reach):
+def _true_place(limits, px, py, qx, qy, z, tol, reach):
     """Where the boundary really is beside the middle of a chord: (x, y, moved)."""
     mx, my = 0.5 * (px + qx), 0.5 * (py + qy)
     dx, dy = qx - px, qy - py
@@ -137,27 +161,27 @@ def _true_place(tree, noncut, row, px, py, qx, qy, z, radius, corner, allowance,
     if length < 4.0 * tol:
         return mx, my, False
     nx, ny = -dy / length, dx / length
-    if stands_blocked(tree, noncut, row, mx, my, z, radius, corner, allowance):
+    if stands_blocked(limits, mx, my, z):
         d = tol
         while d <= reach:
             fx, fy = mx + d * nx, my + d * ny
-            if not stands_blocked(tree, noncut, row, fx, fy, z, radius, corner, allowance):
+            if not stands_blocked(limits, fx, fy, z):
                 bx, by = mx + 0.5 * d * nx, my + 0.5 * d * ny
                 if d <= tol:
                     bx, by = mx, my
-                fx, fy = _bisect(tree, noncut, row, fx, fy, bx, by, z, radius, corner, allowance, 6)
+                fx, fy = _bisect(limits, fx, fy, bx, by, z, 6)
                 return fx, fy, True
             d *= 2.0
         return mx, my, False
     bx, by = mx - tol * nx, my - tol * ny
-    if stands_blocked(tree, noncut, row, bx, by, z, radius, corner, allowance):
+    if stands_blocked(limits, bx, by, z):
         return mx, my, False
     d = 2.0 * tol
     fx, fy = bx, by
     while d <= reach:
         bx, by = mx - d * nx, my - d * ny
-        if stands_blocked(tree, noncut, row, bx, by, z, radius, corner, allowance):
-            fx, fy = _bisect(tree, noncut, row, fx, fy, bx, by, z, radius, corner, allowance, 6)
+        if stands_blocked(limits, bx, by, z):
+            fx, fy = _bisect(limits, fx, fy, bx, by, z, 6)
             return fx, fy, True
         fx, fy = bx, by
         d *= 2.0
@@ -165,7 +189,7 @@ def _true_place(tree, noncut, row, px, py, qx, qy, z, radius, corner, allowance,
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True, parallel=True)
-def refine(tree, noncut, row, points, follows, z, radius, corner, allowance, tol, reach, out, count):
+def refine(limits: TipLimits, points, follows, z, tol, reach, out, count):
     """Points put in on every chord that leaves the true boundary by more than tol.
 
     points  : (n, 2); follows : (n,) the point each is joined to, -1 for none
@@ -187,8 +211,7 @@ def refine(tree, noncut, row, points, follows, z, radius, corner, allowance, tol
             level = depth[top]
             mx, my, moved = px, py, False
             if level < HALVINGS:
-                mx, my, moved = _true_place(tree, noncut, row, px, py, qx, qy, z, radius, corner, allowance, tol,
-                                            reach)
+                mx, my, moved = _true_place(limits, px, py, qx, qy, z, tol, reach)
             if moved:
                 ends[top, 0], ends[top, 1] = mx, my
                 depth[top] = level + 1
@@ -203,7 +226,7 @@ def refine(tree, noncut, row, points, follows, z, radius, corner, allowance, tol
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def chords_free(tree, noncut, row, points, z, radius, corner, allowance, spacing, ok):
+def chords_free(limits: TipLimits, points, z, spacing, ok):
     """ok[k]: the straight move from point k to k+1 at height z stays free, tested every ``spacing`` mm."""
     for k in range(len(points) - 1):
         dx, dy = points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
@@ -212,15 +235,16 @@ def chords_free(tree, noncut, row, points, z, radius, corner, allowance, spacing
         ok[k] = True
         for s in range(1, n):
             x, y = points[k, 0] + dx * s / n, points[k, 1] + dy * s / n
-            if stands_blocked(tree, noncut, row, x, y, z, radius, corner, allowance):
+            if stands_blocked(limits, x, y, z):
                 ok[k] = False
                 break
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def linear_crossings(ids, value, level, x0, y0, step, out):
+def linear_crossings(ids, value, level, frame: LatticeFrame, out):
     """Places (n, 2) where a nodal field ``value`` passes ``level`` on each edge, by linear interpolation."""
     nx = value.shape[1]
+    x0, y0, step = frame
     for k in range(len(ids)):
         node = ids[k] // 2
         i, j = node // nx, node % nx

@@ -27,7 +27,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from geometry.kernels.cutter_sizes import CutterSizes
 from geometry.kernels.options import KERNEL
+from toolpath.kernels.residual import SampleCells
 
 TOLERANCE = 1e-6  # mm
 ON_AXIS = 1e-7  # mm
@@ -145,13 +147,14 @@ def _off(x, y, ax, ay, bx, by):
 
 
 @njit(**KERNEL)
-def _lower_part(points, cell_start, cell_items, gx, gy, cell, ncx, ncy, part, radius, corner, flute, margin, least,
-                stack):
+def _lower_part(points, cells, part, cutter, margin, least, stack):
     """Lower ``least`` by one part of a move.
 
     The tool halfway, thicker by half of what its places go, covers the shadow of all of it in plan. And since s and s'
     halfway bound s all along, most samples in that shadow are asked once only.
     """
+    cell_start, cell_items, gx, gy, cell, ncx, ncy = cells
+    radius, corner, flute = cutter
     theta = part[12]
     cosine, sine = np.cos(0.5 * theta), np.sin(0.5 * theta)
     length = np.sqrt(part[3] ** 2 + part[4] ** 2 + part[5] ** 2)
@@ -183,14 +186,12 @@ def _lower_part(points, cell_start, cell_items, gx, gy, cell, ncx, ncy, part, ra
 
 
 @njit(**KERNEL)
-def lower_leaning(points, cell_start, cell_items, gx, gy, cell, ncx, ncy, tips, axes, flute, radius, corner, margin,
-                  least):
+def lower_leaning(points, cells: SampleCells, tips, axes, cutter: CutterSizes, margin, least):
     """Lower least (n,) float64, mm, by the signed distance of samples to a cutting part that walks leaning.
 
-    points (n, 3) float64, mm, are binned in square cells in plan: cell_start (ncx*ncy + 1,), cell_items (n,): samples
-    of each cell; gx, gy, cell: corner and size of the cells, mm. tips (m, 3) float64, mm; axes (m, 3) float64, unit,
-    neighbours less than a right angle apart. flute, radius, corner: mm. margin: mm, distances beyond it change nothing,
-    and neither do those that are less than ``least`` by no more than TOLERANCE.
+    points (n, 3) float64, mm, are binned in square cells in plan. tips (m, 3) float64, mm; axes (m, 3) float64, unit,
+    neighbours less than a right angle apart. margin: mm, distances beyond it change nothing, and neither do those that
+    are less than ``least`` by no more than TOLERANCE.
 
     A move is taken in parts in which no place of the cutting part goes farther than a radius and a cell.
     """
@@ -201,8 +202,7 @@ def lower_leaning(points, cell_start, cell_items, gx, gy, cell, ncx, ncy, tips, 
         for m in range(3):
             way[m] = tips[k + 1, m] - tips[k, m]
         length = np.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
-        parts = max(int(np.ceil((length + theta * flute) / (radius + cell))), 1)
+        parts = max(int(np.ceil((length + theta * cutter.length) / (cutter.radius + cells.size))), 1)
         for m in range(parts):
             _set_part(part, tips[k], way, axes[k], across, theta, m, parts)
-            _lower_part(points, cell_start, cell_items, gx, gy, cell, ncx, ncy, part, radius, corner, flute, margin,
-                        least, stack)
+            _lower_part(points, cells, part, cutter, margin, least, stack)

@@ -12,11 +12,35 @@ or at an end; all are tried.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+from geometry.kernels.cutter_sizes import CutterSizes
 
 FAR = 1e3
 LEVEL_PLANE, UPRIGHT = 1, 2
+
+
+class SampleCells(NamedTuple):
+    """Samples by square cells in plan; cell (i, j) is row i ncx + j, access frame.
+
+    start    : (ncx ncy + 1,) int64, index, first of each cell's samples in ``items``
+    items    : (n,) int64, index, numbers of the samples
+    x0, y0   : float, mm, lower corner of cell (0, 0)
+    size     : float, mm, side of a cell
+    ncx, ncy : int, count of cells along x and y
+    """
+
+    start: NDArray[np.int64]
+    items: NDArray[np.int64]
+    x0: float
+    y0: float
+    size: float
+    ncx: int
+    ncy: int
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True, inline="always")
@@ -52,12 +76,13 @@ def _segment_gap(p, a, b, radius, corner, level):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def lower(points, level, cell_start, cell_items, gx, gy, cell, ncx, ncy, path, flute, radius, corner, margin, residual):
+def lower(points, level, cells: SampleCells, path, cutter: CutterSizes, margin, residual):
     """Lower residual (n,) by one polyline of tips (m, 3); samples are binned in square cells in plan.
 
-    level (n,): 1 on a level plane, 2 on a wall, else 0. cell_start (ncx*ncy + 1,), cell_items (n,): samples of each
-    cell; gx, gy, cell: corner and size of the cells, mm; margin: mm beyond the cutter within which it is measured.
+    level (n,): 1 on a level plane, 2 on a wall, else 0; margin: mm beyond the cutter within which it is measured.
     """
+    cell_start, cell_items, gx, gy, cell, ncx, ncy = cells
+    radius, corner, flute = cutter
     for k in range(len(path) - 1):
         a, b = path[k], path[k + 1]
         r = radius + margin

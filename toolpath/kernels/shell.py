@@ -7,15 +7,63 @@ with everything in it: the answer is that of asking every place.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from geometry.kernels.options import KERNEL
+from zones.kernels.lattice import LatticeFrame
+
+F64 = NDArray[np.float64]
 
 LEAF, BRANCH = 8, 4  # places of a box, boxes of a box above
 CARE = 1e-9  # mm: what rounding may move a place out of its box
 WIDE = 2  # squares a side, and one: so fine is the height looked at under a box
 STACK = 256
+
+
+class Ceilings(NamedTuple):
+    """Heights of stock over a lattice, and the highest of ever larger squares of it, access frame.
+
+    heights : (h,) float64, mm, of the lattice row by row, then of squares of 2, 4, 8, ... nodes a side
+    begins  : (l,) int64, index, where each level begins in ``heights``
+    ny, nx  : int, count of rows and columns of the lattice
+    """
+
+    heights: F64
+    begins: NDArray[np.int64]
+    ny: int
+    nx: int
+
+
+class PoseArrays(NamedTuple):
+    """Poses of a tool, access frame.
+
+    tips   : (n, 3) float64, mm
+    axes   : (n, 3) float64, unit, tip to spindle
+    first  : (n, 3) float64, unit, square to the axis
+    second : (n, 3) float64, unit, square to the axis and to ``first``
+    """
+
+    tips: F64
+    axes: F64
+    first: F64
+    second: F64
+
+
+class ShellArrays(NamedTuple):
+    """Places on a tool in boxes of boxes, as ``toolpath.stock.tool_shell.Shell`` makes them, frame of the tool.
+
+    places : (n, 3) float64, mm
+    boxes  : (b, 6) float64, mm, centre and half the sides
+    levels : (l + 1,) int64, index, where the boxes of each level begin, and their count
+    """
+
+    places: F64
+    boxes: F64
+    levels: NDArray[np.int64]
 
 
 @njit(**KERNEL)
@@ -35,11 +83,9 @@ def highest_of_four(fine, coarse):
 
 
 @njit(**KERNEL)
-def stands_above(heights, begins, ny, nx, i0, i1, j0, j1, z):
-    """Whether anything in rows i0 to i1 and columns j0 to j1 is higher than z; if not sure, yes.
-
-    heights : all levels one behind the other; begins : (l,) int64, where each begins
-    """
+def stands_above(ceilings: Ceilings, i0, i1, j0, j1, z):
+    """Whether anything in rows i0 to i1 and columns j0 to j1 is higher than z; if not sure, yes."""
+    heights, begins, ny, nx = ceilings
     i0, i1, j0, j1 = max(i0, 0), min(i1, ny - 1), max(j0, 0), min(j1, nx - 1)
     if i0 > i1 or j0 > j1:
         return False
@@ -55,12 +101,12 @@ def stands_above(heights, begins, ny, nx, i0, i1, j0, j1, z):
 
 
 @njit(**KERNEL)
-def stands_in(heights, begins, ny, nx, x0, y0, step, tips, axes, first, second, places, boxes, levels, out):
-    """Set out[k] where the node nearest to a place of the shell at pose k is higher than the place.
-
-    tips, axes    : (n, 3) float64, mm and unit; first, second : (n, 3), unit, square to them and to each other
-    places, boxes, levels : as ``toolpath.stock.tool_shell.Shell`` has them
-    """
+def stands_in(ceilings: Ceilings, frame: LatticeFrame, poses: PoseArrays, shell: ShellArrays, out):
+    """Set out[k], (n,) bool, where the node nearest to a place of the shell at pose k is higher than the place."""
+    heights, _, ny, nx = ceilings
+    x0, y0, step = frame
+    tips, axes, first, second = poses
+    places, boxes, levels = shell
     stack_level, stack_box = np.empty(STACK, np.int64), np.empty(STACK, np.int64)
     top = len(levels) - 2
     for k in range(len(tips)):
@@ -83,7 +129,7 @@ def stands_in(heights, begins, ny, nx, x0, y0, step, tips, axes, first, second, 
             dz = abs(box[3] * u[2]) + abs(box[4] * v[2]) + abs(box[5] * a[2]) + CARE
             i0, i1 = int(np.rint((y - dy - y0) / step)), int(np.rint((y + dy - y0) / step))
             j0, j1 = int(np.rint((x - dx - x0) / step)), int(np.rint((x + dx - x0) / step))
-            if not stands_above(heights, begins, ny, nx, i0, i1, j0, j1, z - dz):
+            if not stands_above(ceilings, i0, i1, j0, j1, z - dz):
                 continue
             if level > 0:
                 for c in range(min((b + 1) * BRANCH, levels[level] - levels[level - 1]) - 1, b * BRANCH - 1, -1):

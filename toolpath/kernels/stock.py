@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from zones.kernels.lattice import LatticeFrame
+
 HALF_DIAGONAL = 0.7072  # of a cell, rounded up
 LEAST_RISE = 0.02  # of a tool axis: one that lies lower takes nothing off a height over the plan
 
@@ -23,12 +25,13 @@ def _bottom(rho, radius, corner):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def stamp(top, cover, x0, y0, step, points, radius, corner):
+def stamp(top, cover, frame: LatticeFrame, points, radius, corner):
     """Lower ``top`` and ``cover`` along a polyline of tips (n, 3).
 
     A cell of ``cover`` is lowered only by positions that clear the whole disc of its half diagonal, to what the
     farthest point of the disc is lowered to; positions lie on the polyline, so neither map ever falls too low.
     """
+    x0, y0, step = frame
     ny, nx = top.shape
     half = HALF_DIAGONAL * step
     n_r = int(np.ceil(radius / step))
@@ -54,7 +57,7 @@ def stamp(top, cover, x0, y0, step, points, radius, corner):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def overlaps(heights, pooled, side, x0, y0, step, tips, radius, corner, margin, half, least, out):
+def overlaps(heights, pooled, side, frame: LatticeFrame, tips, radius, corner, margin, half, least, out):
     """How far the stock stands above the cutter's bottom at tips (n, 3), mm: greatest over the disc; <= 0 is air.
 
     heights : (ny, nx) float64, of the stock at the nodes, or the most in the cells round them
@@ -64,6 +67,7 @@ def overlaps(heights, pooled, side, x0, y0, step, tips, radius, corner, margin, 
     half    : mm round a node that its height stands for: 0 for a point, half a diagonal for a cell
     least   : mm; what is less comes out as this, and squares that hold no more are not looked at
     """
+    x0, y0, step = frame
     ny, nx = heights.shape
     rows, cols = pooled.shape
     inner = max(radius + margin, 0.35 * radius)
@@ -95,12 +99,13 @@ def overlaps(heights, pooled, side, x0, y0, step, tips, radius, corner, margin, 
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def standing(cover, part, x0, y0, step, tips, radius, half, out):
+def standing(cover, part, frame: LatticeFrame, tips, radius, half, out):
     """How far stock stands above tips (n, 3), mm, in the cells that a cutter of this radius may touch.
 
     part : (ny, nx) float64, highest of the part in a cell; cells with part above the tip are left out: whatever else
            is in them stands beside a wall
     """
+    x0, y0, step = frame
     ny, nx = cover.shape
     reach = radius + half
     n_r = int(np.ceil(reach / step))
@@ -118,11 +123,12 @@ def standing(cover, part, x0, y0, step, tips, radius, half, out):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def meets(top, pooled, side, x0, y0, step, tips, height, radius, out):
+def meets(top, pooled, side, frame: LatticeFrame, tips, height, radius, out):
     """Set out[k] where stock stands higher than ``height`` mm over tip k within ``radius`` mm of its axis.
 
     pooled : no lower than the highest of each square of ``side`` nodes a side; lowered to it where it is looked at
     """
+    x0, y0, step = frame
     ny, nx = top.shape
     rows, cols = pooled.shape
     for k in range(len(tips)):
@@ -163,7 +169,7 @@ def _gone(x, y, z, turns, tops, frames, rise):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def sink(heights, known, x0, y0, step, low, turns, tops, frames, rise):
+def sink(heights, known, frame: LatticeFrame, low, turns, tops, frames, rise):
     """Lower heights to where, on the way straight down, stock begins that other maps show too.
 
     heights : (ny, nx) mm, of the nodes, in this frame. A place that is gone is no more than a 16th of a step above one
@@ -175,6 +181,7 @@ def sink(heights, known, x0, y0, step, low, turns, tops, frames, rise):
     tops    : (k, ny, nx) mm, heights of the others, -inf where one has no node; frames : (k, 3) x0, y0, step of each
     rise    : mm, over a height of another map up to which a place counts as stock
     """
+    x0, y0, step = frame
     ny, nx = heights.shape
     for i in range(ny):
         for j in range(nx):
@@ -197,7 +204,7 @@ def sink(heights, known, x0, y0, step, low, turns, tops, frames, rise):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def stamp_leaning(heights, x0, y0, step, tips, axes, sides, radius, low, high, shrink):
+def stamp_leaning(heights, frame: LatticeFrame, tips, axes, sides, radius, low, high, shrink):
     """Lower heights by the flank of a leaning tool standing at poses, pose after pose.
 
     tips, axes : (n, 3) mm and unit, up; sides : (n, 2) mm, half the extent in plan of each pose's flank, x and y, about
@@ -207,6 +214,7 @@ def stamp_leaning(heights, x0, y0, step, tips, axes, sides, radius, low, high, s
 
     A column is lowered where the flank takes its top: from there down to where the flank leaves it.
     """
+    x0, y0, step = frame
     ny, nx = heights.shape
     r = radius - shrink
     if r <= 0.0 or high - low <= 2.0 * shrink:
@@ -244,13 +252,14 @@ def stamp_leaning(heights, x0, y0, step, tips, axes, sides, radius, low, high, s
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def stamp_balls(heights, x0, y0, step, centres, radius, shrink):
+def stamp_balls(heights, frame: LatticeFrame, centres, radius, shrink):
     """Lower heights by balls, one after the other.
 
     centres : (n, 3) mm; radius : mm; shrink : mm, by which they are made smaller, for heights of cells
 
     A column is lowered where a ball takes its top: from there down to where the ball leaves it.
     """
+    x0, y0, step = frame
     ny, nx = heights.shape
     r = radius - shrink
     if r <= 0.0:

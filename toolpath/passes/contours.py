@@ -21,6 +21,7 @@ from geometry.mesh import F64
 from toolpath.kernels.contour import (
     MOST_PER_CHORD,
     SEGMENTS,
+    TipLimits,
     chords_free,
     linear_crossings,
     place_crossings,
@@ -28,6 +29,7 @@ from toolpath.kernels.contour import (
     trace,
 )
 from toolpath.lines import Line, dense, pieces_where, true_runs
+from zones.kernels.lattice import LatticeFrame
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 MIN_APART = 0.6  # lattice steps between successive crossings; less only where a corner is cut
@@ -111,8 +113,7 @@ def _traced(field: TipField, z: float, active: NDArray[np.bool_], tolerance: flo
         return [], rough
     x0, y0 = lat.x0 + cols.start * lat.step, lat.y0 + rows.start * lat.step
     xy = np.empty((len(ids), 2))
-    where = (field.tree.arrays, field.noncut, field.coarse_row)
-    shape = (z + LEVEL_TOLERANCE, field.grown_radius, field.grown_corner, field.allowance)
+    limits = _limits(field)
     follows = np.arange(1, len(ids) + 1)
     follows[starts[1:] - 1] = np.where(closed, starts[:-1], -1)
     exact = np.ones(len(ids), np.bool_)
@@ -122,12 +123,13 @@ def _traced(field: TipField, z: float, active: NDArray[np.bool_], tolerance: flo
         exact = _along_chains(wanted[lat.cells(middle)], starts, closed, more)
         xy[~exact] = middle[~exact]
     placed = np.empty((int(exact.sum()), 2))
-    place_crossings(*where, ids[exact], blocked, x0, y0, lat.step, *shape, BISECTIONS, placed)
+    place_crossings(limits, ids[exact], blocked, LatticeFrame(x0, y0, lat.step), z + LEVEL_TOLERANCE, BISECTIONS,
+                    placed)
     xy[exact] = placed
     both = exact & (follows >= 0)
     both[both] = exact[follows[both]]
     fine, count = np.empty((len(ids), MOST_PER_CHORD, 2)), np.empty(len(ids), np.int64)
-    refine(*where, xy, np.where(both, follows, -1), *shape, tolerance, lat.step, fine, count)
+    refine(limits, xy, np.where(both, follows, -1), z + LEVEL_TOLERANCE, tolerance, lat.step, fine, count)
     points = fine[np.arange(MOST_PER_CHORD) < count[:, None]]
     begins = np.concatenate([[0], np.cumsum(count)])[starts]
     if not exact.all():
@@ -144,6 +146,12 @@ def _traced(field: TipField, z: float, active: NDArray[np.bool_], tolerance: flo
             way = np.vstack([way, way[:1]])
         out.append(Line(np.column_stack([way, np.full(len(way), z)]), bool(closed[k])))
     return out, rough
+
+
+def _limits(field: TipField) -> TipLimits:
+    """What keeps the tip of a field's tool up, for kernels."""
+    return TipLimits(field.tree.arrays, field.noncut, field.coarse.frame, field.grown_radius, field.grown_corner,
+                     field.allowance)
 
 
 def _flat(points: F64) -> NDArray[np.complex128]:
@@ -212,7 +220,7 @@ def lines_at(field: TipField, z: float, far: F64, distance: float, inside: NDArr
     """
     ids, starts, closed = trace(np.ascontiguousarray(far < distance), inside, SEGMENTS)
     xy = np.empty((len(ids), 2))
-    linear_crossings(ids, far, distance, *corner, field.lattice.step, xy)
+    linear_crossings(ids, far, distance, LatticeFrame(*corner, field.lattice.step), xy)
     lines: list[Line] = []
     for k in range(len(starts) - 1):
         chain = xy[starts[k]:starts[k + 1]]
@@ -232,9 +240,8 @@ def moves_free(field: TipField, points: F64) -> NDArray[np.bool_]:
     """
     ok = np.ones(max(len(points) - 1, 0), np.bool_)
     if len(points) > 1:
-        chords_free(field.tree.arrays, field.noncut, field.coarse_row, np.ascontiguousarray(points[:, :2]),
-                    float(points[:, 2].max()) + LEVEL_TOLERANCE, field.grown_radius, field.grown_corner,
-                    field.allowance, field.lattice.step / 3, ok)
+        chords_free(_limits(field), np.ascontiguousarray(points[:, :2]), float(points[:, 2].max()) + LEVEL_TOLERANCE,
+                    field.lattice.step / 3, ok)
     return ok
 
 

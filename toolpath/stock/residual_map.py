@@ -10,13 +10,13 @@ from __future__ import annotations
 import copy
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.errors import GeometryError
+from geometry.kernels.cutter_sizes import CutterSizes
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.kernels.leaning import lower_leaning
-from toolpath.kernels.residual import LEVEL_PLANE, UPRIGHT, lower
+from toolpath.kernels.residual import LEVEL_PLANE, UPRIGHT, SampleCells, lower
 
 CELL = 0.6  # mm
 MIN_MARGIN = 0.02  # mm
@@ -38,8 +38,8 @@ class ResidualMap:
         upright = np.abs(normals[:, 2]) < 0.5
         self.level = np.where(normals[:, 2] > 1.0 - 1e-6, LEVEL_PLANE, np.where(upright, UPRIGHT, 0))
         self.residual = np.full(len(points), UNTOUCHED)
-        self.cell, self.margin = cell, max(margin, MIN_MARGIN)
-        self.origin, self.ncx, self.ncy, self.starts, self.items = _binned(points, cell)
+        self.margin = max(margin, MIN_MARGIN)
+        self._cells = _binned(points, cell)
 
     def copied(self) -> ResidualMap:
         """A copy with a residual of its own."""
@@ -52,8 +52,7 @@ class ResidualMap:
 
         path : (m, 3) float64, mm, access frame
         """
-        lower(self.points, self.level, self.starts, self.items, self.origin[0], self.origin[1], self.cell, self.ncx,
-              self.ncy, np.ascontiguousarray(path), tool.flute_length, tool.radius, tool.corner_radius, self.margin,
+        lower(self.points, self.level, self._cells, np.ascontiguousarray(path), _sizes(tool), self.margin,
               self.residual)
 
     def cut_leaning(self, tips: F64, axes: F64, tool: ToolBody) -> None:
@@ -70,9 +69,7 @@ class ResidualMap:
             Code 'bad_axis', as ``leaning_depths``.
         """
         tips, axes = _poses(tips, axes)
-        lower_leaning(self.points, self.starts, self.items, self.origin[0], self.origin[1], self.cell, self.ncx,
-                      self.ncy, tips, axes, tool.flute_length, tool.radius, tool.corner_radius, self.margin,
-                      self.residual)
+        lower_leaning(self.points, self._cells, tips, axes, _sizes(tool), self.margin, self.residual)
 
 
 def leaning_depths(points: F64, tips: F64, axes: F64, tool: ToolBody, margin: float) -> F64:
@@ -101,10 +98,8 @@ def leaning_depths(points: F64, tips: F64, axes: F64, tool: ToolBody, margin: fl
     """
     points = np.ascontiguousarray(points, float)
     tips, axes = _poses(tips, axes)
-    origin, ncx, ncy, starts, items = _binned(points, CELL)
     least = np.full(len(points), UNTOUCHED)
-    lower_leaning(points, starts, items, origin[0], origin[1], CELL, ncx, ncy, tips, axes, tool.flute_length,
-                  tool.radius, tool.corner_radius, float(margin), least)
+    lower_leaning(points, _binned(points, CELL), tips, axes, _sizes(tool), float(margin), least)
     return least
 
 
@@ -124,8 +119,12 @@ def _poses(tips: F64, axes: F64) -> tuple[F64, F64]:
     return (np.repeat(tips, 2, axis=0), np.repeat(axes, 2, axis=0)) if len(tips) == 1 else (tips, axes)
 
 
-def _binned(points: F64, cell: float) -> tuple[F64, int, int, NDArray[np.int64], NDArray[np.int64]]:
-    """Points (n, 3), mm, in square cells in plan: corner (2,), columns and rows, first item of each cell, the items."""
+def _sizes(tool: ToolBody) -> CutterSizes:
+    return CutterSizes(tool.radius, tool.corner_radius, tool.flute_length)
+
+
+def _binned(points: F64, cell: float) -> SampleCells:
+    """Points (n, 3), mm, in square cells in plan."""
     lo = points[:, :2].min(axis=0) if len(points) else np.zeros(2)
     hi = points[:, :2].max(axis=0) if len(points) else np.zeros(2)
     ncx, ncy = (np.floor((hi - lo) / cell).astype(int) + 1).tolist()
@@ -134,4 +133,5 @@ def _binned(points: F64, cell: float) -> tuple[F64, int, int, NDArray[np.int64],
         c = np.floor((points[:, :2] - lo) / cell).astype(np.int64)
         key = c[:, 1] * ncx + c[:, 0]
     items = np.argsort(key, kind="stable")
-    return lo, ncx, ncy, np.searchsorted(key[items], np.arange(ncx * ncy + 1)), items
+    starts = np.searchsorted(key[items], np.arange(ncx * ncy + 1))
+    return SampleCells(starts, items, float(lo[0]), float(lo[1]), cell, ncx, ncy)

@@ -19,7 +19,7 @@ from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import drop_grid
 from geometry.tool_body import ToolBody
-from toolpath.kernels.shell import highest_of_four, stands_in
+from toolpath.kernels.shell import Ceilings, PoseArrays, highest_of_four, stands_in
 from toolpath.kernels.stock import HALF_DIAGONAL, meets, overlaps, sink, stamp, stamp_balls, stamp_leaning, standing
 from toolpath.poses import between, places_along
 from toolpath.stock.tool_shell import Shell
@@ -35,10 +35,6 @@ ON_EDGE = 1e-9  # mm
 APART, MAX_POSED = 2.0, 0.1  # lattice steps, or radii, between poses that are removed
 ROUND = (0.0, 0.25 * np.pi, 0.5 * np.pi)  # how far round the corner a cylinder inside the cutting part touches it
 SKIN = 0.08  # diameters: thickest stock that the end of the tool may take in a descent steeper than the ramp
-
-
-Ceilings = tuple[F64, NDArray[np.int64]]
-"""Heights of a lattice and of ever larger squares of it, as ``toolpath.kernels.shell`` looks at them."""
 
 
 class StockMap:
@@ -223,8 +219,7 @@ class StockMap:
         points : (n, 3) float64, mm, access frame
         """
         lat, self._ceilings = self.lattice, None
-        stamp(self.top, self.cover, lat.x0, lat.y0, lat.step, np.ascontiguousarray(points), tool.radius,
-              tool.corner_radius)
+        stamp(self.top, self.cover, lat.frame, np.ascontiguousarray(points), tool.radius, tool.corner_radius)
 
     def cut_leaning(self, tips: F64, axes: F64, tool: ToolBody) -> None:
         """Remove the volume that a tilted tool cuts along poses.
@@ -244,14 +239,14 @@ class StockMap:
         for radius, low in ((tool.radius - r + r * np.sin(a), r - r * np.cos(a)) for a in bent):
             sides = 0.5 * (high - low) * np.abs(axes[:, :2]) + radius * np.sqrt(1.0 - np.minimum(axes[:, :2]**2, 1.0))
             for heights, shrink in ((self.top, 0.0), (self.cover, HALF_DIAGONAL * lat.step)):
-                stamp_leaning(heights, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips),
-                              np.ascontiguousarray(axes), sides, radius, low, high, shrink)
+                stamp_leaning(heights, lat.frame, np.ascontiguousarray(tips), np.ascontiguousarray(axes), sides, radius,
+                              low, high, shrink)
         if r == tool.radius:
             # from under a ball that leans its side is seen up to there, and above short flutes it does not cut
             cuts = high >= r * (1.0 + np.sqrt(np.maximum(1.0 - axes[:, 2]**2, 0.0)))
             centres = np.ascontiguousarray((tips + r * axes)[cuts])
             for heights, shrink in ((self.top, 0.0), (self.cover, HALF_DIAGONAL * lat.step)):
-                stamp_balls(heights, lat.x0, lat.y0, lat.step, centres, r, shrink)
+                stamp_balls(heights, lat.frame, centres, r, shrink)
 
     def stands_in(self, tips: F64, axes: F64, flank: Shell, bodies: Shell) -> NDArray[np.bool_]:
         """Whether stock stands in a tilted tool at poses, (n,) bool.
@@ -263,12 +258,11 @@ class StockMap:
         out, lat = np.zeros(len(tips), np.bool_), self.lattice
         first = np.cross(axes, np.where(np.abs(axes[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
         first /= np.linalg.norm(first, axis=1, keepdims=True)
-        pose = np.ascontiguousarray(tips), np.ascontiguousarray(axes), first, np.cross(axes, first)
+        poses = PoseArrays(np.ascontiguousarray(tips), np.ascontiguousarray(axes), first, np.cross(axes, first))
         if self._ceilings is None:
             self._ceilings = (_ceilings(self.top), _ceilings(np.where(self.top > self.part, self.top, -np.inf)))
-        for shell, (heights, begins) in zip((flank, bodies), self._ceilings, strict=True):
-            stands_in(heights, begins, lat.ny, lat.nx, lat.x0, lat.y0, lat.step, *pose, shell.places, shell.boxes,
-                      shell.levels, out)
+        for shell, ceilings in zip((flank, bodies), self._ceilings, strict=True):
+            stands_in(ceilings, lat.frame, poses, shell.arrays, out)
         return out
 
     def overlap(self, tips: F64, tool: ToolBody, rim: float = -0.8, *, lower_bound: float = -np.inf) -> F64:
@@ -281,8 +275,8 @@ class StockMap:
         """
         out = np.empty(len(tips))
         lat = self.lattice
-        overlaps(self.top, self._pooled, POOLED, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips), tool.radius,
-                 tool.corner_radius, rim * lat.step, 0.0, lower_bound, out)
+        overlaps(self.top, self._pooled, POOLED, lat.frame, np.ascontiguousarray(tips), tool.radius, tool.corner_radius,
+                 rim * lat.step, 0.0, lower_bound, out)
         return out
 
     def under_end(self, tips: F64, tool: ToolBody, *, lower_bound: float = -np.inf) -> F64:
@@ -297,7 +291,7 @@ class StockMap:
         reach = tool.radius - 0.5 * tool.corner_radius
         out, lat = np.empty(len(tips)), self.lattice
         half = HALF_DIAGONAL * lat.step
-        overlaps(self.cover, self._covered, POOLED, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips), tool.radius,
+        overlaps(self.cover, self._covered, POOLED, lat.frame, np.ascontiguousarray(tips), tool.radius,
                  tool.corner_radius, reach + half - tool.radius, half, lower_bound, out)
         return out
 
@@ -312,8 +306,8 @@ class StockMap:
         tips : (n, 3) float64, mm, access frame
         """
         out, lat = np.empty(len(tips)), self.lattice
-        standing(self.cover, self.part, lat.x0, lat.y0, lat.step, np.ascontiguousarray(tips), tool.radius,
-                 HALF_DIAGONAL * lat.step, out)
+        standing(self.cover, self.part, lat.frame, np.ascontiguousarray(tips), tool.radius, HALF_DIAGONAL * lat.step,
+                 out)
         return out
 
     def meets_bodies(self, tips: F64, bodies: Sequence[Disc]) -> NDArray[np.bool_]:
@@ -332,7 +326,7 @@ class StockMap:
         lowest = float(tips[:, 2].min())
         for body in bodies:
             if lowest + body.height < float(self._pooled.max()):
-                meets(self.top, self._pooled, POOLED, lat.x0, lat.y0, lat.step, tips, body.height,
+                meets(self.top, self._pooled, POOLED, lat.frame, tips, body.height,
                       body.radius + HALF_DIAGONAL * lat.step, out)
         return out
 
@@ -382,7 +376,7 @@ class _Others:
         if self.known.shape[1:] != top.shape:
             self.known = np.full((2, *top.shape), np.inf)
         for heights, known, (theirs, rise) in zip((cover, top), self.known, self.said, strict=True):
-            sink(heights, known, lat.x0, lat.y0, lat.step, self.lowest, self.turns, theirs, self.frames, rise)
+            sink(heights, known, lat.frame, self.lowest, self.turns, theirs, self.frames, rise)
         np.minimum(top, cover, out=top)
         self.known[0], self.known[1] = cover, top
 
@@ -420,7 +414,8 @@ def _ceilings(top: F64) -> Ceilings:
         highest_of_four(levels[-1], coarse)
         levels.append(coarse)
     begins = np.concatenate([[0], np.cumsum([level.size for level in levels])])[:-1]
-    return np.concatenate([level.ravel() for level in levels]), begins.astype(np.int64)
+    heights = np.concatenate([level.ravel() for level in levels])
+    return Ceilings(heights, begins.astype(np.int64), *top.shape)
 
 
 def _pooled(top: F64) -> F64:

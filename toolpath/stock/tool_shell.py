@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.kernels.shell import BRANCH, LEAF
+from toolpath.kernels.shell import BRANCH, LEAF, ShellArrays
 from zones.reach.assembly import Clearances, Disc
 
 BITS = 8  # of each coordinate on the curve along which places are put in boxes
@@ -36,6 +36,11 @@ class Shell:
     places: F64
     boxes: F64
     levels: NDArray[np.int64]
+
+    @property
+    def arrays(self) -> ShellArrays:
+        """The same for kernels."""
+        return ShellArrays(self.places, self.boxes, self.levels)
 
     @classmethod
     def of(cls, places: F64) -> Shell:

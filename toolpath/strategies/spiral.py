@@ -60,7 +60,7 @@ class Rings(Family):
         [Lorensen1987]."""
         ids, starts, closed = trace(self.far < t, self.inside, SEGMENTS)
         xy = np.empty((len(ids), 2))
-        linear_crossings(ids, self.far, t, self.lattice.x0, self.lattice.y0, self.lattice.step, xy)
+        linear_crossings(ids, self.far, t, self.lattice.frame, xy)
         out = []
         for k in range(len(starts) - 1):
             way = xy[starts[k]:starts[k + 1]]

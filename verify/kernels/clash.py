@@ -8,18 +8,34 @@ the place it stands in with no clearance asked.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from geometry.kernels.cutter_sizes import CutterSizes
 from geometry.kernels.options import KERNEL
-from verify.kernels.frustum import contact, no_deeper
+from verify.kernels.frustum import Frustum, contact, no_deeper
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import beside, carried
 from verify.kernels.stock import CUTTER, FIXTURE, _note, _worse, known_depth
+from verify.kernels.tables import F64, AxisArrays, Bool, ContactLimits, MoveArrays, ToolArrays
 
 TOUCHING = 1e-3
 ASIDE = 2e-3  # mm a straight lift may end beside its axis: X, Y, Z of programs have three decimals
+
+
+class PointArrays(NamedTuple):
+    """Points of the part and of fixtures in nested balls, in the order of the tree, setup frame.
+
+    points : (n, 3) float64, mm
+    fixed  : (n,) bool, points of fixtures: the cutting part must not touch those either
+    balls  : four (k, 4) float64, mm, centre and radius of balls of 8, 64, 512 and 4096 points; radius -1: empty
+    """
+
+    points: F64
+    fixed: Bool
+    balls: tuple[F64, F64, F64, F64]
 
 
 @njit(**KERNEL)
@@ -50,9 +66,9 @@ def _meet_point(p, x, y, z, cutter, bodies, b, grow, slack, known):
     qx, qy, qz, dx, dy, dz = view(p, x, y, z)
     if b >= 0:
         body, clearance = bodies[b], bodies[b, 4] + grow
-        return contact(qx, qy, qz, dx, dy, dz, body[0], body[1], body[2] + grow, body[3] + grow, clearance, slack,
-                       known, False)
-    a, r, length = cutter[0] - cutter[1], cutter[1], cutter[2]
+        return contact(qx, qy, qz, dx, dy, dz, Frustum(body[0], body[1], body[2] + grow, body[3] + grow), clearance,
+                       slack, known, False)
+    a, r, length = cutter.radius - cutter.corner, cutter.corner, cutter.length
     bare = -carried(qx, qy, qz, dx, dy, dz, a, r, length)
     if bare > slack:
         return grow + bare
@@ -60,17 +76,19 @@ def _meet_point(p, x, y, z, cutter, bodies, b, grow, slack, known):
 
 
 @njit(**KERNEL)
-def _traverse(p, chunk, t0, t1, t2, t3, points, fixed, every, cutter, bodies, b, grow, slack, held, best):
+def _traverse(p, chunk, cloud, held, every, cutter, bodies, b, grow, slack, best):
     """One body of a tool on piece p against the points of a chunk; of fixtures alone unless ``every``.
 
     held : whether the chunk has points of fixtures
     """
-    z0, z1, wide, clearance, code = 0.0, cutter[2], cutter[0] + grow, grow, CUTTER
+    z0, z1, wide, clearance, code = 0.0, cutter.length, cutter.radius + grow, grow, CUTTER
     if b >= 0:
         z0, z1, wide = bodies[b, 0], bodies[b, 1], max(bodies[b, 2], bodies[b, 3]) + grow
         clearance, code = bodies[b, 4] + grow, int(bodies[b, 5])
     of_fixture, known = known_depth(best, code + FIXTURE, clearance), known_depth(best, code, clearance)
     known = of_fixture if not every else min(known, of_fixture) if held else known
+    points, fixed = cloud.points, cloud.fixed
+    t0, t1, t2, t3 = cloud.balls
     if not _meets(p, t3, chunk, z0, z1, wide, clearance, known):
         return
     for n2 in range(chunk * 8, chunk * 8 + 8):
@@ -93,16 +111,17 @@ def _traverse(p, chunk, t0, t1, t2, t3, points, fixed, every, cutter, bodies, b,
 
 
 @njit(**KERNEL)
-def clash_chunk(chunk, t0, t1, t2, t3, points, fixed, starts, ends, axis, about, angle, feeds, free, tool, cutters,
-                bodies, body_first, reach, rapid_grow, slack, bow, events):
+def clash_chunk(chunk, cloud: PointArrays, moves: MoveArrays, axes: AxisArrays, free, tools: ToolArrays,
+                limits: ContactLimits, events):
     """Events of all moves with the points of one chunk; returns their number, which may exceed the table.
 
-    t0..t3  : (k, 4) float64 balls of 8, 64, 512, 4096 points; points (n, 3) in the order of the tree
-    free    : (m,) bool, rapids that no clearance is asked of
-    fixed   : (n,) bool, points of fixtures: the cutting part must not touch those either
-    reach   : (k,) float64, mm, how far the whole assembly reaches from the tip; bow : mm
-    slack   : mm of overlap with the part that the cutting part, and a body beside its own cut, may have
+    free : (m,) bool, rapids that need no clearance
     """
+    starts, ends, feeds, tool = moves
+    axis, about, angle, bow = axes
+    cutters, _ends_radius, reach, bodies, body_first = tools
+    rapid_grow, slack = limits
+    fixed, t3 = cloud.fixed, cloud.balls[3]
     best, piece = np.zeros((16, 5)), np.empty(PIECE)
     x, y, z, rad = t3[chunk, 0], t3[chunk, 1], t3[chunk, 2], t3[chunk, 3]
     held = fixed[chunk * 4096:chunk * 4096 + 4096].any()
@@ -112,18 +131,18 @@ def clash_chunk(chunk, t0, t1, t2, t3, points, fixed, starts, ends, axis, about,
         far = reach[k] + rad + bow + rapid_grow
         if near_segment2(x, y, z, starts[m], ends[m]) > far * far:
             continue
+        cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2])
         grow = 0.0 if feed or free[m] else rapid_grow
         length2 = (ends[m, 0] - starts[m, 0]) ** 2 + (ends[m, 1] - starts[m, 1]) ** 2 + (ends[m, 2] - starts[m, 2]) ** 2
         n = pieces(angle[m], math.sqrt(length2), reach[k], bow)
         for part in range(n):
             fill_piece(piece, starts[m], ends[m], axis[m], about[m], angle[m], part, n)
             if held or not feed:
-                _traverse(piece, chunk, t0, t1, t2, t3, points, fixed, not feed, cutters[k], bodies, -1, grow,
-                          slack, held, best)
+                _traverse(piece, chunk, cloud, held, not feed, cutter, bodies, -1, grow, slack, best)
             for b in range(body_first[k], body_first[k + 1]):
                 extra = 0.0 if feed else -bodies[b, 4] if free[m] else grow - min(grow, bodies[b, 4])
-                beside = max(bodies[b, 2], bodies[b, 3]) <= cutters[k, 0] + 1e-9
-                _traverse(piece, chunk, t0, t1, t2, t3, points, fixed, True, cutters[k], bodies, b, extra,
-                          slack if beside else TOUCHING, held, best)
+                beside = max(bodies[b, 2], bodies[b, 3]) <= cutter.radius + 1e-9
+                _traverse(piece, chunk, cloud, held, True, cutter, bodies, b, extra, slack if beside else TOUCHING,
+                          best)
         count = _note(events, count, m, best)
     return count

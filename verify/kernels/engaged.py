@@ -13,9 +13,11 @@ there, whatever way each of the moves between went: how a path is cut into moves
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from geometry.kernels.options import KERNEL
 
@@ -31,6 +33,17 @@ STRAIGHT = 0.25
 """Share of the tool radius: a way that goes on for less before it turns is looked at with what was before it."""
 ONE_WAY = math.cos(math.radians(30.0))
 """Moves that turn off by more go another way."""
+
+
+class EngagedArrays(NamedTuple):
+    """Sectors of the cutter that met stock, by even parts of moves.
+
+    first   : (m + 1,) int64, index, first part of each move
+    sectors : (p,) int64, bits, frame of the sectors (``verify.tool_axes``); kernels add to them in place
+    """
+
+    first: NDArray[np.int64]
+    sectors: NDArray[np.int64]
 
 
 @njit(**KERNEL)

@@ -16,24 +16,56 @@ each, kept beside the tile.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
+from geometry.kernels.cutter_sizes import CutterSizes
 from geometry.kernels.options import KERNEL
 from verify.kernels.clash import TOUCHING, is_lift
-from verify.kernels.engaged import LEAST_DEPTH, bottom, edge_radius, sector_bits
-from verify.kernels.frustum import contact_of_ball, no_deeper
+from verify.kernels.engaged import LEAST_DEPTH, EngagedArrays, bottom, edge_radius, sector_bits
+from verify.kernels.frustum import Frustum, contact_of_ball, no_deeper
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import beside, carried
 from verify.kernels.rays import gap, plan_distance
 from verify.kernels.stock import CUTTER, _note, _worse, known_depth
+from verify.kernels.tables import F64, I64, AxisArrays, ContactLimits, MoveArrays, ToolArrays
 
 LEAST_CUT = 1e-5
 NEAR = 1e-9  # mm, more than rounding of a distance
 RISE = 0.02  # mm: a tool that goes up goes no further between two looks at its bodies, where they met what stood before
 MOST_LOOKS = 128
 VOLUME_UNITS = 1e9
+
+
+class FieldArrays(NamedTuple):
+    """Signed distances into the stock, setup frame; node (i, j, k) is at origin + (i, j, k) step.
+
+    values : (nx, ny, nz) float32, mm, above zero where stock stands
+    origin : (3,) float64, mm
+    step   : float, mm between nodes
+    band   : float, mm, limit of the distances
+    """
+
+    values: NDArray[np.float32]
+    origin: F64
+    step: float
+    band: float
+
+
+class TileArrays(NamedTuple):
+    """A tile of nodes and its bricks of 4 nodes a side.
+
+    nodes : (6,) int64, index, first and stop node along x, y and z
+    tops  : (bx, by, bz) float64, mm, largest distance in each brick, kept beside the tile
+    solid : (6,) int64, index, first bricks along x, y and z that hold stock, then the last
+    """
+
+    nodes: I64
+    tops: F64
+    solid: I64
 
 
 @njit(**KERNEL)
@@ -79,7 +111,7 @@ def _box(p, z0, z1, wide):
 
 
 @njit(**KERNEL)
-def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius, twist, engaged, totals):
+def _cut_brick(stock, tile, brick, p, cutter, steep, end_radius, twist, engaged, totals):
     """Lower the nodes of one brick by piece p.
 
     totals : added to: volume, volume by the end, 1 where stock was touched, the end's volume times the square of
@@ -89,8 +121,10 @@ def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius
 
     Returns the new top.
     """
+    field, origin, h, band = stock
     i0, j0, k0 = tile[0] + 4 * brick[0], tile[2] + 4 * brick[1], tile[4] + 4 * brick[2]
-    a, r, length = cutter[0] - cutter[1], cutter[1], cutter[2]
+    radius, r, length = cutter
+    a = radius - r
     top = -1e30
     straight = p[30] == 0.0
     mx, my, mz = p[27], p[28], p[29]
@@ -111,13 +145,13 @@ def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius
                         far = NEAR + (max(v, h) if steep else v - LEAST_CUT)
                         s = min(max((qx * mx + qy * my) * by, 0.0), 1.0)
                         ex, ey = qx - s * mx, qy - s * my
-                        wide = max(cutter[0] + far, 0.0)
+                        wide = max(radius + far, 0.0)
                         if ex * ex + ey * ey > wide * wide or lowest - qz > far or qz - highest > far:
                             top = max(top, v)
                             continue
                     qx, qy, qz, dx, dy, dz = view(p, origin[0] + i * h, origin[1] + j * h, origin[2] + k * h)
                     # the search that a flat or a bull nose asks for pays only where the node may be lowered
-                    if a > 1e-12 and gap(qx, qy, qz, dx, dy, dz, dx * dx + dy * dy, a + r, r, length) >= v:
+                    if a > 1e-12 and gap(qx, qy, qz, dx, dy, dz, dx * dx + dy * dy, CutterSizes(a + r, r, length)) >= v:
                         top = max(top, v)
                         continue
                     d = max(carried(qx, qy, qz, dx, dy, dz, a, r, length), -band)
@@ -131,21 +165,21 @@ def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius
                             totals[2] = 1.0
                             plan = math.sqrt(dx * dx + dy * dy)
                             if d <= 0.0 and plan > 0.0:
-                                aside = min(abs(dx * qy - dy * qx) / plan, cutter[0])
-                                if qz - 0.5 * dz - bottom(aside, cutter[0], r) > LEAST_DEPTH * cutter[0]:
+                                aside = min(abs(dx * qy - dy * qx) / plan, radius)
+                                if qz - 0.5 * dz - bottom(aside, radius, r) > LEAST_DEPTH * radius:
                                     # where the edge comes to the place
                                     ahead = (qx * dx + qy * dy) / plan
-                                    edge = edge_radius(max(qz - 0.5 * dz, 0.0), cutter[0], r)
+                                    edge = edge_radius(max(qz - 0.5 * dz, 0.0), radius, r)
                                     ahead -= math.sqrt(max(edge * edge - aside * aside, 0.0))
                                     k_part = min(max(int(ahead / plan * len(engaged)), 0), len(engaged) - 1)
-                                    engaged[k_part] |= sector_bits(qx, qy, dx, dy, plan, qz - 0.5 * dz, cutter[0], r,
-                                                                   h, twist)
+                                    engaged[k_part] |= sector_bits(qx, qy, dx, dy, plan, qz - 0.5 * dz, radius, r, h,
+                                                                   twist)
                         totals[0] += gone
                         if steep:
                             off = plan_distance(qx, qy, dx, dy, dx * dx + dy * dy)
                             # a cell on the rim of the end counts by about the part of it that lies inside; where that
                             # is the rim of the cut as well, what went says so already
-                            rim = end_radius + max(h - (cutter[0] - end_radius), 0.0)
+                            rim = end_radius + max(h - (radius - end_radius), 0.0)
                             own = gone * min(max(0.5 + (rim - off) / h, 0.0), 1.0)
                             totals[1] += own
                             totals[3] += own * min(off / end_radius, 1.0) ** 2
@@ -155,9 +189,11 @@ def _cut_brick(field, tile, h, band, origin, brick, p, cutter, steep, end_radius
 
 
 @njit(**KERNEL)
-def _cut(field, tops, tile, h, band, origin, p, cutter, steep, end_radius, twist, engaged, totals):
+def _cut(stock, bricks, p, cutter, steep, end_radius, twist, engaged, totals):
     """Lower the nodes of a tile by a cutting part on piece p."""
-    box = _box(p, 0.0, cutter[2], cutter[0] + band)
+    origin, h, band = stock.origin, stock.step, stock.band
+    tile, tops = bricks.nodes, bricks.tops
+    box = _box(p, 0.0, cutter.length, cutter.radius + band)
     nx, ny, nz = tops.shape
     a0, a1 = _bricks(box[0] - band, box[3] + band, origin[0], h, tile[0], nx)
     b0, b1 = _bricks(box[1] - band, box[4] + band, origin[1], h, tile[2], ny)
@@ -172,16 +208,18 @@ def _cut(field, tops, tile, h, band, origin, p, cutter, steep, end_radius, twist
                 if top <= -band:
                     continue
                 qx, qy, qz, dx, dy, dz = view(p, x, y, origin[2] + (tile[4] + 4 * bk + 1.5) * h)
-                if gap(qx, qy, qz, dx, dy, dz, dx * dx + dy * dy, cutter[0], cutter[1], cutter[2]) - half >= top:
+                if gap(qx, qy, qz, dx, dy, dz, dx * dx + dy * dy, cutter) - half >= top:
                     continue
-                tops[bi, bj, bk] = _cut_brick(field, tile, h, band, origin, (bi, bj, bk), p, cutter, steep, end_radius,
-                                              twist, engaged, totals)
+                tops[bi, bj, bk] = _cut_brick(stock, tile, (bi, bj, bk), p, cutter, steep, end_radius, twist, engaged,
+                                              totals)
 
 
 @njit(**KERNEL)
-def _meet(field, tops, solid, tile, h, origin, p, body, is_cutter, cutter, grow, slack, best):
+def _meet(stock, bricks, p, body, is_cutter, cutter, grow, slack, best):
     """Find the stock of a tile that one body of a tool, grown by ``grow``, takes in on piece p."""
-    z0, z1, wide, clearance, code = 0.0, cutter[2], cutter[0] + grow, grow, CUTTER
+    field, origin, h, _band = stock
+    tile, tops, solid = bricks
+    z0, z1, wide, clearance, code = 0.0, cutter.length, cutter.radius + grow, grow, CUTTER
     if not is_cutter:
         z0, z1, wide, clearance, code = body[0], body[1], max(body[2], body[3]) + grow, body[4] + grow, int(body[5])
     box = _box(p, z0, z1, wide)
@@ -215,15 +253,17 @@ def _meet(field, tops, solid, tile, h, origin, p, body, is_cutter, cutter, grow,
                             x, y, z = origin[0] + i * h, origin[1] + j * h, origin[2] + k * h
                             qx, qy, qz, dx, dy, dz = view(p, x, y, z)
                             if is_cutter:
-                                bare = v - carried(qx, qy, qz, dx, dy, dz, cutter[0] - cutter[1], cutter[1], cutter[2])
+                                bare = v - carried(qx, qy, qz, dx, dy, dz, cutter.radius - cutter.corner, cutter.corner,
+                                                   cutter.length)
                                 depth = grow + bare if bare > slack else 0.0
                                 if depth == 0.0 and known_depth(best, code, grow) < grow:
-                                    depth = grow - beside(qx, qy, qz, dx, dy, dz, cutter[0] - cutter[1], cutter[1],
-                                                          cutter[2], v, grow, slack)
+                                    depth = grow - beside(qx, qy, qz, dx, dy, dz, cutter.radius - cutter.corner,
+                                                          cutter.corner, cutter.length, v, grow, slack)
                             else:
                                 # the ball of radius v round the node is stock
-                                depth = contact_of_ball(qx, qy, qz, dx, dy, dz, z0, z1, body[2] + grow, body[3] + grow,
-                                                        v, clearance, slack, known_depth(best, code, clearance))
+                                depth = contact_of_ball(qx, qy, qz, dx, dy, dz,
+                                                        Frustum(z0, z1, body[2] + grow, body[3] + grow), v, clearance,
+                                                        slack, known_depth(best, code, clearance))
                             if depth > 0.0:
                                 _worse(best, code, depth, clearance, x, y, z)
 
@@ -262,37 +302,43 @@ def _beside(seen, z0, z1, wide):
 
 
 @njit(**KERNEL)
-def _look(field, tops, solid, tile, h, origin, p, bodies, first, stop, cutter, seen, feed, free, grow, slack, best):
-    """Find the stock of a tile that neck, shank and holder of a tool take in on piece p."""
-    for b in range(first, stop):
+def _look(stock, bricks, p, tools, k, seen, feed, free, grow, slack, best):
+    """Find the stock of a tile that neck, shank and holder of tool k take in on piece p."""
+    cutters, bodies = tools.cutters, tools.bodies
+    cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2])
+    for b in range(tools.first[k], tools.first[k + 1]):
         extra = 0.0 if feed else -bodies[b, 4] if free else grow - min(grow, bodies[b, 4])
         if _beside(seen, bodies[b, 0], bodies[b, 1], max(bodies[b, 2], bodies[b, 3]) + extra):
             continue
-        loose = slack if max(bodies[b, 2], bodies[b, 3]) <= cutter[0] + 1e-9 else TOUCHING
-        _meet(field, tops, solid, tile, h, origin, p, bodies[b], False, cutter, extra, loose, best)
+        loose = slack if max(bodies[b, 2], bodies[b, 3]) <= cutter.radius + 1e-9 else TOUCHING
+        _meet(stock, bricks, p, bodies[b], False, cutter, extra, loose, best)
 
 
 @njit(**KERNEL)
-def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, twists, feeds, free, steep, parts,
-               tool, cutters, ends_radius, bodies, body_first, reach, rapid_grow, slack, bow, taken, engaged, events):
+def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, twists, free, steep, tools: ToolArrays,
+               limits: ContactLimits, taken, engaged: EngagedArrays, events):
     """Work all moves in order through the nodes of one tile, in place.
 
-    field : (nx, ny, nz) float32; tile : (6,) int64 first and stop node in x, y, z; origin (3,), h, band : mm
+    tile   : (6,) int64, index, first and stop node in x, y, z
     twists : (m,) float64, rad, of the X that a tool sees a move in, row w, in the frame of the sectors
-    free  : (m,) bool, rapids that no clearance is asked of
-    steep : (m,) bool, feed moves that go down along the tool steeper than a ramp
-    reach : (k,) float64, mm, how far each assembly reaches from the tip
-    taken : (m, 4) int64, added to; 1e-9 mm³: what each move takes, and what the end of a steep one does; whole numbers,
-            so that sums do not depend on the order of tiles; 1 where stock was touched and no share of a cell went;
-            third what the end does times the square of the share of its radius it is from the middle; fourth 1e-9
-            mm² of stock right under the end
-    parts : (m + 1,) int64, first row of each move in ``engaged`` (p,) int64, sectors of the cutter that met stock,
-            which are added to
+    free   : (m,) bool, rapids that need no clearance
+    steep  : (m,) bool, feed moves that go down along the tool steeper than a ramp
+    taken  : (m, 4) int64, added to; 1e-9 mm³: what each move takes, and what the end of a steep one does; whole
+             numbers, so that sums do not depend on the order of tiles; 1 where stock was touched and no share of a cell
+             went; third what the end does times the square of the share of its radius it is from the middle; fourth
+             1e-9 mm² of stock right under the end
 
     Returns the number of events found, which may exceed the table.
     """
+    field, origin, h, band = stock
+    starts, ends, feeds, tool = moves
+    axis, about, angle, bow = axes
+    cutters, ends_radius, reach, bodies, _first = tools
+    rapid_grow, slack = limits
+    parts, sectors = engaged
     tops = brick_tops(field, tile[0], tile[1], tile[2], tile[3], tile[4], tile[5])
     solid = np.zeros(6, np.int64)
+    bricks = TileArrays(tile, tops, solid)
     changing = _solid(tops, band, solid)
     best, trial, piece, totals = np.zeros((16, 5)), np.zeros((16, 5)), np.empty(PIECE), np.zeros(5)
     rows = np.zeros((1, 6)) if len(bodies) == 0 else bodies
@@ -308,6 +354,7 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, t
         far = reach[k] + rad + band + bow + rapid_grow
         if near_segment2(cx, cy, cz, starts[m], ends[m]) > far * far:
             continue
+        cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2])
         grow = 0.0 if feed or free[m] else rapid_grow
         length2 = (ends[m, 0] - starts[m, 0]) ** 2 + (ends[m, 1] - starts[m, 1]) ** 2 + (ends[m, 2] - starts[m, 2]) ** 2
         n = pieces(angle[m], math.sqrt(length2), reach[k], bow)
@@ -321,8 +368,7 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, t
                 for part in range(n):
                     fill_piece(piece, starts[m], ends[m], axis[m], about[m], angle[m], part, n)
                     seen = _seen_tile(piece, cx, cy, cz, rad + band)
-                    _look(field, tops, solid, tile, h, origin, piece, rows, body_first[k], body_first[k + 1],
-                          cutters[k], seen, True, False, 0.0, slack, trial)
+                    _look(stock, bricks, piece, tools, k, seen, True, False, 0.0, slack, trial)
                 if trial[:, 0].max() > 0.0:
                     n = max(n, min(math.ceil(math.sqrt(length2) / RISE), MOST_LOOKS))
         totals[:] = 0.0
@@ -330,14 +376,13 @@ def field_tile(field, tile, origin, h, band, starts, ends, axis, about, angle, t
             fill_piece(piece, starts[m], ends[m], axis[m], about[m], angle[m], part, n)
             # most of a long tool passes most tiles by: one look at the ball round the tile decides
             seen = _seen_tile(piece, cx, cy, cz, rad + band)
-            near = not _beside(seen, 0.0, cutters[k, 2], cutters[k, 0] + grow)
+            near = not _beside(seen, 0.0, cutter.length, cutter.radius + grow)
             if near and feed:
-                _cut(field, tops, tile, h, band, origin, piece, cutters[k], steep[m], ends_radius[k], twists[m],
-                     engaged[parts[m]:parts[m + 1]], totals)
+                _cut(stock, bricks, piece, cutter, steep[m], ends_radius[k], twists[m], sectors[parts[m]:parts[m + 1]],
+                     totals)
             elif near:
-                _meet(field, tops, solid, tile, h, origin, piece, rows[0], True, cutters[k], grow, TOUCHING, best)
-            _look(field, tops, solid, tile, h, origin, piece, rows, body_first[k], body_first[k + 1], cutters[k], seen,
-                  feed, free[m], grow, slack, best)
+                _meet(stock, bricks, piece, rows[0], True, cutter, grow, TOUCHING, best)
+            _look(stock, bricks, piece, tools, k, seen, feed, free[m], grow, slack, best)
         if totals[0] > 0.0 or totals[2] > 0.0:
             taken[m, 0] += max(round(totals[0] * VOLUME_UNITS), 1)
             taken[m, 1] += round(totals[1] * VOLUME_UNITS)

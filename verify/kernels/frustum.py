@@ -13,6 +13,7 @@ closed form: at an end, where a slope is zero, or where they are equal.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -20,6 +21,19 @@ from numba import njit
 INF = np.inf
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 SECTIONS = 32  # of a move: 2e-7 of it is left
+
+
+class Frustum(NamedTuple):
+    """A frustum about the axis of the tool, mm, frame of the tool: tip at the origin, axis Z.
+
+    z0, z1 : float, heights of its lower and upper end over the tip
+    r0, r1 : float, its radii there
+    """
+
+    z0: float
+    z1: float
+    r0: float
+    r1: float
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
@@ -79,11 +93,12 @@ def _meeting(wz, dz, low, high):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _most(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column, lesser):
+def _most(wx, wy, wz, dx, dy, dz, body, column, lesser):
     """The greatest of aside, or of the lesser of aside and down; -inf where the heights never meet.
 
     A column meets a frustum that narrows upwards with its lower end, one that widens as high as it stands.
     """
+    z0, z1, r0, r1 = body
     s1, s2 = _meeting(wz, dz, z0, INF if column else z1)
     if s1 > s2:
         return -INF
@@ -103,21 +118,21 @@ def _most(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column, lesser):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def overlap(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
+def overlap(wx, wy, wz, dx, dy, dz, body: Frustum, column):
     """How deep (radially, mm) the frustum takes in the point, or the column below it.
 
     Positive inside; -inf where the heights never meet.
     """
-    return _most(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column, False)
+    return _most(wx, wy, wz, dx, dy, dz, body, column, False)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def penetration(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column):
+def penetration(wx, wy, wz, dx, dy, dz, body: Frustum, column):
     """How deep the frustum takes in the point (or the column below it), mm: the shorter way out, aside or down.
 
     0 where they do not meet.
     """
-    return max(_most(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column, True), 0.0)
+    return max(_most(wx, wy, wz, dx, dy, dz, body, column, True), 0.0)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
@@ -128,32 +143,35 @@ def no_deeper(wx, wy, wz, dx, dy, dz, z0, z1, wide, clearance, known):
     """
     if known >= clearance and clearance + wz - min(dz, 0.0) - z0 <= known:
         return True
-    return overlap(wx, wy, wz, dx, dy, dz, z0, z1, wide, wide, False) <= known
+    return overlap(wx, wy, wz, dx, dy, dz, Frustum(z0, z1, wide, wide), False) <= known
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def contact(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, clearance, slack, known, column):
+def contact(wx, wy, wz, dx, dy, dz, body: Frustum, clearance, slack, known, column):
     """How deep a body grown by ``clearance`` takes in a point (or the column below it), as an event counts it.
 
-    r0, r1 hold the clearance. Up to the clearance that is how much nearer than it, aside; above it the clearance and
-    how deep the point is in the bare body (``penetration``). 0 where it is no deeper than ``slack`` or ``known``.
+    The radii of ``body`` hold the clearance. Up to the clearance that is how much nearer than it, aside; above it the
+    clearance and how deep the point is in the bare body (``penetration``). 0 where it is no deeper than ``slack`` or
+    ``known``.
     """
+    z0, z1, r0, r1 = body
     if known >= clearance and clearance + wz - min(dz, 0.0) - z0 <= known:
         return 0.0
-    depth = overlap(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, column)
+    depth = overlap(wx, wy, wz, dx, dy, dz, body, column)
     if depth <= max(slack, known):
         return 0.0
-    bare = penetration(wx, wy, wz, dx, dy, dz, z0, z1, r0 - clearance, r1 - clearance, column)
+    bare = penetration(wx, wy, wz, dx, dy, dz, Frustum(z0, z1, r0 - clearance, r1 - clearance), column)
     return clearance + bare if bare > slack else min(depth, clearance)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _of_ball(s, wx, wy, wz, dx, dy, dz, z0, z1, r, k, v, lesser):
+def _of_ball(s, wx, wy, wz, dx, dy, dz, body, k, v, lesser):
     """The greatest of aside, or of the lesser of aside and down, of places within v of the point, at s.
 
     Of all places q higher than the point the deepest is nearer the axis by what is left of v. -inf where none of them
     is between z0 and z1.
     """
+    z0, z1, r = body.z0, body.z1, body.r0
     ux, uy, high = wx - s * dx, wy - s * dy, wz - s * dz - z0
     low, up = max(-v, -high), min(v, z1 - z0 - high)
     if low > up:
@@ -176,45 +194,47 @@ def _of_ball(s, wx, wy, wz, dx, dy, dz, z0, z1, r, k, v, lesser):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _most_of_ball(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, v, lesser):
+def _most_of_ball(wx, wy, wz, dx, dy, dz, body, v, lesser):
     """The greatest on the move of ``_of_ball``, which is concave in s: by golden sections."""
+    z0, z1, r0, r1 = body
     s1, s2 = _meeting(wz, dz, z0 - v, z1 + v)
     if s1 > s2:
         return -INF
     k = (r1 - r0) / max(z1 - z0, 1e-12)
     if (s2 - s1) ** 2 * (dx * dx + dy * dy + dz * dz) < 1e-18:
-        return _of_ball(0.5 * (s1 + s2), wx, wy, wz, dx, dy, dz, z0, z1, r0, k, v, lesser)
+        return _of_ball(0.5 * (s1 + s2), wx, wy, wz, dx, dy, dz, body, k, v, lesser)
     a, b = s2 - GOLDEN * (s2 - s1), s1 + GOLDEN * (s2 - s1)
-    at_a = _of_ball(a, wx, wy, wz, dx, dy, dz, z0, z1, r0, k, v, lesser)
-    at_b = _of_ball(b, wx, wy, wz, dx, dy, dz, z0, z1, r0, k, v, lesser)
-    most = max(at_a, at_b, _of_ball(s1, wx, wy, wz, dx, dy, dz, z0, z1, r0, k, v, lesser),
-               _of_ball(s2, wx, wy, wz, dx, dy, dz, z0, z1, r0, k, v, lesser))
+    at_a = _of_ball(a, wx, wy, wz, dx, dy, dz, body, k, v, lesser)
+    at_b = _of_ball(b, wx, wy, wz, dx, dy, dz, body, k, v, lesser)
+    most = max(at_a, at_b, _of_ball(s1, wx, wy, wz, dx, dy, dz, body, k, v, lesser),
+               _of_ball(s2, wx, wy, wz, dx, dy, dz, body, k, v, lesser))
     for _ in range(SECTIONS):
         if at_a < at_b:
             s1, a, at_a = a, b, at_b
             b = s1 + GOLDEN * (s2 - s1)
-            at_b = _of_ball(b, wx, wy, wz, dx, dy, dz, z0, z1, r0, k, v, lesser)
+            at_b = _of_ball(b, wx, wy, wz, dx, dy, dz, body, k, v, lesser)
         else:
             s2, b, at_b = b, a, at_a
             a = s2 - GOLDEN * (s2 - s1)
-            at_a = _of_ball(a, wx, wy, wz, dx, dy, dz, z0, z1, r0, k, v, lesser)
+            at_a = _of_ball(a, wx, wy, wz, dx, dy, dz, body, k, v, lesser)
         most = max(most, at_a, at_b)
     return most
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def contact_of_ball(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, v, clearance, slack, known):
+def contact_of_ball(wx, wy, wz, dx, dy, dz, body: Frustum, v, clearance, slack, known):
     """As ``contact``, for the deepest of all places within v mm of the point."""
+    z0, z1, r0, r1 = body
     k = (r1 - r0) / max(z1 - z0, 1e-12)
     side = v * math.sqrt(1.0 + k * k)  # the side moves out by so much, measured across the axis
-    most = overlap(wx, wy, wz, dx, dy, dz, z0 - v, z1 + v, r0 + side - v * k, r1 + side + v * k, False)
+    most = overlap(wx, wy, wz, dx, dy, dz, Frustum(z0 - v, z1 + v, r0 + side - v * k, r1 + side + v * k), False)
     if most <= max(slack, known) or (known >= clearance and clearance + wz - min(dz, 0.0) + v - z0 <= known):
         return 0.0
     if most > clearance + slack:
-        bare = _most_of_ball(wx, wy, wz, dx, dy, dz, z0, z1, r0 - clearance, r1 - clearance, v, True)
+        bare = _most_of_ball(wx, wy, wz, dx, dy, dz, Frustum(z0, z1, r0 - clearance, r1 - clearance), v, True)
         if bare > slack:
             return clearance + bare
     if known >= clearance:
         return 0.0
-    near = _most_of_ball(wx, wy, wz, dx, dy, dz, z0, z1, r0, r1, v, False)
+    near = _most_of_ball(wx, wy, wz, dx, dy, dz, body, v, False)
     return min(near, clearance) if near > max(slack, known) else 0.0

@@ -8,14 +8,47 @@ program order: the result does not depend on the number of threads.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from geometry.kernels.cutter_sizes import CutterSizes
 from verify.kernels.sweep import capsule_start, cutter_interval
+from verify.kernels.tables import F64, I32, I64, MoveArrays
 
 TOUCH = 1e-6
 SAME = 1e-8  # mm: a move that takes less than that off a ray has taken nothing, as the way back out of a plunge
+
+
+class CellArrays(NamedTuple):
+    """Cells of a 3-D grid of points, setup frame; cell (x, y, z) is row (x shape[1] + y) shape[2] + z.
+
+    origin : (3,) float64, mm, lower corner
+    size   : float, mm, side of a cell
+    shape  : (3,) int64, count of cells
+    first  : (cells + 1,) int64, index, first point of each cell
+    """
+
+    origin: F64
+    size: float
+    shape: I64
+    first: I64
+
+
+class SampleArrays(NamedTuple):
+    """Samples of the surface and what is left on them, setup frame; the last two change in place.
+
+    points   : (n, 3) float64, mm
+    normals  : (n, 3) float64, unit, out of the material
+    residual : (n,) float64, mm, along the normal
+    mover    : (n,) int32, index, the move that left it
+    """
+
+    points: F64
+    normals: F64
+    residual: F64
+    mover: I32
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
@@ -30,8 +63,9 @@ def plan_distance(wx, wy, dx, dy, length2):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def gap(x, y, z, dx, dy, dz, plan2, radius, corner, length):
+def gap(x, y, z, dx, dy, dz, plan2, cutter: CutterSizes):
     """A lower bound of the distance from a point, seen from the tip, to the swept cutting part (negative inside)."""
+    radius, corner, length = cutter
     plan = plan_distance(x, y, dx, dy, plan2)
     side = plan - radius
     low = min(0.0, dz)
@@ -66,11 +100,12 @@ def _flank_bound(wx, wy, nx, ny, dx, dy, plan2, radius):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def new_left(qx, qy, qz, nx, ny, nz, dx, dy, dz, plan2, radius, corner, length, left):
+def new_left(qx, qy, qz, nx, ny, nz, dx, dy, dz, plan2, cutter: CutterSizes, left):
     """What a move leaves on a ray from q along n that had ``left`` on it; ``left`` itself where it takes nothing.
 
     q, n, D as in ``sweep``; plan2 = dx² + dy².
     """
+    radius, corner, length = cutter
     if corner >= radius - 1e-12 and qz < min(0.0, dz) + corner:
         # under every equator a ball is as far as its sphere: squares decide most pairs
         wx, wy, wz = qx, qy, qz - corner
@@ -84,7 +119,7 @@ def new_left(qx, qy, qz, nx, ny, nz, dx, dy, dz, plan2, radius, corner, length, 
     else:
         if _flank_bound(qx, qy, nx, ny, dx, dy, plan2, radius) > max(left, 0.0) + TOUCH:
             return left
-        if gap(qx, qy, qz, dx, dy, dz, plan2, radius, corner, length) > max(left, 0.0) + TOUCH:
+        if gap(qx, qy, qz, dx, dy, dz, plan2, cutter) > max(left, 0.0) + TOUCH:
             return left
     if corner >= radius - 1e-12 and nz >= 0.0 and qz + nz * left < min(0.0, dz) + min(corner, length - corner):
         # the ray meets the ball below its equator first: one root decides nearly all pairs
@@ -93,22 +128,22 @@ def new_left(qx, qy, qz, nx, ny, nz, dx, dy, dz, plan2, radius, corner, length, 
             return left
         if t >= 0.0:
             return t
-    lo, hi = cutter_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, corner, length)
+    lo, hi = cutter_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter)
     return lo if lo <= hi and hi >= -TOUCH and lo < left else left
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def cut_tile(cx0, cx1, cy0, cy1, origin, size, shape, first, points, normals, residual, mover, left,
-             starts, ends, feeds, tool, cutters):
-    """Work all feed moves through the cell columns cx0..cx1-1, cy0..cy1-1.
+def cut_tile(tile, cells: CellArrays, samples: SampleArrays, left, moves: MoveArrays, cutters):
+    """Work all feed moves through the cell columns x0..x1-1, y0..y1-1 of a tile (x0, x1, y0, y1).
 
-    origin, size, shape : of the grid; first (cells + 1,) int64 is the first sample of each cell
-    points, normals     : (n, 3) float64, sorted by cell
-    residual, mover     : (n,) float64 and int32, changed in place
-    left                : (cells,) float64, largest residual of each cell, changed in place
-    starts, ends        : (m, 3) float64 tip positions; feeds (m,) bool; tool (m,) int32 row of ``cutters``
-    cutters             : (k, 3) float64: radius, corner radius, flute length
+    samples : sorted by cell
+    left    : (cells,) float64, mm, largest residual of each cell, changed in place
+    cutters : (k, 3) float64, mm: radius, corner radius, flute length
     """
+    cx0, cx1, cy0, cy1 = tile
+    origin, size, shape, first = cells
+    points, normals, residual, mover = samples
+    starts, ends, feeds, tool = moves
     half = 0.5 * math.sqrt(2.0) * size
     pad = 0.0
     # lowest cell of each column that holds samples and the one after the highest: a surface fills few of them
@@ -127,7 +162,8 @@ def cut_tile(cx0, cx1, cy0, cy1, origin, size, shape, first, points, normals, re
             continue
         ax, ay, az = starts[m, 0], starts[m, 1], starts[m, 2]
         dx, dy, dz = ends[m, 0] - ax, ends[m, 1] - ay, ends[m, 2] - az
-        radius, corner, length = cutters[tool[m], 0], cutters[tool[m], 1], cutters[tool[m], 2]
+        cutter = CutterSizes(cutters[tool[m], 0], cutters[tool[m], 1], cutters[tool[m], 2])
+        radius = cutter.radius
         reach = radius + pad
         x0 = max(cx0, math.floor((min(ax, ax + dx) - reach - origin[0]) / size))
         x1 = min(cx1 - 1, math.floor((max(ax, ax + dx) + reach - origin[0]) / size))
@@ -136,7 +172,7 @@ def cut_tile(cx0, cx1, cy0, cy1, origin, size, shape, first, points, normals, re
         if x0 > x1 or y0 > y1:
             continue
         z0 = max(0, math.floor((min(az, az + dz) - pad - origin[2]) / size))
-        z1 = min(shape[2] - 1, math.floor((max(az, az + dz) + length + pad - origin[2]) / size))
+        z1 = min(shape[2] - 1, math.floor((max(az, az + dz) + cutter.length + pad - origin[2]) / size))
         plan2 = dx * dx + dy * dy
         for cx in range(x0, x1 + 1):
             for cy in range(y0, y1 + 1):
@@ -152,14 +188,13 @@ def cut_tile(cx0, cx1, cy0, cy1, origin, size, shape, first, points, normals, re
                     if first[c] == first[c + 1] or side > left[c] + TOUCH:
                         continue
                     pz = origin[2] + (c - row + 0.5) * size
-                    if gap(px - ax, py - ay, pz - az, dx, dy, dz, plan2, radius, corner, length) \
+                    if gap(px - ax, py - ay, pz - az, dx, dy, dz, plan2, cutter) \
                             > left[c] + 0.5 * math.sqrt(3.0) * size + TOUCH:
                         continue
                     most = 0.0
                     for i in range(first[c], first[c + 1]):
                         t = new_left(points[i, 0] - ax, points[i, 1] - ay, points[i, 2] - az, normals[i, 0],
-                                     normals[i, 1], normals[i, 2], dx, dy, dz, plan2, radius, corner, length,
-                                     residual[i])
+                                     normals[i, 1], normals[i, 2], dx, dy, dz, plan2, cutter, residual[i])
                         if t < residual[i] - SAME:
                             residual[i], mover[i] = t, m
                         most = max(most, residual[i])

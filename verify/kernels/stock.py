@@ -9,17 +9,63 @@ Blocks are independent, and within one every line sees the moves in order.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from verify.kernels.engaged import LEAST_DEPTH, WINDOW, sector_bits
-from verify.kernels.frustum import contact
+from geometry.kernels.cutter_sizes import CutterSizes
+from verify.kernels.engaged import LEAST_DEPTH, WINDOW, EngagedArrays, sector_bits
+from verify.kernels.frustum import Frustum, contact
 from verify.kernels.heights import INF, _cells, entered, lowest, lowest_within
+from verify.kernels.tables import F64, Bool, ContactLimits, MoveArrays, ToolArrays
 
 CUTTER, NECK, SHANK, HOLDER, PLUNGE, FIXTURE = 0, 1, 2, 3, 4, 8
 REFRESH = 64
 ARM = 0.05  # mm by which a line that stands over the flutes must reach into them
+
+
+class LineArrays(NamedTuple):
+    """Vertical lines of stock, setup frame: line (i, j) stands at origin + ((i, j) + 0.5) step.
+
+    height : (nx, ny) float64, mm, top of the stock
+    origin : (2,) float64, mm
+    step   : float, mm between lines
+    """
+
+    height: F64
+    origin: F64
+    step: float
+
+
+class DescentArrays(NamedTuple):
+    """What the moves before each move allow it to dig.
+
+    steep  : (m,) bool, feed moves steeper than a ramp
+    earned : (m,) float64, mm, depth that ramps could have taken before
+    way    : (m,) float64, mm, sideways way of feed moves before; far off after a rapid or another tool
+    skin   : (k,) float64, mm, depth that the end of each tool may dig
+    """
+
+    steep: Bool
+    earned: F64
+    way: F64
+    skin: F64
+
+
+class LineHistory(NamedTuple):
+    """What the moves so far did to each line of a block, changed in place.
+
+    since : (nx, ny) float64, mm, depth that ramps could have taken until the line was last dug
+    dug   : (nx, ny) float64, mm, depth that ends of tools have dug and no ramp has paid for
+    come  : (nx, ny) float64, mm, height of the line before the cutter began to lower it
+    begun : (nx, ny) float64, mm, sideways way of the feed moves then
+    """
+
+    since: F64
+    dug: F64
+    come: F64
+    begun: F64
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
@@ -77,16 +123,17 @@ def _worse(best, code, depth, clearance, x, y, z):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _lower(height, box, origin, step, a, d, cutter, end_radius, skin, steep, earned, since, dug, gone_on, come, begun,
-           engaged, best):
-    """Lower the lines under one feed move.
+def _lower(lines, box, a, d, cutter, end_radius, skin, descents, m, history, engaged, best):
+    """Lower the lines under feed move m.
 
-    gone_on     : mm of way before the move
-    come, begun : (nx, ny) of the block, height of a line before the cutter began to lower it, mm, and mm of way then
-    engaged     : (parts,) int64, sectors of the cutter that met stock, added to, by even parts of the move
+    end_radius : mm, of the end of the tool that cuts straight down; skin : mm that it may dig
+    engaged    : (parts,) int64, sectors of the cutter that met stock, added to, by even parts of the move
 
     Returns whether any stock went, and whether the flutes were under stock.
     """
+    height, origin, step = lines
+    steep, earned, gone_on = descents.steep[m], descents.earned[m], descents.way[m]
+    since, dug, come, begun = history
     i0, i1, j0, j1 = box
     radius, corner, length = cutter
     cut, under = False, False
@@ -146,8 +193,9 @@ def _lower(height, box, origin, step, a, d, cutter, end_radius, skin, steep, ear
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _meet_body(height, box, origin, step, a, d, body, grow, slack, best):
+def _meet_body(lines, box, a, d, body, grow, slack, best):
     """Find the lines that one body, grown further by ``grow``, takes in by more than ``slack``."""
+    height, origin, step = lines
     z0, z1, r0, r1 = body[0], body[1], body[2] + grow, body[3] + grow
     wide = max(r0, r1)
     i0, i1, j0, j1 = box
@@ -162,15 +210,16 @@ def _meet_body(height, box, origin, step, a, d, body, grow, slack, best):
             top = height[i, j]
             if top <= under:
                 continue
-            depth = contact(x - a[0], y - a[1], top - a[2], d[0], d[1], d[2], z0, z1, r0, r1, body[4] + grow, slack,
-                            known_depth(best, code, body[4] + grow), True)
+            depth = contact(x - a[0], y - a[1], top - a[2], d[0], d[1], d[2], Frustum(z0, z1, r0, r1), body[4] + grow,
+                            slack, known_depth(best, code, body[4] + grow), True)
             if depth > 0.0:
                 _worse(best, code, depth, body[4] + grow, x, y, top)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _rapid_cutter(height, box, origin, step, a, d, cutter, grow, best):
+def _rapid_cutter(lines, box, a, d, cutter, grow, best):
     """Find the lines that the cutting part, grown radially, enters in a rapid; whether they stand over the flutes."""
+    height, origin, step = lines
     radius, corner, length = cutter
     under, above = False, max(a[2], a[2] + d[2]) + length + ARM
     wide = radius + grow
@@ -206,24 +255,24 @@ def _rapid_cutter(height, box, origin, step, a, d, cutter, grow, best):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def stock_tile(i0, i1, j0, j1, origin, step, height, starts, ends, feeds, free, steep, earned, ways, parts, tool,
-               cutters, ends_radius, skins, bodies, body_first, rapid_grow, slack, cut, under, engaged, events):
-    """Work all moves through the lines i0..i1-1, j0..j1-1 of ``height``, in place.
+def stock_tile(box, lines: LineArrays, moves: MoveArrays, free, descents: DescentArrays, tools: ToolArrays,
+               limits: ContactLimits, cut, under, engaged: EngagedArrays, events):
+    """Work all moves through the lines i0..i1-1, j0..j1-1 of a box (i0, i1, j0, j1), in place.
 
-    steep : (m,) bool, feed moves steeper than a ramp; earned : (m,) float64, mm, what ramps could have taken before
-    rapid_grow : mm around everything in a rapid, but in those that are ``free`` (m,) bool
-    ways  : (m,) float64, mm, sideways way of feed moves before each; far off after a rapid or another tool
-    slack : mm of radial overlap that a body beside its own cut may have; cut (m,) uint8 is set where stock went
+    free  : (m,) bool, rapids that need no clearance
+    cut   : (m,) uint8, set where stock went
     under : (m,) uint8, set where the flutes were under stock, of which lines of one height cannot tell
-    parts : (m + 1,) int64, first row of each move in ``engaged`` (p,) int64, sectors of the cutter that met stock,
-            which are added to
 
     Returns the number of events found, which may exceed the table.
     """
-    box = (i0, i1, j0, j1)
-    since = np.zeros((i1 - i0, j1 - j0))
-    dug = np.zeros((i1 - i0, j1 - j0))
-    come, begun = np.zeros((i1 - i0, j1 - j0)), np.full((i1 - i0, j1 - j0), -INF)
+    i0, i1, j0, j1 = box
+    height, origin, step = lines
+    starts, ends, feeds, tool = moves
+    cutters, ends_radius, _reach, bodies, body_first = tools
+    rapid_grow, slack = limits
+    skins, parts, sectors = descents.skin, engaged.first, engaged.sectors
+    history = LineHistory(np.zeros((i1 - i0, j1 - j0)), np.zeros((i1 - i0, j1 - j0)), np.zeros((i1 - i0, j1 - j0)),
+                          np.full((i1 - i0, j1 - j0), -INF))
     best = np.zeros((16, 5))
     top = _top(height, i0, i1, j0, j1)
     x0, x1 = origin[0] + i0 * step, origin[0] + i1 * step
@@ -243,10 +292,10 @@ def stock_tile(i0, i1, j0, j1, origin, step, height, starts, ends, feeds, free, 
         if min(a[0], ends[m, 0]) - wide > x1 or max(a[0], ends[m, 0]) + wide < x0 \
                 or min(a[1], ends[m, 1]) - wide > y1 or max(a[1], ends[m, 1]) + wide < y0:
             continue
-        cutter = (cutters[k, 0], cutters[k, 1], cutters[k, 2])
+        cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2])
         if feeds[m]:
-            went, below = _lower(height, box, origin, step, a, d, cutter, ends_radius[k], skins[k], steep[m], earned[m],
-                                 since, dug, ways[m], come, begun, engaged[parts[m]:parts[m + 1]], best)
+            went, below = _lower(lines, box, a, d, cutter, ends_radius[k], skins[k], descents, m, history,
+                                 sectors[parts[m]:parts[m + 1]], best)
             if below:
                 under[m] = 1
             if went:
@@ -255,14 +304,13 @@ def stock_tile(i0, i1, j0, j1, origin, step, height, starts, ends, feeds, free, 
                 if lowered % REFRESH == 0:
                     top = _top(height, i0, i1, j0, j1)
         else:
-            if _rapid_cutter(height, box, origin, step, a, d, cutter, grow, best):
+            if _rapid_cutter(lines, box, a, d, cutter, grow, best):
                 under[m] = 1
         for b in range(body_first[k], body_first[k + 1]):
             if min(a[2], ends[m, 2]) + bodies[b, 0] < top:
                 # a body no wider than the cutting part runs where the flutes have been, within what they may gouge
-                loose = slack if max(bodies[b, 2], bodies[b, 3]) <= cutter[0] + 1e-9 else 1e-3
+                loose = slack if max(bodies[b, 2], bodies[b, 3]) <= cutter.radius + 1e-9 else 1e-3
                 extra = grow - min(grow, bodies[b, 4]) if not free[m] else -bodies[b, 4]
-                _meet_body(height, box, origin, step, a, d, bodies[b], extra if not feeds[m] else 0.0, loose,
-                           best)
+                _meet_body(lines, box, a, d, bodies[b], extra if not feeds[m] else 0.0, loose, best)
         count = _note(events, count, m, best)
     return count

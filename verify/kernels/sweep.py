@@ -18,13 +18,31 @@ Newton's step from outside never passes the root.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from geometry.kernels.cutter_sizes import CutterSizes
+
 INF = np.inf
 FLAT_RAY = 1e-9
 ROOT_ERROR = 1e-9
+
+
+class Ray(NamedTuple):
+    """A ray as the tool sees it at the start of the move, frame of the tool: tip at the origin, axis Z.
+
+    qx, qy, qz : float, mm, where it begins
+    nx, ny, nz : float, unit, its direction
+    """
+
+    qx: float
+    qy: float
+    qz: float
+    nx: float
+    ny: float
+    nz: float
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
@@ -214,8 +232,9 @@ def disc_distance(qx, qy, qz, nx, ny, nz, dx, dy, dz, a):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _disc_root(t, limit, sign, qx, qy, qz, nx, ny, nz, dx, dy, dz, a, r):
+def _disc_root(t, limit, sign, ray, dx, dy, dz, a, r):
     """Newton from t (outside) in the direction of ``sign`` to distance r; NaN where the ray passes by."""
+    qx, qy, qz, nx, ny, nz = ray
     for _ in range(80):
         dist, slope = disc_distance(qx + t * nx, qy + t * ny, qz + t * nz, nx, ny, nz, dx, dy, dz, a)
         if dist - r <= ROOT_ERROR:
@@ -234,17 +253,18 @@ def torus_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, r):
     lo, hi = sphere_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, r, 1e300)
     if lo > hi:
         return INF, -INF
-    z, a = qz - r, radius - r
-    first = _disc_root(lo, hi, 1.0, qx, qy, z, nx, ny, nz, dx, dy, dz, a, r)
+    ray, a = Ray(qx, qy, qz - r, nx, ny, nz), radius - r
+    first = _disc_root(lo, hi, 1.0, ray, dx, dy, dz, a, r)
     if math.isnan(first):
         return INF, -INF
-    last = _disc_root(hi, first, -1.0, qx, qy, z, nx, ny, nz, dx, dy, dz, a, r)
+    last = _disc_root(hi, first, -1.0, ray, dx, dy, dz, a, r)
     return first, (first if math.isnan(last) else last)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def cutter_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, corner, length):
+def cutter_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter: CutterSizes):
     """Interval of t inside the sweep of a whole cutting part; (inf, -inf) where the ray misses it."""
+    radius, corner, length = cutter
     lo, hi = cylinder_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, corner, length)
     if corner <= 0.0:
         return lo, hi

@@ -13,35 +13,37 @@ import math
 import numpy as np
 from numba import njit
 
+from geometry.kernels.cutter_sizes import CutterSizes
 from geometry.kernels.options import KERNEL
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, turned, view
-from verify.kernels.rays import SAME, TOUCH, gap, new_left
+from verify.kernels.rays import SAME, TOUCH, SampleArrays, gap, new_left
+from verify.kernels.tables import AxisArrays, MoveArrays
 
 AGAIN = 6
 SETTLED = 1e-7
 
 
 @njit(**KERNEL)
-def _near(p, balls, node, left, margin, radius, corner, length):
+def _near(p, balls, node, left, margin, cutter):
     """Whether a cutting part on piece p may come within ``left`` of anything in a ball."""
     rad = balls[node, 3]
     if rad < 0.0:
         return False
     qx, qy, qz, dx, dy, dz = view(p, balls[node, 0], balls[node, 1], balls[node, 2])
-    return gap(qx, qy, qz, dx, dy, dz, dx * dx + dy * dy, radius, corner, length) <= left + rad + margin
+    return gap(qx, qy, qz, dx, dy, dz, dx * dx + dy * dy, cutter) <= left + rad + margin
 
 
 @njit(**KERNEL)
-def _cut_ray(p, x, y, z, nx, ny, nz, radius, corner, length, left):
+def _cut_ray(p, x, y, z, nx, ny, nz, cutter, left):
     """What piece p leaves on the ray from (x, y, z) along n; ``left`` where it takes nothing."""
     qx, qy, qz, dx, dy, dz = view(p, x, y, z)
     ux, uy, uz = turned(p, nx, ny, nz)
-    t = new_left(qx, qy, qz, ux, uy, uz, dx, dy, dz, dx * dx + dy * dy, radius, corner, length, left)
+    t = new_left(qx, qy, qz, ux, uy, uz, dx, dy, dz, dx * dx + dy * dy, cutter, left)
     if t >= left or p[30] == 0.0:
         return t
     for _ in range(AGAIN):
         qx, qy, qz, dx, dy, dz = view(p, x + t * nx, y + t * ny, z + t * nz)
-        step = new_left(qx, qy, qz, ux, uy, uz, dx, dy, dz, dx * dx + dy * dy, radius, corner, length, left - t)
+        step = new_left(qx, qy, qz, ux, uy, uz, dx, dy, dz, dx * dx + dy * dy, cutter, left - t)
         if step >= left - t:
             return left
         t += step
@@ -51,17 +53,17 @@ def _cut_ray(p, x, y, z, nx, ny, nz, radius, corner, length, left):
 
 
 @njit(**KERNEL)
-def _leaves(p, chunk, n1, b0, left0, points, normals, residual, mover, m, margin, cutter):
+def _leaves(p, chunk, n1, balls, left0, samples, m, margin, cutter):
     """Cut the samples of the 8 leaves of ball n1 of a chunk; returns the most that is left on them, mm."""
-    radius, corner, length = cutter
+    points, normals, residual, mover = samples
     most1 = 0.0
     for n0 in range(n1 * 8, n1 * 8 + 8):
         leaf = chunk * 512 + n0
-        if _near(p, b0, leaf, left0[n0], margin, radius, corner, length):
+        if _near(p, balls, leaf, left0[n0], margin, cutter):
             most = 0.0
             for i in range(leaf * 8, min(leaf * 8 + 8, len(points))):
                 t = _cut_ray(p, points[i, 0], points[i, 1], points[i, 2], normals[i, 0], normals[i, 1], normals[i, 2],
-                             radius, corner, length, residual[i])
+                             cutter, residual[i])
                 if t < residual[i] - SAME:
                     residual[i], mover[i] = t, m
                 most = max(most, residual[i])
@@ -71,16 +73,18 @@ def _leaves(p, chunk, n1, b0, left0, points, normals, residual, mover, m, margin
 
 
 @njit(**KERNEL)
-def cut_chunk(chunk, b0, b1, b2, b3, points, normals, residual, mover, starts, ends, axis, about, angle, feeds, tool,
-              cutters, reach, bow):
+def cut_chunk(chunk, balls, samples: SampleArrays, moves: MoveArrays, axes: AxisArrays, cutters, reach):
     """Work all feed moves through the samples of one chunk.
 
-    b0..b3          : (k, 4) float64 balls of 8, 64, 512, 4096 samples
-    points, normals : (n, 3) float64 in the order of the tree; residual, mover (n,) float64 and int32, changed in place
-    starts, ends    : (m, 3) float64 tips; axis, about, angle : as ``verify.tool_axes.ToolAxes``; feeds (m,) bool
-    tool            : (m,) int32, row of cutters (k, 3) float64 radius, corner radius, flute length
-    reach           : (k,) float64, mm, how far the cutting part reaches from the tip; bow : mm
+    balls   : four (k, 4) float64, mm, balls of 8, 64, 512, 4096 samples
+    samples : in the order of the tree
+    cutters : (k, 3) float64, mm: radius, corner radius, flute length
+    reach   : (k,) float64, mm, how far the cutting part reaches from the tip
     """
+    b0, b1, b2, b3 = balls
+    points, residual = samples.points, samples.residual
+    starts, ends, feeds, tool = moves
+    axis, about, angle, bow = axes
     piece = np.empty(PIECE)
     left0, left1, left2 = np.zeros(512), np.zeros(64), np.zeros(8)
     left3 = 0.0
@@ -96,23 +100,22 @@ def cut_chunk(chunk, b0, b1, b2, b3, points, normals, residual, mover, starts, e
         far = reach[k] + rad + left3 + bow
         if near_segment2(x, y, z, starts[m], ends[m]) > far * far:
             continue
-        cutter = (cutters[k, 0], cutters[k, 1], cutters[k, 2])
+        cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2])
         length2 = (ends[m, 0] - starts[m, 0]) ** 2 + (ends[m, 1] - starts[m, 1]) ** 2 + (ends[m, 2] - starts[m, 2]) ** 2
         count = pieces(angle[m], math.sqrt(length2), reach[k], bow)
         # a turning ray runs off its chord by half the angle of the piece for every mm of what is left
         margin = TOUCH if angle[m] == 0.0 else TOUCH + bow + 0.5 * angle[m] / count * left3
         for part in range(count):
             fill_piece(piece, starts[m], ends[m], axis[m], about[m], angle[m], part, count)
-            if not _near(piece, b3, chunk, left3, margin, cutter[0], cutter[1], cutter[2]):
+            if not _near(piece, b3, chunk, left3, margin, cutter):
                 continue
             left3 = 0.0
             for n2 in range(8):
-                if _near(piece, b2, chunk * 8 + n2, left2[n2], margin, cutter[0], cutter[1], cutter[2]):
+                if _near(piece, b2, chunk * 8 + n2, left2[n2], margin, cutter):
                     most2 = 0.0
                     for n1 in range(n2 * 8, n2 * 8 + 8):
-                        if _near(piece, b1, chunk * 64 + n1, left1[n1], margin, cutter[0], cutter[1], cutter[2]):
-                            left1[n1] = _leaves(piece, chunk, n1, b0, left0, points, normals, residual, mover, m,
-                                                margin, cutter)
+                        if _near(piece, b1, chunk * 64 + n1, left1[n1], margin, cutter):
+                            left1[n1] = _leaves(piece, chunk, n1, b0, left0, samples, m, margin, cutter)
                         most2 = max(most2, left1[n1])
                     left2[n2] = most2
                 left3 = max(left3, left2[n2])

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from verify.kernels.clash import clash_chunk
+from verify.kernels.clash import PointArrays, clash_chunk
+from verify.kernels.tables import ContactLimits
 from verify.material.point_tree import PointTree
-from verify.material.stock_pass import event_table, free_rapids, gather, noted
+from verify.material.stock_pass import end_radii, event_table, free_rapids, gather, noted
 from verify.material.tiles import run_tiles
 from verify.model import ProofSetup
 from verify.moves import BOW, Moves, Progress, cutter_table
@@ -109,17 +110,15 @@ def run_clashes(points: F64, fixed: NDArray[np.bool_], moves: Moves, tools: Sequ
     if len(points) == 0 or len(moves) == 0:
         return np.zeros((0, 7)), 0
     tree, axes = PointTree.build(points), moves.axes or ToolAxes.upright(len(moves))
-    pts, held = np.ascontiguousarray(points[tree.order]), np.ascontiguousarray(fixed[tree.order])
-    cutters, bodies = cutter_table(tools), Bodies.of(tools, setup)
-    reach, free = bodies.reach(cutters), free_rapids(moves) if free is None else free
-    start, end = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end)
+    cloud = PointArrays(np.ascontiguousarray(points[tree.order]), np.ascontiguousarray(fixed[tree.order]), tree.balls)
+    sizes = Bodies.of(tools, setup).arrays(cutter_table(tools), end_radii(tools))
+    open_rapids = free_rapids(moves) if free is None else free
+    steps, turns, limits = moves.arrays, axes.arrays(bow), ContactLimits(setup.clearance_rapid, setup.gouge_tolerance)
 
     def job(chunk: int) -> Callable[[], object]:
         def work() -> object:
             events = event_table()
-            n = clash_chunk(chunk, *tree.balls, pts, held, start, end, axes.axis, axes.about, axes.angle, moves.feed,
-                            free, moves.tool, cutters, bodies.rows, bodies.first, reach, setup.clearance_rapid,
-                            setup.gouge_tolerance, bow, events)
+            n = clash_chunk(chunk, cloud, steps, turns, open_rapids, sizes, limits, events)
             return noted(events), n
         return work
 

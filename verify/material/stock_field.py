@@ -19,9 +19,11 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.nearest import nearest
 from geometry.tool_body import ToolBody
 from verify.blank.blank import blank_cylinder, blank_mesh, stock_bounds
-from verify.kernels.field import VOLUME_UNITS, field_tile
+from verify.kernels.engaged import EngagedArrays
+from verify.kernels.field import VOLUME_UNITS, FieldArrays, field_tile
 from verify.kernels.grid import cross_columns, net_faces, net_vertices
 from verify.kernels.stock import PLUNGE
+from verify.kernels.tables import ContactLimits
 from verify.material.stock_pass import (
     StockPass,
     descents,
@@ -63,6 +65,11 @@ class DistanceField:
     def band(self) -> float:
         """Limit of the distances, mm: the step as a float32, so that a removed node is recognised."""
         return float(np.float32(self.step))
+
+    @property
+    def arrays(self) -> FieldArrays:
+        """The same for kernels, which cut ``values`` in place."""
+        return FieldArrays(self.values, self.origin, self.step, self.band)
 
     @property
     def volume(self) -> float:
@@ -181,8 +188,9 @@ def run_field(field: DistanceField, moves: Moves, tools: Sequence[ToolBody], set
     cutters, ends = cutter_table(tools), end_radii(tools)
     bodies = Bodies(np.zeros((0, 6)), np.zeros(len(tools) + 1, np.int64)) if bare else Bodies.of(tools, setup)
     axes = moves.axes or ToolAxes.upright(len(moves))
-    reach, (steep, earned) = bodies.reach(cutters), descents(moves, setup.ramp_angle)
-    start, end, free = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end), free_rapids(moves)
+    sizes, (steep, earned) = bodies.arrays(cutters, ends), descents(moves, setup.ramp_angle)
+    stock, limits = field.arrays, ContactLimits(setup.clearance_rapid, setup.gouge_tolerance)
+    steps, turns, free = moves.arrays, axes.arrays(bow), free_rapids(moves)
     x, y = sector_frames(moves.axes, len(moves))
     twists = np.arctan2((axes.about * y).sum(axis=1), (axes.about * x).sum(axis=1))
     first = parts(moves, tools)
@@ -192,10 +200,8 @@ def run_field(field: DistanceField, moves: Moves, tools: Sequence[ToolBody], set
     def job(tile: NDArray[np.int64]) -> Callable[[], object]:
         def work() -> object:
             events, taken, engaged = event_table(), spare.get(), blank_table.get()
-            n = field_tile(field.values, tile, field.origin, field.step, field.band, start, end, axes.axis,
-                           axes.about, axes.angle, twists, moves.feed, free, steep, first, moves.tool, cutters, ends,
-                           bodies.rows, bodies.first, reach, setup.clearance_rapid, setup.gouge_tolerance, bow,
-                           taken, engaged, events)
+            n = field_tile(stock, tile, steps, turns, twists, free, steep, sizes, limits, taken,
+                           EngagedArrays(first, engaged), events)
             spare.put(taken)
             blank_table.put(engaged)
             return noted(events), n

@@ -30,8 +30,10 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.tool_body import ToolBody
 from verify.blank.blank import blank_cylinder, blank_mesh, stock_bounds
 from verify.kernels.bodies import body_tile
+from verify.kernels.engaged import EngagedArrays
 from verify.kernels.heights import raise_offset
-from verify.kernels.stock import stock_tile
+from verify.kernels.stock import DescentArrays, LineArrays, stock_tile
+from verify.kernels.tables import ContactLimits
 from verify.material.stock_pass import (
     StockPass,
     descents,
@@ -121,9 +123,12 @@ def run_stock(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup:
     Returns StockPass. Raises VerificationError as ``cutter_table``. Same bytes for any number of threads.
     """
     cutters, bodies = cutter_table(tools), Bodies.of(tools, setup)
-    (steep, earned), ways = descents(moves, setup.ramp_angle), ways_before(moves)
+    sizes = bodies.arrays(cutters, end_radii(tools))
+    allowed = DescentArrays(*descents(moves, setup.ramp_angle), ways_before(moves),
+                            setup.plunge_skin * 2.0 * cutters[:, 0])
     cut, under = np.zeros(len(moves), np.uint8), np.zeros(len(moves), np.uint8)
-    skins, free = setup.plunge_skin * 2.0 * cutters[:, 0], free_rapids(moves)
+    limits, free = ContactLimits(setup.clearance_rapid, setup.gouge_tolerance), free_rapids(moves)
+    lines, steps = LineArrays(field.height, field.origin, field.step), moves.arrays
     nx, ny = field.height.shape
     first = parts(moves, tools)
     tables, spare = tables_for(threads, (int(first[-1]),))
@@ -131,10 +136,8 @@ def run_stock(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup:
     def job(i: int, j: int) -> Callable[[], object]:
         def work() -> object:
             events, engaged = event_table(), spare.get()
-            n = stock_tile(i, min(i + BLOCK, nx), j, min(j + BLOCK, ny), field.origin, field.step, field.height,
-                           moves.start, moves.end, moves.feed, free, steep, earned, ways, first, moves.tool,
-                           cutters, end_radii(tools), skins, bodies.rows, bodies.first, setup.clearance_rapid,
-                           setup.gouge_tolerance, cut, under, engaged, events)
+            n = stock_tile((i, min(i + BLOCK, nx), j, min(j + BLOCK, ny)), lines, steps, free, allowed, sizes, limits,
+                           cut, under, EngagedArrays(first, engaged), events)
             spare.put(engaged)
             return noted(events), n
         return work
@@ -156,13 +159,12 @@ def run_bodies(points: F64, moves: Moves, tools: Sequence[ToolBody], setup: Proo
         return np.zeros((0, 7)), 0
     grid = CellGrid.build(points)
     pts, bodies = np.ascontiguousarray(points[grid.order]), Bodies.of(tools, setup)
-    radii = np.array([t.radius for t in tools])
+    radii, cells, steps = np.array([t.radius for t in tools]), grid.arrays, moves.arrays
 
     def job(tile: tuple[int, int, int, int]) -> Callable[[], object]:
         def work() -> object:
             events = event_table()
-            n = body_tile(*tile, grid.origin, grid.size, grid.shape, grid.first, pts, moves.start, moves.end,
-                          moves.feed, moves.tool, radii, bodies.rows, bodies.first, setup.gouge_tolerance, events)
+            n = body_tile(tile, cells, pts, steps, radii, bodies.rows, bodies.first, setup.gouge_tolerance, events)
             return noted(events), n
         return work
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
+from verify.kernels.rays import CellArrays
 from verify.moves import Progress
 
 MAX_CELLS = 4_000_000
@@ -49,6 +50,11 @@ class CellGrid:
         order = np.argsort(key, kind="stable")
         first = np.searchsorted(key[order], np.arange(int(shape.prod()) + 1)).astype(np.int64)
         return cls(lower, size, shape, order, first)
+
+    @property
+    def arrays(self) -> CellArrays:
+        """The cells for kernels, which take the samples in the order of the cells."""
+        return CellArrays(self.origin, self.size, self.shape, self.first)
 
     def tiles(self, across: int = TILES) -> list[tuple[int, int, int, int]]:
         """Blocks (x0, x1, y0, y1) of cell columns that hold samples, about ``across`` squared of them."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from geometry.mesh import F64, I32
 from geometry.tool_body import ToolBody
-from verify.kernels.rays import cut_tile
+from verify.kernels.rays import SampleArrays, cut_tile
 from verify.kernels.turned import cut_chunk
 from verify.material.point_tree import PointTree
 from verify.material.tiles import CellGrid, run_tiles
@@ -62,12 +62,11 @@ def residual_on_normals(points: F64, normals: F64, initial: F64, moves: Moves, t
     left = np.zeros(len(counts))
     full = np.flatnonzero(counts)
     left[full] = np.maximum(np.maximum.reduceat(work, grid.first[full]), 0.0)
-    cutters = cutter_table(tools)
-    start, end = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end)
+    cutters, samples = cutter_table(tools), SampleArrays(pts, nrm, work, mover_of)
+    cells, steps = grid.arrays, moves.arrays
 
     def job(tile: tuple[int, int, int, int]) -> Callable[[], object]:
-        return lambda: cut_tile(*tile, grid.origin, grid.size, grid.shape, grid.first, pts, nrm, work, mover_of, left,
-                                start, end, moves.feed, moves.tool, cutters)
+        return lambda: cut_tile(tile, cells, samples, left, steps, cutters)
 
     run_tiles([job(t) for t in grid.tiles()], threads, progress)
     residual[grid.order], mover[grid.order] = work, mover_of
@@ -82,11 +81,10 @@ def _turned(points: F64, normals: F64, residual: F64, moves: Moves, axes: ToolAx
     work, mover_of = residual[tree.order], np.full(len(points), -1, np.int32)
     cutters = cutter_table(tools)
     reach = np.hypot(cutters[:, 0], cutters[:, 2])
-    start, end = np.ascontiguousarray(moves.start), np.ascontiguousarray(moves.end)
+    samples, steps, turns = SampleArrays(pts, nrm, work, mover_of), moves.arrays, axes.arrays(bow)
 
     def job(chunk: int) -> Callable[[], object]:
-        return lambda: cut_chunk(chunk, *tree.balls, pts, nrm, work, mover_of, start, end, axes.axis, axes.about,
-                                 axes.angle, moves.feed, moves.tool, cutters, reach, bow)
+        return lambda: cut_chunk(chunk, tree.balls, samples, steps, turns, cutters, reach)
 
     run_tiles([job(c) for c in range(tree.chunks)], threads, progress)
     mover = np.empty(len(points), np.int32)

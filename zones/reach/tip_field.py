@@ -196,12 +196,7 @@ class TipField:
         """Tip limit of the whole assembly, (n,) float64, mm; exact for the cutting part. xy : (n, 2) float64, mm."""
         xy = np.ascontiguousarray(xy, dtype=np.float64)
         out = drop_tips(self.tree, xy, self.grown_radius, self.grown_corner) + self.allowance
-        return np.asarray(np.maximum(out, noncut_lookup(self.noncut, self.coarse_row, xy)))
-
-    @property
-    def coarse_row(self) -> tuple[float, float, float]:
-        """(x0, y0, step) of the shank and holder grid, for kernels."""
-        return (self.coarse.x0, self.coarse.y0, self.coarse.step)
+        return np.asarray(np.maximum(out, noncut_lookup(self.noncut, self.coarse.frame, xy)))
 
     def blocked_by_cutter(self, tips: F64) -> NDArray[np.bool_]:
         """(n,) bool: the cutting part enters the obstacles at tips. tips : (n, 3) float64, mm."""
@@ -211,7 +206,7 @@ class TipField:
 
     def blocked_by_body(self, tips: F64) -> NDArray[np.bool_]:
         """(n,) bool: shank or holder come nearer than their clearance at tips. tips : (n, 3) float64, mm."""
-        return np.asarray(noncut_blocked(self.noncut, self.coarse_row, np.ascontiguousarray(tips)))
+        return np.asarray(noncut_blocked(self.noncut, self.coarse.frame, np.ascontiguousarray(tips)))
 
 
 FLAT_RING = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])

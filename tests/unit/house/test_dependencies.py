@@ -28,6 +28,17 @@ def test_kernels_import_numpy_numba_math_and_kernels_only():
     assert not wrong, "\n".join(wrong)
 
 
+MAX_ARGUMENTS = 12
+"""Of a kernel; what belongs together travels in a named tuple."""
+
+
+def test_no_kernel_has_more_arguments_than_a_reader_can_tell_apart():
+    kernels = [(name, f) for name, tree in modules() for f in ast.walk(tree) if isinstance(f, ast.FunctionDef)
+               and any("njit" in ast.unparse(d) for d in f.decorator_list)]
+    assert len(kernels) > 200
+    assert [f"{name}.{f.name}" for name, f in kernels if len(f.args.args) > MAX_ARGUMENTS] == []
+
+
 def test_every_kernel_package_is_seen():
     assert {n.split(".")[0] for n, _ in modules() if "kernels" in n.split(".")} >= {"geometry", "verify"}
 

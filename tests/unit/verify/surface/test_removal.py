@@ -82,6 +82,7 @@ def test_threads_do_not_change_a_byte():
 
 @pytest.mark.parametrize("tool", [BALL, FLAT, BULL])
 def test_the_grid_changes_nothing(tool):
+    from geometry.kernels.cutter_sizes import CutterSizes
     from verify.kernels.sweep import cutter_interval
 
     rng = np.random.default_rng(5)
@@ -90,10 +91,11 @@ def test_the_grid_changes_nothing(tool):
     n /= np.linalg.norm(n, axis=1)[:, None]
     walk = rng.uniform(-6, 6, (61, 3)) * [1, 1, 0.3]
     res, _who = residual_on_normals(p, n, np.ones(400), path(walk), [tool])
+    sizes = CutterSizes(tool.radius, tool.corner_radius, tool.flute_length)
     for i in range(400):
         best = 1.0
         for a, b in itertools.pairwise(walk):
-            lo, hi = cutter_interval(*(p[i] - a), *n[i], *(b - a), tool.radius, tool.corner_radius, tool.flute_length)
+            lo, hi = cutter_interval(*(p[i] - a), *n[i], *(b - a), sizes)
             if lo <= hi and hi >= -1e-6:
                 best = min(best, lo)
         assert res[i] == pytest.approx(best, abs=1.01e-8)  # what a move must take to count
