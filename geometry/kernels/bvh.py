@@ -85,9 +85,10 @@ def _best_split(lower, upper, order, start, stop, clo, chi, bin_lo, bin_hi, bin_
         extent = chi[axis] - clo[axis]
         if not extent > 0.0:
             continue
-        bin_lo[:] = np.inf
-        bin_hi[:] = -np.inf
-        bin_n[:] = 0
+        for b in range(BINS):
+            for j in range(3):
+                bin_lo[b, j], bin_hi[b, j] = np.inf, -np.inf
+            bin_n[b] = 0
         scale = BINS / extent
         for i in range(start, stop):
             t = order[i]
@@ -96,8 +97,9 @@ def _best_split(lower, upper, order, start, stop, clo, chi, bin_lo, bin_hi, bin_
             for j in range(3):
                 bin_lo[b, j] = min(bin_lo[b, j], lower[t, j])
                 bin_hi[b, j] = max(bin_hi[b, j], upper[t, j])
-        lo = np.full(3, np.inf)
-        hi = np.full(3, -np.inf)
+        lo, hi = np.empty(3), np.empty(3)
+        for j in range(3):
+            lo[j], hi[j] = np.inf, -np.inf
         n = 0
         for b in range(BINS - 1, 0, -1):
             n += bin_n[b]
@@ -105,8 +107,8 @@ def _best_split(lower, upper, order, start, stop, clo, chi, bin_lo, bin_hi, bin_
                 lo[j] = min(lo[j], bin_lo[b, j])
                 hi[j] = max(hi[j], bin_hi[b, j])
             right[b] = n * _half_area(lo, hi)
-        lo[:] = np.inf
-        hi[:] = -np.inf
+        for j in range(3):
+            lo[j], hi[j] = np.inf, -np.inf
         n = 0
         for b in range(BINS - 1):
             n += bin_n[b]
@@ -136,11 +138,31 @@ def _partition(lower, upper, order, start, stop, axis, left_bins, clo, scale):
 
 
 @njit(**KERNEL)
+def _halve(lower, upper, order, start, stop, axis):
+    """Sort the triangles start..stop-1 along an axis by the middles of their boxes; equal ones keep their order."""
+    count = stop - start
+    rows, keys = np.empty(count, np.int32), np.empty(count)
+    for i in range(count):
+        rows[i] = order[start + i]
+        keys[i] = lower[rows[i], axis] + upper[rows[i], axis]
+    sorted_rows = np.argsort(keys, kind="mergesort")
+    for i in range(count):
+        order[start + i] = rows[sorted_rows[i]]
+
+
+@njit(**KERNEL)
 def build_nodes(triangles: F64, leaf_size: int):
     """Boxes, topology and leaf order of the hierarchy [MacDonald1990, Wald2007].
 
     triangles : (m, 3, 3) float64, mm, corner points in the frame of the mesh, m > 0
     leaf_size : largest number of triangles in a leaf
+
+    Returns
+    -------
+    lower, upper  : (2 m - 1, 3) float64, mm, frame of the mesh, boxes of the nodes
+    child, parent : (2 m - 1,) int32, index; first, count : (2 m - 1,) int32, index and count, as ``TreeArrays``
+    order         : (m,) int32, index, triangle at each place of the leaf order
+    nodes         : int, how many rows of the tables hold nodes
     """
     m = triangles.shape[0]
     lower, upper = np.empty((m, 3)), np.empty((m, 3))
@@ -149,7 +171,9 @@ def build_nodes(triangles: F64, leaf_size: int):
     node_lo, node_hi = np.empty((k_max, 3)), np.empty((k_max, 3))
     child, parent = np.full(k_max, -1, np.int32), np.full(k_max, -1, np.int32)
     first, count = np.zeros(k_max, np.int32), np.zeros(k_max, np.int32)
-    order = np.arange(m).astype(np.int32)
+    order = np.empty(m, np.int32)
+    for i in range(m):
+        order[i] = i
     bin_lo, bin_hi = np.empty((BINS, 3)), np.empty((BINS, 3))
     bin_n, right = np.empty(BINS, np.int64), np.empty(BINS)
     clo, chi = np.empty(3), np.empty(3)
@@ -159,10 +183,9 @@ def build_nodes(triangles: F64, leaf_size: int):
     while top > 0:
         top -= 1
         node, start, stop, depth = stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3]
-        node_lo[node] = np.inf
-        node_hi[node] = -np.inf
-        clo[:] = np.inf
-        chi[:] = -np.inf
+        for j in range(3):
+            node_lo[node, j], node_hi[node, j] = np.inf, -np.inf
+            clo[j], chi[j] = np.inf, -np.inf
         for i in range(start, stop):
             t = order[i]
             for j in range(3):
@@ -181,12 +204,11 @@ def build_nodes(triangles: F64, leaf_size: int):
                 scale = BINS / (chi[axis] - clo[axis])
                 middle = _partition(lower, upper, order, start, stop, axis, left, clo[axis], scale)
         else:
-            axis = np.argmax(chi - clo)
-            part = order[start:stop].copy()
-            keys = lower[part, axis] + upper[part, axis]
-            sorted_rows = np.argsort(keys, kind="mergesort")
-            for i in range(len(part)):
-                order[start + i] = part[sorted_rows[i]]
+            axis = 0
+            for j in range(1, 3):
+                if chi[j] - clo[j] > chi[axis] - clo[axis]:
+                    axis = j
+            _halve(lower, upper, order, start, stop, axis)
         child[node] = k
         parent[k] = node
         parent[k + 1] = node
@@ -194,8 +216,7 @@ def build_nodes(triangles: F64, leaf_size: int):
         stack[top + 1, 0], stack[top + 1, 1], stack[top + 1, 2], stack[top + 1, 3] = k, start, middle, depth + 1
         top += 2
         k += 2
-    return (node_lo[:k].copy(), node_hi[:k].copy(), child[:k].copy(), parent[:k].copy(), first[:k].copy(),
-            count[:k].copy(), order)
+    return node_lo, node_hi, child, parent, first, count, order, k
 
 
 @njit(**KERNEL)

@@ -38,23 +38,36 @@ def triangle2(px, py, pz, t):
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def foot(px, py, pz, t):
     """The point of a triangle (3, 3) that ``triangle2`` measures to."""
-    p = np.array([px, py, pz])
-    u, v = t[1] - t[0], t[2] - t[0]
-    uu, uv, vv, w = np.dot(u, u), np.dot(u, v), np.dot(v, v), p - t[0]
+    p, u, v, w = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    p[0], p[1], p[2] = px, py, pz
+    for c in range(3):
+        u[c], v[c], w[c] = t[1, c] - t[0, c], t[2, c] - t[0, c], p[c] - t[0, c]
+    uu, uv, vv = np.dot(u, u), np.dot(u, v), np.dot(v, v)
     wu, wv, det = np.dot(w, u), np.dot(w, v), uu * vv - uv * uv
+    out = np.empty(3)
     if det > 0.0:
         f, g = (wu * vv - wv * uv) / det, (wv * uu - wu * uv) / det
         if f >= 0.0 and g >= 0.0 and f + g <= 1.0:
-            return t[0] + f * u + g * v
-    best, out = np.inf, t[0].copy()
+            for c in range(3):
+                out[c] = t[0, c] + f * u[c] + g * v[c]
+            return out
+    best = np.inf
+    for c in range(3):
+        out[c] = t[0, c]
     for k in range(3):
-        a, e = t[k], t[(k + 1) % 3] - t[k]
-        length2 = np.dot(e, e)
-        s = min(max(np.dot(p - a, e) / length2, 0.0), 1.0) if length2 > 0.0 else 0.0
-        q = a + s * e
-        d2 = np.dot(p - q, p - q)
+        following = (k + 1) % 3
+        for c in range(3):
+            u[c], w[c] = t[following, c] - t[k, c], p[c] - t[k, c]
+        length2 = np.dot(u, u)
+        s = min(max(np.dot(w, u) / length2, 0.0), 1.0) if length2 > 0.0 else 0.0
+        for c in range(3):
+            v[c] = t[k, c] + s * u[c]
+            w[c] = p[c] - v[c]
+        d2 = np.dot(w, w)
         if d2 < best:
-            best, out = d2, q
+            best = d2
+            for c in range(3):
+                out[c] = v[c]
     return out
 
 

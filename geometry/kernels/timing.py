@@ -27,7 +27,7 @@ SQUARE_SHARE, ARC_SHARE = math.sqrt(0.75), 0.5  # of the acceleration on an arc:
 
 @njit(**KERNEL)
 def corner(before, behind, shorter, a, d):
-    """The arc at a corner between unit vectors (3,) along two moves, the shorter ``shorter`` mm long.
+    """The arc at a corner between unit vectors, of three numbers, along two moves, the shorter ``shorter`` mm long.
 
     Returns the most speed on it, mm/s, how much of each move it takes the place of, and half of its length, mm.
     """
@@ -41,6 +41,12 @@ def corner(before, behind, shorter, a, d):
         return np.inf, 0.0, 0.0
     radius = min(d * half / (1.0 - half), 0.5 * shorter / tan)
     return math.sqrt(SQUARE_SHARE * a * radius), radius * tan, radius * math.atan2(sine, half)
+
+
+@njit(**KERNEL)
+def _direction(way, size, i):
+    """Unit vector along move i."""
+    return way[i, 0] / size[i], way[i, 1] / size[i], way[i, 2] / size[i]
 
 
 @njit(**KERNEL)
@@ -64,7 +70,7 @@ def seconds_of_moves(way, speed, stop, curve, a, d, out):
         change[k] = ARC_SHARE * a
         if stop[i + 1] or size[i] == 0.0 or size[i + 1] == 0.0:
             continue
-        v, taken, half = corner(way[i] / size[i], way[i + 1] / size[i + 1], min(size[i], size[i + 1]), a,
+        v, taken, half = corner(_direction(way, size, i), _direction(way, size, i + 1), min(size[i], size[i + 1]), a,
                                 np.inf if curve[i + 1] else d)
         length[k], most[k] = 2.0 * half, min(v, min(speed[i], speed[i + 1]))
         length[k - 1] -= taken
@@ -75,7 +81,8 @@ def seconds_of_moves(way, speed, stop, curve, a, d, out):
         at[k] = min(min(most[k - 1], most[k]), math.sqrt(at[k - 1] ** 2 + 2.0 * change[k - 1] * length[k - 1]))
     for k in range(2 * m - 2, -1, -1):
         at[k] = min(at[k], math.sqrt(at[k + 1] ** 2 + 2.0 * change[k] * length[k]))
-    out[:] = 0.0
+    for i in range(m):
+        out[i] = 0.0
     for k in range(2 * m - 1):
         if length[k] > 0.0:
             v, w, b = at[k], at[k + 1], change[k]

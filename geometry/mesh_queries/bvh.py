@@ -49,7 +49,8 @@ def _arrays(mesh: TriangleMesh, leaf_size: int) -> TreeArrays:
     if len(mesh.faces) == 0:
         return _empty()
     triangles = mesh.vertices[mesh.faces]  # mesh.triangles would stay in memory
-    lower, upper, child, parent, first, count, order = build_nodes(triangles, leaf_size)
+    *tables, order, nodes = build_nodes(triangles, leaf_size)
+    lower, upper, child, parent, first, count = (table[:nodes].copy() for table in tables)
     corners = triangles[order]
     del triangles
     column = column_rows(lower, upper, child, parent, first, count, corners)

@@ -91,7 +91,7 @@ class Canvas:
         return np.asarray(np.rint(np.clip(mean, 0.0, 1.0) * 255.0), dtype=np.uint8)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _triangles(corners, colours, owners, image, depth, owner):  # type: ignore[no-untyped-def]
     # a, b, c: corners; w0, w1, w2: barycentric weights at the pixel centre
     h, w = depth.shape
@@ -123,7 +123,7 @@ def _triangles(corners, colours, owners, image, depth, owner):  # type: ignore[n
                         image[y, x, k] = colours[t, k]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _blend(image, depth, x, y, z, colour, alpha, hidden, bias):  # type: ignore[no-untyped-def]
     h, w = depth.shape
     if x < 0 or y < 0 or x >= w or y >= h:
@@ -134,7 +134,7 @@ def _blend(image, depth, x, y, z, colour, alpha, hidden, bias):  # type: ignore[
             image[y, x, k] += a * (colour[k] - image[y, x, k])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _strokes(segments, start, colour, width, alpha, hidden, bias, dash, image, depth):  # type: ignore[no-untyped-def]
     # one pixel column across the line per step along its longer axis, so that no pixel is blended twice
     h, w = depth.shape
@@ -162,7 +162,7 @@ def _strokes(segments, start, colour, width, alpha, hidden, bias, dash, image, d
                     _blend(image, depth, x + k, y, z0 + f * dz, colour, alpha, hidden, bias)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _dots(points, colour, width, alpha, hidden, bias, image, depth):  # type: ignore[no-untyped-def]
     low = -(width // 2)
     for i in range(points.shape[0]):

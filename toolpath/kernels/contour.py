@@ -38,19 +38,21 @@ MOST_PER_CHORD = 2 ** HALVINGS
 
 
 class TipLimits(NamedTuple):
-    """What keeps the tip of one tool up, in the access frame.
+    """What keeps the tip of one tool up, beside the obstacles themselves; access frame.
 
-    tree      : TreeArrays of the obstacles
-    noncut    : (ny, nx) float64, mm, tip limit of shank and holder
-    frame     : LatticeFrame of ``noncut``
-    radius    : float, mm, of the cutting part, grown by the allowance
-    corner    : float, mm, its corner radius, grown by the allowance
-    allowance : float, mm, material that stays on the part
+    The fields are flat: numba takes no tuple in a tuple into a parallel loop.
+
+    noncut       : (ny, nx) float64, mm, tip limit of shank and holder
+    x0, y0, step : float, mm, ``LatticeFrame`` of ``noncut``
+    radius       : float, mm, of the cutting part, grown by the allowance
+    corner       : float, mm, its corner radius, grown by the allowance
+    allowance    : float, mm, material that stays on the part
     """
 
-    tree: TreeArrays
     noncut: NDArray[np.float64]
-    frame: LatticeFrame
+    x0: float
+    y0: float
+    step: float
     radius: float
     corner: float
     allowance: float
@@ -117,19 +119,19 @@ def trace(blocked, active, segments):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def stands_blocked(limits: TipLimits, x, y, z):
+def stands_blocked(tree: TreeArrays, limits: TipLimits, x, y, z):
     """Whether the assembly cannot stand with its tip at (x, y, z)."""
-    if noncut_at(limits.noncut, limits.frame, x, y) > z:
+    if noncut_at(limits.noncut, LatticeFrame(limits.x0, limits.y0, limits.step), x, y) > z:
         return True
-    return is_blocked(limits.tree, x, y, z - limits.allowance, limits.radius, limits.corner)
+    return is_blocked(tree, x, y, z - limits.allowance, limits.radius, limits.corner)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _bisect(limits, fx, fy, bx, by, z, rounds):
+def _bisect(tree, limits, fx, fy, bx, by, z, rounds):
     """Last free place between a free point f and a blocked point b."""
     for _ in range(rounds):
         mx, my = 0.5 * (fx + bx), 0.5 * (fy + by)
-        if stands_blocked(limits, mx, my, z):
+        if stands_blocked(tree, limits, mx, my, z):
             bx, by = mx, my
         else:
             fx, fy = mx, my
@@ -137,7 +139,7 @@ def _bisect(limits, fx, fy, bx, by, z, rounds):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True, parallel=True)
-def place_crossings(limits: TipLimits, ids, blocked, frame: LatticeFrame, z, rounds, out):
+def place_crossings(tree: TreeArrays, limits: TipLimits, ids, blocked, frame: LatticeFrame, z, rounds, out):
     """Exact place (n, 2) of every crossing, on its free side."""
     nx = blocked.shape[1]
     x0, y0, step = frame
@@ -149,11 +151,11 @@ def place_crossings(limits: TipLimits, ids, blocked, frame: LatticeFrame, z, rou
         bx, by = x0 + step * j2, y0 + step * i2
         if blocked[i, j]:
             ax, ay, bx, by = bx, by, ax, ay
-        out[k, 0], out[k, 1] = _bisect(limits, ax, ay, bx, by, z, rounds)
+        out[k, 0], out[k, 1] = _bisect(tree, limits, ax, ay, bx, by, z, rounds)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _true_place(limits, px, py, qx, qy, z, tol, reach):
+def _true_place(tree, limits, px, py, qx, qy, z, tol, reach):
     """Where the boundary really is beside the middle of a chord: (x, y, moved)."""
     mx, my = 0.5 * (px + qx), 0.5 * (py + qy)
     dx, dy = qx - px, qy - py
@@ -161,27 +163,27 @@ def _true_place(limits, px, py, qx, qy, z, tol, reach):
     if length < 4.0 * tol:
         return mx, my, False
     nx, ny = -dy / length, dx / length
-    if stands_blocked(limits, mx, my, z):
+    if stands_blocked(tree, limits, mx, my, z):
         d = tol
         while d <= reach:
             fx, fy = mx + d * nx, my + d * ny
-            if not stands_blocked(limits, fx, fy, z):
+            if not stands_blocked(tree, limits, fx, fy, z):
                 bx, by = mx + 0.5 * d * nx, my + 0.5 * d * ny
                 if d <= tol:
                     bx, by = mx, my
-                fx, fy = _bisect(limits, fx, fy, bx, by, z, 6)
+                fx, fy = _bisect(tree, limits, fx, fy, bx, by, z, 6)
                 return fx, fy, True
             d *= 2.0
         return mx, my, False
     bx, by = mx - tol * nx, my - tol * ny
-    if stands_blocked(limits, bx, by, z):
+    if stands_blocked(tree, limits, bx, by, z):
         return mx, my, False
     d = 2.0 * tol
     fx, fy = bx, by
     while d <= reach:
         bx, by = mx - d * nx, my - d * ny
-        if stands_blocked(limits, bx, by, z):
-            fx, fy = _bisect(limits, fx, fy, bx, by, z, 6)
+        if stands_blocked(tree, limits, bx, by, z):
+            fx, fy = _bisect(tree, limits, fx, fy, bx, by, z, 6)
             return fx, fy, True
         fx, fy = bx, by
         d *= 2.0
@@ -189,7 +191,7 @@ def _true_place(limits, px, py, qx, qy, z, tol, reach):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True, parallel=True)
-def refine(limits: TipLimits, points, follows, z, tol, reach, out, count):
+def refine(tree: TreeArrays, limits: TipLimits, points, follows, z, tol, reach, out, count):
     """Points put in on every chord that leaves the true boundary by more than tol.
 
     points  : (n, 2); follows : (n,) the point each is joined to, -1 for none
@@ -211,7 +213,7 @@ def refine(limits: TipLimits, points, follows, z, tol, reach, out, count):
             level = depth[top]
             mx, my, moved = px, py, False
             if level < HALVINGS:
-                mx, my, moved = _true_place(limits, px, py, qx, qy, z, tol, reach)
+                mx, my, moved = _true_place(tree, limits, px, py, qx, qy, z, tol, reach)
             if moved:
                 ends[top, 0], ends[top, 1] = mx, my
                 depth[top] = level + 1
@@ -226,7 +228,7 @@ def refine(limits: TipLimits, points, follows, z, tol, reach, out, count):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def chords_free(limits: TipLimits, points, z, spacing, ok):
+def chords_free(tree: TreeArrays, limits: TipLimits, points, z, spacing, ok):
     """ok[k]: the straight move from point k to k+1 at height z stays free, tested every ``spacing`` mm."""
     for k in range(len(points) - 1):
         dx, dy = points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
@@ -235,7 +237,7 @@ def chords_free(limits: TipLimits, points, z, spacing, ok):
         ok[k] = True
         for s in range(1, n):
             x, y = points[k, 0] + dx * s / n, points[k, 1] + dy * s / n
-            if stands_blocked(limits, x, y, z):
+            if stands_blocked(tree, limits, x, y, z):
                 ok[k] = False
                 break
 

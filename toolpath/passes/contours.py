@@ -123,13 +123,14 @@ def _traced(field: TipField, z: float, active: NDArray[np.bool_], tolerance: flo
         exact = _along_chains(wanted[lat.cells(middle)], starts, closed, more)
         xy[~exact] = middle[~exact]
     placed = np.empty((int(exact.sum()), 2))
-    place_crossings(limits, ids[exact], blocked, LatticeFrame(x0, y0, lat.step), z + LEVEL_TOLERANCE, BISECTIONS,
-                    placed)
+    place_crossings(field.tree.arrays, limits, ids[exact], blocked, LatticeFrame(x0, y0, lat.step),
+                    z + LEVEL_TOLERANCE, BISECTIONS, placed)
     xy[exact] = placed
     both = exact & (follows >= 0)
     both[both] = exact[follows[both]]
     fine, count = np.empty((len(ids), MOST_PER_CHORD, 2)), np.empty(len(ids), np.int64)
-    refine(limits, xy, np.where(both, follows, -1), z + LEVEL_TOLERANCE, tolerance, lat.step, fine, count)
+    refine(field.tree.arrays, limits, xy, np.where(both, follows, -1), z + LEVEL_TOLERANCE, tolerance, lat.step, fine,
+           count)
     points = fine[np.arange(MOST_PER_CHORD) < count[:, None]]
     begins = np.concatenate([[0], np.cumsum(count)])[starts]
     if not exact.all():
@@ -149,9 +150,8 @@ def _traced(field: TipField, z: float, active: NDArray[np.bool_], tolerance: flo
 
 
 def _limits(field: TipField) -> TipLimits:
-    """What keeps the tip of a field's tool up, for kernels."""
-    return TipLimits(field.tree.arrays, field.noncut, field.coarse.frame, field.grown_radius, field.grown_corner,
-                     field.allowance)
+    """What keeps the tip of a field's tool up, beside the obstacles, for kernels."""
+    return TipLimits(field.noncut, *field.coarse.frame, field.grown_radius, field.grown_corner, field.allowance)
 
 
 def _flat(points: F64) -> NDArray[np.complex128]:
@@ -240,8 +240,8 @@ def moves_free(field: TipField, points: F64) -> NDArray[np.bool_]:
     """
     ok = np.ones(max(len(points) - 1, 0), np.bool_)
     if len(points) > 1:
-        chords_free(_limits(field), np.ascontiguousarray(points[:, :2]), float(points[:, 2].max()) + LEVEL_TOLERANCE,
-                    field.lattice.step / 3, ok)
+        chords_free(field.tree.arrays, _limits(field), np.ascontiguousarray(points[:, :2]),
+                    float(points[:, 2].max()) + LEVEL_TOLERANCE, field.lattice.step / 3, ok)
     return ok
 
 

@@ -124,7 +124,9 @@ def clash_chunk(chunk, cloud: PointArrays, moves: MoveArrays, axes: AxisArrays, 
     fixed, t3 = cloud.fixed, cloud.balls[3]
     best, piece = np.zeros((16, 5)), np.empty(PIECE)
     x, y, z, rad = t3[chunk, 0], t3[chunk, 1], t3[chunk, 2], t3[chunk, 3]
-    held = fixed[chunk * 4096:chunk * 4096 + 4096].any()
+    held = False
+    for i in range(chunk * 4096, min(chunk * 4096 + 4096, len(fixed))):
+        held = held or fixed[i]
     count = 0
     for m in range(len(starts)):
         k, feed = tool[m], feeds[m]

@@ -101,6 +101,11 @@ def _in_front(bits, heading):
 
 
 @njit(**KERNEL)
+def _way(a, b):
+    return b[0] - a[0], b[1] - a[1], b[2] - a[2]
+
+
+@njit(**KERNEL)
 def _heading(way, x, y):
     """Of a way (3,) in the frame x, y (3,): its angle, rad, and its length there."""
     a = way[0] * x[0] + way[1] * x[1] + way[2] * x[2]
@@ -123,7 +128,7 @@ def window_angles(bits, starts, ends, x, y, tool, feeds, radius):
     count = len(bits)
     out, heading, plan, straight = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)
     for m in range(count):
-        heading[m], plan[m] = _heading(ends[m] - starts[m], x[m], y[m])
+        heading[m], plan[m] = _heading(_way(starts[m], ends[m]), x[m], y[m])
     begun, run = 0, 0.0
     for m in range(count + 1):
         joined = m < count and m > 0 and feeds[m] and feeds[m - 1] and tool[m] == tool[m - 1] and (
@@ -131,7 +136,8 @@ def window_angles(bits, starts, ends, x, y, tool, feeds, radius):
         if joined and plan[m] <= 1e-9:
             heading[m] = heading[m - 1]  # a move that goes nowhere turns no way
         if not joined:
-            straight[begun:m] = run
+            for i in range(begun, m):
+                straight[i] = run
             begun, run = m, 0.0
         if m < count:
             run += plan[m]
@@ -146,7 +152,7 @@ def window_angles(bits, starts, ends, x, y, tool, feeds, radius):
             way += plan[i]
         most = _in_front(joint, heading[m])
         if straight[m] < STRAIGHT * r:
-            come, far = _heading(ends[m] - starts[i], x[m], y[m])
+            come, far = _heading(_way(starts[i], ends[m]), x[m], y[m])
             if far > 1e-9:
                 most = max(most, _in_front(joint, come))
         out[m] = most * math.pi / FRONT

@@ -315,6 +315,21 @@ def _look(stock, bricks, p, tools, k, seen, feed, free, grow, slack, best):
 
 
 @njit(**KERNEL)
+def _clear(best):
+    for row in range(len(best)):
+        for k in range(best.shape[1]):
+            best[row, k] = 0.0
+
+
+@njit(**KERNEL)
+def _any_depth(best):
+    for row in range(len(best)):
+        if best[row, 0] > 0.0:
+            return True
+    return False
+
+
+@njit(**KERNEL)
 def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, twists, free, steep, tools: ToolArrays,
                limits: ContactLimits, taken, engaged: EngagedArrays, events):
     """Work all moves in order through the nodes of one tile, in place.
@@ -364,14 +379,15 @@ def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, tw
             rise = (ends[m, 0] - starts[m, 0]) * axis[m, 0] + (ends[m, 1] - starts[m, 1]) * axis[m, 1] \
                 + (ends[m, 2] - starts[m, 2]) * axis[m, 2]
             if rise > RISE:
-                trial[:] = 0.0
+                _clear(trial)
                 for part in range(n):
                     fill_piece(piece, starts[m], ends[m], axis[m], about[m], angle[m], part, n)
                     seen = _seen_tile(piece, cx, cy, cz, rad + band)
                     _look(stock, bricks, piece, tools, k, seen, True, False, 0.0, slack, trial)
-                if trial[:, 0].max() > 0.0:
+                if _any_depth(trial):
                     n = max(n, min(math.ceil(math.sqrt(length2) / RISE), MOST_LOOKS))
-        totals[:] = 0.0
+        for i in range(len(totals)):
+            totals[i] = 0.0
         for part in range(n):
             fill_piece(piece, starts[m], ends[m], axis[m], about[m], angle[m], part, n)
             # most of a long tool passes most tiles by: one look at the ball round the tile decides

@@ -89,8 +89,12 @@ def _note(events, count, m, best):
         if best[code, 0] > 0.0:
             if used == room:
                 used = room // 2
-                worse = np.zeros(room, np.bool_)
-                worse[np.argsort(events[:room, 3] - events[:room, 2])[:used]] = True
+                worse, keys = np.zeros(room, np.bool_), np.empty(room)
+                for row in range(room):
+                    keys[row] = events[row, 3] - events[row, 2]
+                by_depth = np.argsort(keys)
+                for row in range(used):
+                    worse[by_depth[row]] = True
                 kept = 0
                 for row in range(room):
                     if worse[row]:

@@ -130,7 +130,11 @@ def fit_patches(place, par, start, ring):
             sv = max(sv, abs(par[near[m], 1] - par[i, 1]))
         if su <= 0.0 or sv <= 0.0:
             continue
-        a[:], b[:] = 0.0, 0.0
+        for p in range(9):
+            for q in range(9):
+                a[p, q] = 0.0
+            for c in range(3):
+                b[p, c] = 0.0
         total = 0.0
         for m in range(n):
             s, t = (par[near[m], 0] - par[i, 0]) / su, (par[near[m], 1] - par[i, 1]) / sv
@@ -156,7 +160,9 @@ def fit_patches(place, par, start, ring):
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _shares(a, b, c, p, out):
     """Barycentric coordinates of p in the triangle a b c, clipped to it."""
-    e, f, w = b - a, c - a, p - a
+    e, f, w = np.empty(3), np.empty(3), np.empty(3)
+    for k in range(3):
+        e[k], f[k], w[k] = b[k] - a[k], c[k] - a[k], p[k] - a[k]
     ee, ef, ff, we, wf = e @ e, e @ f, f @ f, w @ e, w @ f
     det = max(ee * ff - ef * ef, 1e-300)
     out[1] = min(max((we * ff - wf * ef) / det, 0.0), 1.0)
@@ -179,7 +185,8 @@ def blend_patches(corner, points, place, par, coef):
         for m in range(3):
             u += share[m] * par[corner[k, m], 0]
             v += share[m] * par[corner[k, m], 1]
-        xu[:], xv[:] = 0.0, 0.0
+        for c in range(3):
+            xu[c], xv[c] = 0.0, 0.0
         for m in range(3):
             i, w = corner[k, m], share[m]
             s, t = u - par[i, 0], v - par[i, 1]
@@ -197,5 +204,5 @@ def blend_patches(corner, points, place, par, coef):
         if length > limit and length > 0.0:
             normal[k, 0], normal[k, 1], normal[k, 2] = nx / length, ny / length, nz / length
         else:
-            normal[k, :] = np.nan
+            normal[k, 0], normal[k, 1], normal[k, 2] = np.nan, np.nan, np.nan
     return where, normal
