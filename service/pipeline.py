@@ -25,7 +25,7 @@ from service.report import report as reporting
 from service.stages.access_plan import ProofFrame, in_setup_frame
 from service.stages.access_settings import proof_setup
 from service.stages.cautions import sentences
-from service.stages.plan_prove_loop import Planner, Progress, plan_and_prove
+from service.stages.plan_prove_loop import Planner, Progress, ProvedPlan, plan_and_prove
 from service.stages.preparation import Prepared, prepare
 from service.stages.programs import proof_frame
 from service.stages.proof_samples import Score, score
@@ -35,7 +35,7 @@ from service.viewer.view_data import verification_view
 from toolpath.passes.trimmed_faces import Faces
 from toolpath.planning.job_plan import plan_job
 from verify.gcode.dialects import dialect_of
-from verify.model import NcProgram, ScoredSamples
+from verify.model import NcProgram, Proof, ScoredSamples
 from verify.prove import prove
 
 
@@ -66,14 +66,33 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     clear_results(out)
     ready = prepare(part_path, setup, progress, blank_path=blank_path)
     cautions = cautions_before_planning(ready)
-    ready, trimmed, scored = _trimmed_and_scored(part_path, warned(ready, sentences(cautions)))
-    frame = proof_frame(ready)
-    samples = frame.into(scored.samples, ready.views[0])
-    resumed = Resumed(kept or Kept(), ready, scored.checks(ready), samples)
-    job = plan_and_prove(resumed, scored, trimmed, frame, proof_setup(ready, frame), planner, progress)
+    job = _proved_plan(part_path, warned(ready, sentences(cautions)), kept or Kept(), planner, progress)
     report = deliver_job(job, cautions, out, mesh, progress)
     progress("done", 1.0)
     return report
+
+
+def prove_plan(part_path: Path, setup: Setup, progress: Progress) -> Proof:
+    """Plan and prove a job as ``plan`` does, but write no files; returns the proof of its last plan.
+
+    Raises
+    ------
+    CamError
+        As ``plan``.
+    """
+    check_plannable(setup)
+    job = _proved_plan(part_path, prepare(part_path, setup, progress), Kept(), plan_job, progress)
+    progress("done", 1.0)
+    return job.proof
+
+
+def _proved_plan(part_path: Path, ready: Prepared, kept: Kept, planner: Planner, progress: Progress) -> ProvedPlan:
+    """The last plan of a prepared job, with its proof."""
+    ready, trimmed, scored = _trimmed_and_scored(part_path, ready)
+    frame = proof_frame(ready)
+    samples = frame.into(scored.samples, ready.views[0])
+    resumed = Resumed(kept, ready, scored.checks(ready), samples)
+    return plan_and_prove(resumed, scored, trimmed, frame, proof_setup(ready, frame), planner, progress)
 
 
 def _trimmed_and_scored(part_path: Path, ready: Prepared) -> tuple[Prepared, Mapping[str, Sequence[Faces]], Score]:

@@ -141,13 +141,29 @@ def _partition(lower, upper, order, start, stop, axis, left_bins, clo, scale):
 def _halve(lower, upper, order, start, stop, axis):
     """Sort the triangles start..stop-1 along an axis by the middles of their boxes; equal ones keep their order."""
     count = stop - start
-    rows, keys = np.empty(count, np.int32), np.empty(count)
+    rows, merged = np.empty(count, np.int32), np.empty(count, np.int32)
     for i in range(count):
         rows[i] = order[start + i]
-        keys[i] = lower[rows[i], axis] + upper[rows[i], axis]
-    sorted_rows = np.argsort(keys, kind="mergesort")
+    width = 1
+    while width < count:
+        for low in range(0, count, 2 * width):
+            middle, high = min(low + width, count), min(low + 2 * width, count)
+            i, j = low, middle
+            for k in range(low, high):
+                left = j >= high
+                if not left and i < middle:
+                    t, u = rows[i], rows[j]
+                    left = lower[t, axis] + upper[t, axis] <= lower[u, axis] + upper[u, axis]
+                if left:
+                    merged[k] = rows[i]
+                    i += 1
+                else:
+                    merged[k] = rows[j]
+                    j += 1
+        rows, merged = merged, rows
+        width *= 2
     for i in range(count):
-        order[start + i] = rows[sorted_rows[i]]
+        order[start + i] = rows[i]
 
 
 @njit(**KERNEL)
@@ -169,8 +185,10 @@ def build_nodes(triangles: F64, leaf_size: int):
     _boxes(triangles, lower, upper)
     k_max = 2 * m - 1
     node_lo, node_hi = np.empty((k_max, 3)), np.empty((k_max, 3))
-    child, parent = np.full(k_max, -1, np.int32), np.full(k_max, -1, np.int32)
-    first, count = np.zeros(k_max, np.int32), np.zeros(k_max, np.int32)
+    child, parent = np.empty(k_max, np.int32), np.empty(k_max, np.int32)
+    first, count = np.empty(k_max, np.int32), np.empty(k_max, np.int32)
+    for i in range(k_max):
+        child[i], parent[i], first[i], count[i] = -1, -1, 0, 0
     order = np.empty(m, np.int32)
     for i in range(m):
         order[i] = i

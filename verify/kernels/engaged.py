@@ -168,7 +168,7 @@ def carried_frames(axis, x):
     for m in range(1, len(axis)):
         u = axis[m]
         if u[0] == axis[m - 1, 0] and u[1] == axis[m - 1, 1] and u[2] == axis[m - 1, 2]:
-            x[m] = x[m - 1]
+            x[m, 0], x[m, 1], x[m, 2] = x[m - 1, 0], x[m - 1, 1], x[m - 1, 2]
             continue
         up = u[0] * x[m - 1, 0] + u[1] * x[m - 1, 1] + u[2] * x[m - 1, 2]
         vx, vy, vz = x[m - 1, 0] - up * u[0], x[m - 1, 1] - up * u[1], x[m - 1, 2] - up * u[2]

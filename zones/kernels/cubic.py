@@ -163,7 +163,7 @@ def _shares(a, b, c, p, out):
     e, f, w = np.empty(3), np.empty(3), np.empty(3)
     for k in range(3):
         e[k], f[k], w[k] = b[k] - a[k], c[k] - a[k], p[k] - a[k]
-    ee, ef, ff, we, wf = e @ e, e @ f, f @ f, w @ e, w @ f
+    ee, ef, ff, we, wf = np.dot(e, e), np.dot(e, f), np.dot(f, f), np.dot(w, e), np.dot(w, f)
     det = max(ee * ff - ef * ef, 1e-300)
     out[1] = min(max((we * ff - wf * ef) / det, 0.0), 1.0)
     out[2] = min(max((wf * ee - we * ef) / det, 0.0), 1.0 - out[1])
