@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
@@ -130,23 +131,23 @@ def test_no_program_of_an_earlier_job_stays_beside_a_later_answer(part, tmp_path
 
 
 def test_warm_plans_a_part_on_which_every_strategy_has_something_to_do(monkeypatch):
-    reports = []
-    plan = pipeline.plan
+    jobs = []
+    plan = pipeline.plan_and_prove
 
     def listening(*args):
-        reports.append(plan(*args))
-        return reports[-1]
+        jobs.append(plan(*args))
+        return jobs[-1]
 
-    monkeypatch.setattr(pipeline, "plan", listening)
+    monkeypatch.setattr(pipeline, "plan_and_prove", listening)
     assert CliRunner().invoke(app, ["warm"]).exit_code == 0
-    assert {s["strategy"] for s in reports[0]["steps"]} == {
+    assert {s.strategy for s in jobs[0].plan.steps} == {
         "depth_layers", "planar_floor", "waterline", "zigzag", "isoparametric"}
-    assert reports[0]["state"] == "proved"
+    assert jobs[0].proof.findings == ()
 
 
 def test_warm_fails_where_the_small_part_is_not_proved(monkeypatch):
-    finding = {"message": "T1 cuts into the part"}
-    monkeypatch.setattr(pipeline, "plan", lambda *_args: {"state": "unproved", "findings": [finding]})
+    finding = SimpleNamespace(message="T1 cuts into the part")
+    monkeypatch.setattr(pipeline, "prove_plan", lambda *_args: SimpleNamespace(findings=[finding]))
     got = CliRunner().invoke(app, ["warm", "--json"])
     assert got.exit_code == 1
     problem = json.loads(got.stdout)
