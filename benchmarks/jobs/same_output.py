@@ -79,6 +79,8 @@ def plain(value: Any, key: str = "") -> Any:
         return {k: plain(v, k) for k, v in value.items() if k not in prose | DERIVED}
     if isinstance(value, list):
         return [plain(v, key) for v in value]
+    if isinstance(value, str) and key == "warnings":
+        return ""  # prose; how many there are counts
     if isinstance(value, str) and key == "strategy":
         return STRATEGIES.get(value, value)
     return renamed(f" {value} ") if isinstance(value, str) and key == "name" else value
