@@ -23,7 +23,7 @@ TAIL = "M30\n%\n"
     ("G2 X0 Y0 R4 F100\n", "two different ends"),
     ("G1 A5 F100\n", "unknown word A5"),
     ("G1 X5 U1 F100\n", "unknown word U1"),
-    ("G41 D1\n", "G41 (cutter radius compensation)"),
+    ("G41 D1\n", "G41 needs the radius of T1"),
     ("G43.4 H1\n", "tool centre point control"),
     ("G84 Z-5 R1 F100\n", "unknown word G84 (tapping)"),
     ("G74 Z-5 R1 F100\n", "unknown word G74 (tapping)"),

@@ -15,6 +15,8 @@ CYCLES = frozenset({73, 81, 82, 83, 85, 86, 89})
 MOTION_CODES = frozenset({0, 1, 2, 3, 80}) | CYCLES
 SHIFTS: frozenset[float] = frozenset({10, 52, 92, 92.1, 92.2, 92.3})
 """Words that move program zero."""
+COMPENSATES: frozenset[float] = frozenset({40, 41, 42, 41.1, 42.1})
+"""Words of cutter radius compensation."""
 SAVES = frozenset({70, 71, 72, 73})
 """M words that save modes, discard them and restore them."""
 WORK_OFFSETS = {54: "G54", 55: "G55", 56: "G56", 57: "G57", 58: "G58", 59: "G59", 59.1: "G59.1", 59.2: "G59.2",
@@ -43,22 +45,22 @@ _FOREIGN = re.compile(r"[^\t -~]")
 _M_CODES = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30}) | SAVES
 _ROTARY = "ABC"
 _TCP_G, _TCP_M = 43.4, frozenset({428, 429})  # tool centre point control: Fanuc's word, LinuxCNC's switch
-_WHOLE = "THDLM"
+_WHOLE = "THLM"
 
 # The modal groups of RS274: a control refuses two words of one, or takes the last; G80 has a group of its own on Fanuc.
 _G_GROUPS: tuple[frozenset[float], ...] = (
     frozenset({4, 28, 30, 53}) | SHIFTS, MOTION_CODES - {80}, CYCLES | {80}, frozenset({17, 18, 19}),
     frozenset({90, 91}), frozenset({90.1, 91.1}), frozenset({93, 94, 95}), frozenset({20, 21}),
     frozenset({43, 43.4, 49}),
-    frozenset({98, 99}), frozenset(WORK_OFFSETS), frozenset({61, 61.1, 64}), frozenset({40}), frozenset({15}),
+    frozenset({98, 99}), frozenset(WORK_OFFSETS), frozenset({61, 61.1, 64}), COMPENSATES, frozenset({15}),
     frozenset({50}), frozenset({69}),
 )
 _M_GROUPS: tuple[frozenset[float], ...] = (frozenset({0, 1, 2, 30}), frozenset({6}), frozenset({3, 4, 5}),
                                            frozenset({7, 8, 9}), _TCP_M, SAVES)
 _G_CODES = frozenset().union(*_G_GROUPS) - {_TCP_G}
 _HINTS = {
-    5: "a spline", 5.1: "a spline", 5.2: "a spline", 33: "threading", 38.2: "probing", 41: "cutter radius compensation",
-    42: "cutter radius compensation", 43.4: "tool centre point control", 43.5: "tool centre point control by vectors",
+    5: "a spline", 5.1: "a spline", 5.2: "a spline", 33: "threading", 38.2: "probing",
+    43.4: "tool centre point control", 43.5: "tool centre point control by vectors",
     65: "a macro call", 66: "a macro call", 68: "a rotated frame", 68.2: "a tilted plane", 74: "tapping",
     76: "threading", 84: "tapping", 87: "back boring", 88: "boring with a manual retract",
 }
@@ -121,6 +123,9 @@ def parse_block(text: str, rotary: str = "") -> Block:
         raise BlockError(f"cannot read '{text[:60]}'")
     for letter, digits in words:
         _add(block, letter, digits, rotary)
+    if block.values.get("D", 0.0) % 1 or block.values.get("D", 0.0) < 0:
+        if {41.1, 42.1}.isdisjoint(block.codes):
+            raise BlockError(f"unknown word D{block.values['D']:g}: D takes a whole number from 0")
     _check_groups("G", block.codes, _G_GROUPS)
     _check_groups("M", block.ms, _M_GROUPS)
     return block
@@ -204,6 +209,8 @@ def used_letters(block: Block, motion: float | None, moves: bool) -> str:
         used += "H"
     if 64 in block.codes:
         used += "PQ"
+    if not {41, 42, 41.1, 42.1}.isdisjoint(block.codes):
+        used += "D"
     if 4 in block.codes:
         return used + "P"
     if not moves:

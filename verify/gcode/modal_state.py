@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 
-from verify.gcode.block_words import CYCLES, MOTION_CODES, SAVES, WORK_OFFSETS, Block, BlockError
+from verify.gcode.block_words import COMPENSATES, CYCLES, MOTION_CODES, SAVES, WORK_OFFSETS, Block, BlockError
 from verify.gcode.rotary_words import Rotary
 from verify.gcode.saved_modes import SavedModes
 from verify.kinematics import Kinematics
@@ -62,7 +62,8 @@ class Modes(Rotary):
             self.log.turns(s.tool, s.speed)
         if not {7, 8, 9}.isdisjoint(block.ms):
             s.coolant = 9 not in block.ms
-        self.log.runs(s.speed if s.turning else 0.0, s.coolant)
+        speed, coolant = s.speed if s.turning else 0.0, s.coolant
+        self._in_order(lambda: self.log.runs(speed, coolant))
         if not {428, 429}.isdisjoint(block.ms):
             self._control(s.tcp_word, 428 in block.ms)
         for g in sorted(block.codes, key=lambda g: g != 80):  # with a motion word G80 only ends the cycle before it
@@ -73,7 +74,18 @@ class Modes(Rotary):
             self.log.remark("unit_feed", f"F{values['F']:g} in the block that changes the unit: LinuxCNC reads it "
                             "in the old unit, other controls in the new one; give F its own line", self.log.line)
         if "F" in values:
-            s.feed = values["F"] * (1.0 if s.feed_mode == 93 else s.scale)
+            s.feed = values["F"] * (1.0 if s.feed_mode == 93 else scale if self.fits else s.scale)
+
+    def _in_order(self, run: Callable[[], None]) -> None:
+        """Do something after the moves before it are written."""
+        run()
+
+    def _settled(self, word: str) -> None:
+        """Refuse a block that cutter radius compensation does not go with, where it is on; ``word`` names it."""
+
+    def _compensation(self, word: float, values: dict[str, float]) -> None:
+        """Begin or end cutter radius compensation."""
+        raise NotImplementedError
 
     def _select(self, number: int) -> None:
         if self.tools is not None and number not in self.tools and number != 0:
@@ -86,6 +98,7 @@ class Modes(Rotary):
             if m in ms:
                 self.pause(f"M{m}", s.tool)
         if 6 in ms:
+            self._settled("M6")
             self.pause("tool change", s.selected)
             self.stop("tool change")
             if s.selected != s.tool:
@@ -106,7 +119,11 @@ class Modes(Rotary):
         if g in MOTION_CODES:
             self._motion(g)
         elif g in (17, 18, 19):
+            if g != s.plane:
+                self._settled(f"G{g:g}")
             s.plane = int(g)
+        elif g in COMPENSATES:
+            self._compensation(g, values)
         elif g in (20, 21):
             self._unit(int(g))
         elif g in (90, 91):

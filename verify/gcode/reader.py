@@ -24,7 +24,7 @@ from geometry.errors import ProgramError, VerificationError
 from verify.gcode.block_motion import BlockMotion
 from verify.gcode.block_words import Block, BlockError, parse_block, straight, used_letters
 from verify.gcode.control_flow import Flow, has_flow
-from verify.gcode.dialects import DIALECTS, LINUXCNC, translated_blocks
+from verify.gcode.dialects import CONTROLS, DIALECTS, LINUXCNC, translated_blocks
 from verify.gcode.system_parameters import served
 from verify.kinematics import Kinematics
 from verify.program.move_kinds import FEED, RAPID
@@ -44,10 +44,13 @@ class Reader(BlockMotion):
         log, lines, self.fits = self.log, text.split("\n"), dialect == LINUXCNC
         blocks: Iterable[tuple[int, str]] = enumerate(lines, 1)
         if dialect != LINUXCNC:
-            blocks = translated_blocks(lines, dialect, log)
+            self.control = CONTROLS[dialect]()
+            self.control.names = self.names
+            blocks = translated_blocks(lines, self.control, self)
         elif has_flow(text):
             blocks = Flow(lines, self).blocks()
         percents = self._scan(_reported(blocks, len(lines), report))
+        self._finish()
         self.stop("end of the program")
         self.pause("end of the program", self.s.tool)
         if not self.s.ended and percents < 2 and not log.errors:
@@ -80,6 +83,13 @@ class Reader(BlockMotion):
     def leave(self) -> None:
         """A subroutine ends: the modes that its M73 saved come back."""
         self.saved.leave(self.s)
+
+    def _finish(self) -> None:
+        """Write what a contour still holds back."""
+        try:
+            self._end_contour()
+        except BlockError as problem:
+            self.log.error(str(problem), remedy=problem.remedy)
 
     def _scan(self, blocks: Iterable[tuple[int, str]]) -> int:
         """Run blocks with their lines; the fast path serves plain straight moves in the plain state only."""
@@ -138,7 +148,7 @@ class Reader(BlockMotion):
         s = self.s
         return (not s.relative and s.scale == 1.0 and s.feed_mode == 94 and s.turning and s.tool > 0
                 and s.offset == s.tool and s.work_offset == self.work_offset and (s.tcp or not s.tilted)
-                and not any(s.origin)
+                and not any(s.origin) and self.actual is None and self._frame() is None
                 and not any(math.isnan(v) for v in s.position))
 
     def _block(self, text: str) -> None:
@@ -179,7 +189,8 @@ def _reported(blocks: Iterable[tuple[int, str]], lines: int, report: Report) -> 
 def read_program(text: str, *, name: str = "program", tools: Collection[int] | None = None,
                  work_offset: str = "G54", blend_limit: float = BLEND_LIMIT, kinematics: Kinematics | None = None,
                  gauge_length: Mapping[int, float] | None = None, spindle_tool: int = 0,
-                 report: Report = silent, dialect: str = LINUXCNC) -> Program:
+                 report: Report = silent, dialect: str = LINUXCNC, radii: Mapping[int, float] | None = None,
+                 names: Mapping[str, int] | None = None) -> Program:
     """Read a program of three, four or five axes.
 
     text        : the program
@@ -192,6 +203,8 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
     spindle_tool : T number in the spindle, its length offset on, before the first line; 0 for none
     report      : called with the share read, 0 to 1, every 4096 lines; an exception from it ends the reading
     dialect     : one of ``verify.gcode.dialects.DIALECTS``
+    radii       : mm by T number, radius of the cutting part, for cutter radius compensation
+    names       : T numbers by the ids of the tools, for programs that name their tools
 
     Returns
     -------
@@ -223,6 +236,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
                            subjects=(f"T{spindle_tool}",), measured=spindle_tool, limit=sorted(tools),
                            remedy="give a tool of the table as spindle_tool")
     reader = Reader(Log(name), tools, work_offset, blend_limit, kinematics, gauge_length, spindle_tool)
+    reader.radii, reader.names = dict(radii or {}), dict(names or {})
     return reader.read(text, report, dialect)
 
 

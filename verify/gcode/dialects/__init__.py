@@ -10,17 +10,20 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 
 from verify.gcode.block_words import BlockError
-from verify.gcode.dialects.base import DialectReader
+from verify.gcode.dialects.base import DialectReader, Machine
 from verify.gcode.dialects.fanuc import FanucReader
 from verify.gcode.dialects.haas import HaasReader
 from verify.gcode.dialects.heidenhain import HeidenhainReader, is_conversational
 from verify.gcode.dialects.siemens import SiemensReader, is_siemens
-from verify.program.move_log import MAX_ERRORS, Log
+from verify.program.move_log import MAX_ERRORS
 
 LINUXCNC = "linuxcnc"
 CONTROLS: dict[str, type[DialectReader]] = {
     "fanuc": FanucReader, "haas": HaasReader, "siemens": SiemensReader, "heidenhain": HeidenhainReader}
 """Readers by dialect; ``LINUXCNC`` needs none."""
+
+NEWS = " "
+"""A block without words that keeps the next one off the fast path."""
 
 DIALECTS = (LINUXCNC, *CONTROLS)
 """All dialects that can be read."""
@@ -29,10 +32,21 @@ ENDINGS = {"ngc": (LINUXCNC,), "mpf": ("siemens",), "h": ("heidenhain",), "nc": 
 """Extensions of file names, without the point and in lower case, and the dialects that use them."""
 
 
-def translated_blocks(lines: Sequence[str], dialect: str, log: Log) -> Iterator[tuple[int, str]]:
-    """Blocks with the numbers of their lines, from 1; a line that cannot be read becomes an error of the log."""
-    control = CONTROLS[dialect]()
-    for number, raw in enumerate(lines, 1):
+def translated_blocks(lines: Sequence[str], control: DialectReader, machine: Machine) -> Iterator[tuple[int, str]]:
+    """Blocks with the numbers of their lines, from 1; a line that cannot be read becomes an error of the log.
+
+    control : the reader of the words; machine : the reader that runs the blocks
+    """
+    log, ordered = machine.log, control.order(lines, machine)
+    while True:
+        frame = control.frame
+        try:
+            number, raw = next(ordered)
+        except StopIteration:
+            return
+        except BlockError as problem:
+            log.error(str(problem), log.line or 1, remedy=problem.remedy)
+            return
         try:
             blocks = control.blocks(raw)
         except BlockError as problem:
@@ -40,6 +54,8 @@ def translated_blocks(lines: Sequence[str], dialect: str, log: Log) -> Iterator[
             if len(log.errors) >= MAX_ERRORS:
                 return
             continue
+        if control.frame is not frame:
+            yield number, NEWS
         log.unbounded = control.unbounded
         for note in control.notes:
             log.note(note)

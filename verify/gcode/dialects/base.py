@@ -2,10 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Protocol
+
 from verify.gcode.block_words import NUMBER, WORK_OFFSETS, BlockError
+from verify.gcode.cutter_compensation import FANUC_STYLE, Style
+from verify.gcode.frames import Frame
+from verify.program.move_log import Log
+from verify.program.program import State
 
 ZEROS = tuple(WORK_OFFSETS.values())
 """The work offsets of a control from the first on, as setups name them."""
+
+
+class Machine(Protocol):
+    """The part of the reader that a dialect may look at while it decides which line runs next.
+
+    s   : modal state after the blocks so far; log : record of the reading
+    """
+
+    s: State
+    log: Log
+
+    def served(self, key: int | str) -> float:
+        """A parameter that the control serves."""
 
 
 class DialectReader:
@@ -18,7 +38,14 @@ class DialectReader:
     home_from : first tool change, counted from 0, before which our programs send the spindle home; None: the control
                 retracts by itself
     gives_up_length : whether the length offset is off at these tool changes too
+    style   : how the control compensates a cutter radius; it may change from line to line
+    frame   : from programmed coordinates to those of the work offset, mm, None where both are the same. The reader
+              applies it to X, Y, Z, arcs and cycles of the blocks that follow; shifts by words of blocks (G92, G10)
+              come after it
+    names   : T numbers by the names (ids) of the tools of the setup
     """
+
+    style: Style = FANUC_STYLE
 
     bounds_path = True
     home_from: int | None = None
@@ -29,6 +56,18 @@ class DialectReader:
         self.remarks: list[str] = []
         self.unbounded = False
         self._free = False
+        self.frame: Frame | None = None
+        self.names: Mapping[str, int] = {}
+
+    def order(self, lines: Sequence[str], machine: Machine) -> Iterator[tuple[int, str]]:
+        """Lines with their numbers, from 1, in the order they run: repeats, calls and jumps are followed here.
+
+        Each line goes through ``blocks``, and its blocks run, before the next one is drawn: the state of ``machine`` is
+        then that before the line. A line may come as other text than it has in the program (variables replaced).
+
+        Raises BlockError where the order cannot be known; the reading ends there, at ``machine.log.line``.
+        """
+        yield from enumerate(lines, 1)
 
     def bound(self, known: bool) -> None:
         """From here on a word bounds the deviation from the path (``known``), or none does."""
