@@ -8,9 +8,9 @@ import math
 import numpy as np
 
 from geometry.mesh import F64
-from verify.gcode.block_words import CYCLES, SHIFTS, Block, whole
-from verify.gcode.contour_motion import ContourMotion
+from verify.gcode.block_words import CYCLES, SHIFTS, TURNS, Block, whole
 from verify.gcode.drilling_cycles import Hole, HoleExit, hole_moves
+from verify.gcode.frame_words import FrameWords
 from verify.gcode.rotary_words import between
 from verify.program.arc_chords import (
     CHORD,
@@ -26,8 +26,10 @@ from verify.program.move_log import MAX_MOVES_A_BLOCK
 from verify.program.program import NAN
 from verify.program.turn_subdivision import TIP
 
+_EXITS = {74: HoleExit.FEED_TO_CLEAR, 84: HoleExit.FEED_TO_CLEAR, 85: HoleExit.FEED_TO_CLEAR, 89: HoleExit.FEED}
 
-class BlockMotion(ContourMotion):
+
+class BlockMotion(FrameWords):
     """Moves of the blocks, written to the log; ``dwell`` is the sum of their dwells, s."""
 
     dwell = 0.0
@@ -44,6 +46,8 @@ class BlockMotion(ContourMotion):
         if not SHIFTS.isdisjoint(block.codes):
             self._settled("a word that moves program zero")
             return self._shift_origin(block, axes)
+        if not TURNS.isdisjoint(block.codes):
+            return self._turn_word(block, axes)
         if 53 in block.codes:
             return self._machine_place(axes, turn)
         if not {28, 30}.isdisjoint(block.codes):
@@ -100,7 +104,7 @@ class BlockMotion(ContourMotion):
         """
         s = self.s
         self._settled("G53")
-        if s.motion != 0:
+        if s.motion != 0 and self.control is None:
             return self.log.error("G53 needs G0: the proof cannot see a feed move in machine coordinates")
         if axes[2]:
             self.log.remark("machine_height", f"G53 Z{axes[2]:g} goes to a height that the proof does not know; only "
@@ -240,7 +244,7 @@ class BlockMotion(ContourMotion):
         if s.cycle.get("P", 0.0) < 0:
             return error(f"P{s.cycle['P']:g} is a negative dwell")
         feed = self._feed(values)
-        repeats = whole(values, "L" if "L" in values else "K", 1)
+        repeats = self._holes(values)
         hole = self._hole(k) if feed is not None else None
         if hole is None or feed is None:
             return None
@@ -256,6 +260,12 @@ class BlockMotion(ContourMotion):
                 self._line_to(point, kind, feed if kind == FEED else NAN)
             self.dwell += 0.0 if s.motion in (81, 85) else s.cycle.get("P", 0.0)
         return None
+
+    def _holes(self, values: dict[str, float]) -> int:
+        """Number of holes of a block; 0 where the control only keeps its words."""
+        letters = "LK" if self.control is None else self.control.repeats
+        letter = next((c for c in letters if c in values), letters[0])
+        return 0 if values.get(letter) == 0 and self.control is not None else whole(values, letter, 1)
 
     def _hole(self, k: int) -> Hole | None:
         """The hole of the cycle in force along axis ``k``."""
@@ -273,7 +283,9 @@ class BlockMotion(ContourMotion):
         if peck <= 0 and clear > bottom:
             self.log.error("a drilling cycle with Q0 has no end")
             return None
-        out = {85: HoleExit.FEED_TO_CLEAR, 89: HoleExit.FEED}.get(int(s.motion or 0), HoleExit.RAPID)
+        out = _EXITS.get(int(s.motion or 0), HoleExit.RAPID)
+        if s.motion in (74, 84) and self.control is None:  # LinuxCNC feeds a tap all the way up
+            out = HoleExit.FEED
         return Hole(clear, bottom, clear if s.retract_to_r else max(top, clear), peck, s.motion == 83, out)
 
 

@@ -46,9 +46,8 @@ class ContourMotion(Origins):
     """Straight moves and compensated contours.
 
     control : reader of the control's words, None for LinuxCNC
-    radii   : mm by T number, radius of the tools of the setup
+    radii   : mm by T number, radius of the tools of the setup (``OffsetTables`` keeps it)
     names   : T numbers by the ids of the tools of the setup
-    registers : mm by D number, set by the program
     actual  : (3,) mm, place of the tool where it is not the programmed one, None elsewhere
     across  : whether the running block has a word of an axis of the plane
     """
@@ -56,12 +55,16 @@ class ContourMotion(Origins):
     def __init__(self, *arguments: object, **named: object) -> None:
         super().__init__(*arguments, **named)  # type: ignore[arg-type]
         self.control: DialectReader | None = None
-        self.radii: dict[int, float] = {}
+        self._open_tables()
         self.names: dict[str, int] = {}
-        self.registers: dict[int, float] = {}
         self.contour: Contour | None = None
         self.actual: list[float] | None = None
         self.across = False
+        self._composed: tuple[tuple[object, ...], Frame | None] | None = None
+
+    @property
+    def _foreign(self) -> bool:
+        return self.control is not None
 
     @property
     def style(self) -> Style:
@@ -73,9 +76,13 @@ class ContourMotion(Origins):
         s, outer = self.s, None if self.control is None else self.control.frame
         if outer is None and s.frame is None:
             return None
-        own = outer if s.frame is None else s.frame if outer is None else outer @ s.frame
-        zero = s.origin
-        return translation(zero) @ own @ translation([-v for v in zero]) if any(zero) and own is not None else own
+        key = (outer, s.frame, *s.origin)
+        if self._composed is None or self._composed[0] != key:
+            own = outer if s.frame is None else s.frame if outer is None else outer @ s.frame
+            zero = s.origin
+            whole = translation(zero) @ own @ translation([-v for v in zero]) if any(zero) and own is not None else own
+            self._composed = key, whole
+        return self._composed[1]
 
     def _here(self) -> list[float]:
         """(3,) mm, the programmed place in the coordinates of the blocks."""
@@ -117,8 +124,9 @@ class ContourMotion(Origins):
             return values["D"] * s.scale / 2
         if "D" in values or s.d is None or self.style is LINUXCNC_STYLE:
             s.d = int(values["D"]) if "D" in values else s.tool
-        if s.d in self.registers:
-            return self.registers[s.d]
+        written = self._written_radius(s.d, self.radii.get(s.tool))
+        if written is not None:
+            return written
         if s.d == 0 and "D" in values and self.style is not LINUXCNC_STYLE:
             return 0.0
         number = s.d if s.d in self.radii else s.tool

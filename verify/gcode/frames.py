@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -36,8 +37,13 @@ class Frame:
 
     def back(self, place: Sequence[float]) -> list[float]:
         """(3,) mm, a place of the work offset in programmed coordinates; nan where that is unknown."""
+        inverse = self._inverse
+        return _mapped(inverse.matrix, place, inverse.shift)
+
+    @cached_property
+    def _inverse(self) -> Frame:
         inverse: F64 = np.asarray(np.linalg.inv(self.matrix), dtype=np.float64)
-        return _mapped(inverse, place, -inverse @ self.shift)
+        return Frame(inverse, -inverse @ self.shift)
 
     @property
     def scale(self) -> float:

@@ -83,6 +83,18 @@ class Modes(Rotary):
     def _settled(self, word: str) -> None:
         """Refuse a block that cutter radius compensation does not go with, where it is on; ``word`` names it."""
 
+    def _select_zero(self, name: str) -> None:
+        """Put a work offset in force."""
+        raise NotImplementedError
+
+    def _length_error(self, number: int) -> float:
+        """mm, by which a length offset differs from the length of its tool."""
+        raise NotImplementedError
+
+    def _unturn(self, word: float) -> None:
+        """End a rotation (G69) or a scale (G50) of the programmed coordinates."""
+        raise NotImplementedError
+
     def _compensation(self, word: float, values: dict[str, float]) -> None:
         """Begin or end cutter radius compensation."""
         raise NotImplementedError
@@ -122,6 +134,8 @@ class Modes(Rotary):
             if g != s.plane:
                 self._settled(f"G{g:g}")
             s.plane = int(g)
+        elif g in (50, 69):
+            self._unturn(g)
         elif g in COMPENSATES:
             self._compensation(g, values)
         elif g in (20, 21):
@@ -138,10 +152,7 @@ class Modes(Rotary):
         elif g in (43, 43.4, 49):
             self._length_offset(g, values)
         elif g in WORK_OFFSETS:
-            s.work_offset = WORK_OFFSETS[g]
-            if s.work_offset != self.work_offset:
-                self.log.remark("work_offset", f"{s.work_offset} is not the work offset of the setup "
-                                f"({self.work_offset})", s.work_offset)
+            self._select_zero(WORK_OFFSETS[g])
 
     def _assume(self) -> None:
         """Record the modes that the first move assumes: a control keeps the modes of the program before."""
@@ -208,9 +219,16 @@ class Modes(Rotary):
         s = self.s
         self._control(g == 43.4, s.tcp_switch)
         if g == 49:
-            s.offset = None
+            s.offset, s.length = None, 0.0
             return
-        s.offset = int(values["H"]) if "H" in values else s.tool
+        number = int(values["H"]) if "H" in values else s.tool
+        s.length = self._length_error(number)
+        if number != s.tool and self.tools is not None and number not in self.tools and number > 0 and s.tool > 0:
+            self.log.note(f"H{number} counts as the length of T{s.tool}: the setup has no tool of that number")
+            number = s.tool
+        s.offset = number
+        if s.length and s.tilted:
+            raise BlockError(f"G43 H{number} differs from the length of its tool while a rotary axis stands off 0")
         if s.offset != s.tool:
             self.log.remark("length_offset", f"length offset H{s.offset} with tool T{s.tool} in the spindle",
                             self.log.line)

@@ -155,7 +155,7 @@ class Reader(BlockMotion):
         """Run one block. Order as on the control: speed, tool, spindle, modes, feed, motion, end."""
         before = len(self.log.errors)
         try:
-            block = parse_block(text, self.rotary)
+            block = parse_block(text, self.rotary, self.control.further_words if self.control else ())
             self._set_modes(block)
             self._move(block)
         except BlockError as problem:

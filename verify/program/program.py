@@ -156,6 +156,7 @@ class State:
     table     : mm, shift of the work offset by G10
     shift     : mm, shift of program zero by G92 or G52
     kept      : mm, the shift that G92.3 restores
+    length    : mm, by which the length offset in force differs from the length of the tool
     side      : of the cutter radius compensation in force, 1 left, -1 right, 0 off; d : its register
     frame     : rotation, mirror and scale of the programmed coordinates, None for none
     """
@@ -186,6 +187,7 @@ class State:
     table: list[float] = field(default_factory=lambda: [0.0] * 3)
     shift: list[float] = field(default_factory=lambda: [0.0] * 3)
     kept: list[float] = field(default_factory=lambda: [0.0] * 3)
+    length: float = 0.0
     side: int = 0
     d: int | None = None
     frame: Frame | None = None
@@ -193,7 +195,8 @@ class State:
     @property
     def origin(self) -> list[float]:
         """mm, where program zero lies in the setup frame."""
-        return [a + b for a, b in zip(self.table, self.shift, strict=True)]
+        x, y, z = (a + b for a, b in zip(self.table, self.shift, strict=True))
+        return [x, y, z + self.length]
 
     @property
     def length_off(self) -> bool:

@@ -38,6 +38,8 @@ class DialectReader:
     home_from : first tool change, counted from 0, before which our programs send the spindle home; None: the control
                 retracts by itself
     gives_up_length : whether the length offset is off at these tool changes too
+    further_words : G words of ``block_words.FURTHER`` that the control has
+    repeats : letters that give the number of holes of a drilling cycle, the first one present counts
     style   : how the control compensates a cutter radius; it may change from line to line
     frame   : from programmed coordinates to those of the work offset, mm, None where both are the same. The reader
               applies it to X, Y, Z, arcs and cycles of the blocks that follow; shifts by words of blocks (G92, G10)
@@ -46,6 +48,8 @@ class DialectReader:
     """
 
     style: Style = FANUC_STYLE
+    further_words: frozenset[float] = frozenset()
+    repeats = "LK"
 
     bounds_path = True
     home_from: int | None = None

@@ -217,7 +217,7 @@ def test_a_move_left_out_or_put_in_is_found():
 
 
 @pytest.mark.parametrize(("dialect", "line", "said"), [
-    ("fanuc", "G0 X10", "without a decimal point"), ("fanuc", "#100=3.", "macro"), ("fanuc", "G234 H1", "unknown word"),
+    ("fanuc", "G0 X10", "without a decimal point"), ("fanuc", "G234 H1", "unknown word"),
     ("fanuc", "M428", "word of LinuxCNC"), ("fanuc", "G54.1 P40", "a setup can name"),
     ("fanuc", "X1.; Y2.", "ends the block"),
     ("haas", "G1 X1. F100", "without a decimal point"), ("haas", "G54.1 P1", "unknown word"),
