@@ -274,7 +274,8 @@ class BlockMotion(FrameWords):
         clear = s.cycle["R"] * s.scale + (top if s.relative else s.origin[k])
         bottom = s.cycle["XYZ"[k]] * s.scale + (clear if s.relative else s.origin[k])
         if top > clear and self.stated.isdisjoint((98, 99)):
-            self.log.note("neither G98 nor G99 is stated: drilling cycles are read with G98 (return to start height)")
+            word = "G99 (return to R)" if s.retract_to_r else "G98 (return to start height)"
+            self.log.note(f"neither G98 nor G99 is stated: drilling cycles are read with {word}")
         if bottom > clear:
             self.log.error(f"the drilling depth {'XYZ'[k]} is above R")
             return None

@@ -25,6 +25,7 @@ from verify.gcode.block_motion import BlockMotion
 from verify.gcode.block_words import Block, BlockError, parse_block, straight, used_letters
 from verify.gcode.control_flow import Flow, has_flow
 from verify.gcode.dialects import CONTROLS, DIALECTS, LINUXCNC, translated_blocks
+from verify.gcode.program_text import cleaned
 from verify.gcode.system_parameters import served
 from verify.kinematics import Kinematics
 from verify.program.move_kinds import FEED, RAPID
@@ -42,6 +43,7 @@ class Reader(BlockMotion):
     def read(self, text: str, report: Report = silent, dialect: str = LINUXCNC) -> Program:
         """Moves and remarks of ``text``; raises as ``read_program`` says, and what ``report`` raises."""
         log, lines, self.fits = self.log, text.split("\n"), dialect == LINUXCNC
+        self.s.retract_to_r = dialect == LINUXCNC  # as it starts
         blocks: Iterable[tuple[int, str]] = enumerate(lines, 1)
         if dialect != LINUXCNC:
             self.control = CONTROLS[dialect]()
@@ -229,6 +231,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
     if dialect not in DIALECTS:
         raise VerificationError(f"no reader knows the dialect '{dialect}'", code="unknown_dialect", measured=dialect,
                                 limit=sorted(DIALECTS), remedy=f"name one of {', '.join(sorted(DIALECTS))}")
+    text = cleaned(text)
     if "\x00" in text:
         raise ProgramError(f"{name} is not a text file", remedy="send the NC program as text")
     if spindle_tool and tools is not None and spindle_tool not in tools:

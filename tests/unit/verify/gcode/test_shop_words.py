@@ -120,6 +120,17 @@ def test_modes_comments_and_devices_move_nothing(body):
     assert p.end[p.kind == FEED].tolist() == [[1, 0, 10]] and p.remarks == ()
 
 
+@pytest.mark.parametrize("change", [
+    lambda t: t.replace("\n", "\r\n"), lambda t: t.replace("\n", "\r"), lambda t: "\ufeff" + t, lambda t: t + "\x1a",
+    lambda t: "\x00\x00" + t + "\x00" * 9, lambda t: t.replace("%\n", "\n\n", 1).removesuffix("%\n"),
+    lambda t: t.replace("O1000", ":1000"), lambda t: t.replace("O1000", "O1000(Fr\xe4sen)"),
+    lambda t: t.replace("\n", "\r\r\n"), lambda t: t.removesuffix("%\n"), lambda t: t + "anything\n"])
+def test_line_ends_tape_codes_and_names_as_they_are(change):
+    text = HEAD + "G1 X1. F100.\nX2.\nM30\n%\n"
+    p = read_program(change(text), dialect="fanuc")
+    assert p.end[p.kind == FEED].tolist() == [[1, 0, 10], [2, 0, 10]] and p.remarks == ()
+
+
 def test_a_block_with_a_slash_is_a_remark_only_where_it_moves():
     assert any("depends on a switch" in r.message for r in read("/G1 X1. F100.\n").remarks)
     assert any("depends on a switch" in r.message for r in read("N5/2 G1 X1. F100.\n").remarks)
