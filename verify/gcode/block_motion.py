@@ -163,6 +163,7 @@ class BlockMotion(FrameWords):
 
     def _check_cutting(self, target: list[float]) -> None:
         s, remark = self.s, self.log.remark
+        self.cut = True
         if s.tool == 0:
             remark("no_tool", "a feed move without a tool in the spindle (no T and M6 before it)")
         if s.offset is None:
@@ -245,12 +246,12 @@ class BlockMotion(FrameWords):
             return error(f"P{s.cycle['P']:g} is a negative dwell")
         feed = self._feed(values)
         repeats = self._holes(values)
-        hole = self._hole(k) if feed is not None else None
+        hole = self._hole(k, values, depth) if feed is not None else None
         if hole is None or feed is None:
             return None
         self.log.room(repeats * hole.moves)
         across = [None if axis == k else a for axis, a in enumerate(axes)]
-        if s.cycle["top"] + s.origin[k] < hole.clear != here[k]:
+        if repeats and s.cycle["top"] + s.origin[k] < hole.clear != here[k]:
             self._line_to([hole.clear if axis == k else p for axis, p in enumerate(here)], RAPID, NAN)
         for _ in range(repeats):
             at = self._target(across)
@@ -267,12 +268,19 @@ class BlockMotion(FrameWords):
         letter = next((c for c in letters if c in values), letters[0])
         return 0 if values.get(letter) == 0 and self.control is not None else whole(values, letter, 1)
 
-    def _hole(self, k: int) -> Hole | None:
-        """The hole of the cycle in force along axis ``k``."""
+    def _hole(self, k: int, values: dict[str, float], depth: float | None) -> Hole | None:
+        """The hole of the cycle in force along axis ``k``; ``values`` and ``depth`` are the words of its block.
+
+        LinuxCNC counts R and depth anew in each block, other controls where their words stand.
+        """
         s = self.s
         top = s.cycle.setdefault("top", self._here()[k] - s.origin[k]) + s.origin[k]
         clear = s.cycle["R"] * s.scale + (top if s.relative else s.origin[k])
+        if self.control is not None:
+            clear = s.cycle["clear"] = clear if "R" in values else s.cycle.get("clear", clear)
         bottom = s.cycle["XYZ"[k]] * s.scale + (clear if s.relative else s.origin[k])
+        if self.control is not None:
+            bottom = s.cycle["bottom"] = bottom if depth is not None else s.cycle.get("bottom", bottom)
         if top > clear and self.stated.isdisjoint((98, 99)):
             word = "G99 (return to R)" if s.retract_to_r else "G98 (return to start height)"
             self.log.note(f"neither G98 nor G99 is stated: drilling cycles are read with {word}")

@@ -49,7 +49,7 @@ _WORD = re.compile(rf"([A-Z@^])({NUMBER})")
 _COMMENT = re.compile(r"\([^()]*\)")
 _SCRIPT = re.compile(r"[;(]\s*PY\s*,", re.IGNORECASE)
 _FOREIGN = re.compile(r"[^\t -~]")
-_M_CODES = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30}) | SAVES
+_M_CODES = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 61}) | SAVES
 _ROTARY = "ABC"
 _TCP_G, _TCP_M = 43.4, frozenset({428, 429})  # tool centre point control: Fanuc's word, LinuxCNC's switch
 _WHOLE = "THLM"
@@ -62,7 +62,7 @@ _G_GROUPS: tuple[frozenset[float], ...] = (
     frozenset({98, 99}), frozenset(WORK_OFFSETS), frozenset({61, 61.1, 64}), COMPENSATES, frozenset({15}),
     frozenset({50}), frozenset({69}), IDLE,
 )
-_M_GROUPS: tuple[frozenset[float], ...] = (frozenset({0, 1, 2, 30}), frozenset({6}), frozenset({3, 4, 5}),
+_M_GROUPS: tuple[frozenset[float], ...] = (frozenset({0, 1, 2, 30}), frozenset({6, 61}), frozenset({3, 4, 5}),
                                            frozenset({7, 8, 9}), _TCP_M, SAVES)
 _G_CODES = frozenset().union(*_G_GROUPS) - {_TCP_G} - FURTHER
 _HINTS = {
@@ -217,7 +217,7 @@ def used_letters(block: Block, motion: float | None, moves: bool) -> str:
     motion : G number in force
     moves  : whether the block makes a move of that motion
     """
-    used = "XYZABCFST" + ("PQRLE" if block.idle else "")
+    used = "XYZABCFST" + ("PQRLE" if block.idle else "") + ("Q" if 61 in block.ms else "")
     if 10 in block.codes:
         return used + "LPR"
     if not TURNS.isdisjoint(block.codes):

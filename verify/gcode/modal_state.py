@@ -57,7 +57,7 @@ class Modes(Rotary):
                 self.log.remark("speed", f"S{s.speed:g} is not a spindle speed", self.log.line)
         if "T" in values:
             self._select(int(values["T"]))
-        self._spindle(block.ms)
+        self._spindle(block.ms, values)
         if s.turning:
             self.log.turns(s.tool, s.speed)
         if not {7, 8, 9}.isdisjoint(block.ms):
@@ -104,11 +104,17 @@ class Modes(Rotary):
             self.log.error(f"T{number} is not in the tool table")
         self.s.selected = number
 
-    def _spindle(self, ms: list[int]) -> None:
+    def _spindle(self, ms: list[int], values: dict[str, float]) -> None:
         s = self.s
+        if 61 in ms and (values.get("Q", -1.0) < 0 or values["Q"] % 1):
+            raise BlockError("M61 without Q, the number of the tool in the spindle")
         for m in (0, 1):
             if m in ms:
                 self.pause(f"M{m}", s.tool)
+        if 61 in ms:
+            self._settled("M61")
+            s.tool = s.selected = int(values["Q"])
+            self.loaded = True
         if 6 in ms:
             self._settled("M6")
             self.pause("tool change", s.selected)

@@ -155,7 +155,7 @@ def test_a_place_of_the_machine_needs_no_g0_on_these_controls():
     ("fanuc", "G68 R10.\nG92 X0\n", "rotated"), ("fanuc", "G16\nG91 G1 X1. Y1. F100.\n", "polar"),
     ("fanuc", "G10 L2 P0 X5.\n", "a common shift"), ("fanuc", "G10 L20 P1 X5.\n", "G54.1"),
     ("fanuc", "G10 L3\n", "G10"), ("fanuc", "G41.1\n", "normal direction control"),
-    ("fanuc", "G10 L2 P1 X5.\n", "G10 L2 of G54 after moves")])
+    ("fanuc", "G1 X1. F100.\nG10 L2 P1 X5.\n", "G10 L2 of G54 after feed moves")])
 def test_what_moves_and_is_not_followed_is_refused_by_name(dialect, body, words):
     with pytest.raises(ProgramError) as caught:
         read(body, dialect)
