@@ -163,7 +163,6 @@ class BlockMotion(FrameWords):
 
     def _check_cutting(self, target: list[float]) -> None:
         s, remark = self.s, self.log.remark
-        self.cut = True
         if s.tool == 0:
             remark("no_tool", "a feed move without a tool in the spindle (no T and M6 before it)")
         if s.offset is None:
@@ -221,7 +220,7 @@ class BlockMotion(FrameWords):
         """Largest distance of chords from their arc, mm; half where a turning axis bends the tip path once more."""
         bent = turn is not None and turn != self.s.turn and not self.s.tcp
         frame = self._frame()
-        return (CHORD - TIP if bent else CHORD) / (1.0 if frame is None else frame.scale)
+        return (CHORD - TIP if bent else CHORD) / (1.0 if frame is None else frame.scale_in(self.s.plane))
 
     def _cycle(self, axes: list[float | None], values: dict[str, float]) -> None:
         """Write a drilling cycle along the third axis of the plane as rapids and feeds [Kramer2000].

@@ -11,6 +11,8 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from verify.gcode.block_words import BlockError
 from verify.gcode.cutter_compensation import LINUXCNC_STYLE, CompensationError, Contour, Element, Piece, Style
 from verify.gcode.dialects.base import DialectReader
@@ -61,6 +63,7 @@ class ContourMotion(Origins):
         self.actual: list[float] | None = None
         self.across = False
         self._composed: tuple[tuple[object, ...], Frame | None] | None = None
+        self._stated: tuple[Frame, list[float]] | None = None  # coordinates of a place that is not known whole
 
     @property
     def _foreign(self) -> bool:
@@ -87,7 +90,12 @@ class ContourMotion(Origins):
     def _here(self) -> list[float]:
         """(3,) mm, the programmed place in the coordinates of the blocks."""
         frame = self._frame()
-        return list(self.s.position) if frame is None else frame.back(self.s.position)
+        if frame is None:
+            return list(self.s.position)
+        place = frame.back(self.s.position)
+        if self._stated is not None and self._stated[0] is frame:
+            place = [q if math.isnan(p) else p for p, q in zip(place, self._stated[1], strict=True)]
+        return place
 
     def _compensation(self, word: float, values: dict[str, float]) -> None:
         """Run G40, G41, G42, G41.1 or G42.1."""
@@ -102,10 +110,10 @@ class ContourMotion(Origins):
             raise BlockError(f"G{word:g} while {_UNSETTLED}")
         if self.style is LINUXCNC_STYLE and s.plane == 19:
             raise BlockError("cutter radius compensation in plane G19")
-        if s.tcp and s.tilted:
+        if s.tcp and s.tilted and not self._square():
             raise BlockError("cutter radius compensation with a tilted tool")
         if (frame := self._frame()) is not None:
-            radius /= frame.scale
+            radius /= frame.scale_in(s.plane)
         s.side = side
         if radius == 0:  # the programmed path is the path of the tool
             return None
@@ -114,6 +122,15 @@ class ContourMotion(Origins):
         self.contour = Contour(side * (1 if radius > 0 else -1), abs(radius), complex(where[i], where[j]))
         self.actual = list(where)
         return None
+
+    def _square(self) -> bool:
+        """Whether the tool stands square to the plane of the blocks."""
+        s, frame = self.s, self._frame()
+        if frame is None or self.machine is None:
+            return False
+        axis = self.machine.axis(np.radians([s.turn]))[0]
+        normal = frame.matrix[:, PLANE_AXES[s.plane][2]]
+        return bool(np.linalg.norm(axis - normal / np.linalg.norm(normal)) < 1e-6)
 
     def _cutter_radius(self, word: float, values: dict[str, float]) -> float:
         """mm, of the D word, which is the diameter itself in G41.1 and G42.1."""
@@ -253,6 +270,8 @@ class ContourMotion(Origins):
                 return self._hold(target, kind, feed, turn, minutes, frame)
             else:
                 self.actual = None
+        unknown = frame is not None and any(map(math.isnan, target))
+        self._stated = (frame, list(target)) if unknown and frame is not None else None
         return self._straight(target if frame is None else frame.out(target), kind, feed, turn, minutes)
 
     def _hold(self, target: list[float], kind: int, feed: float, turn: list[float] | None, minutes: float,

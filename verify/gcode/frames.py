@@ -45,17 +45,17 @@ class Frame:
         inverse: F64 = np.asarray(np.linalg.inv(self.matrix), dtype=np.float64)
         return Frame(inverse, -inverse @ self.shift)
 
-    @property
-    def scale(self) -> float:
-        """Length of an image of a unit vector, where all directions agree.
+    def scale_in(self, plane: int) -> float:
+        """Length of the image of a unit vector of a plane (17, 18 or 19), where all its directions agree.
 
         Raises
         ------
         BlockError
             They do not agree: a circle becomes an ellipse.
         """
-        lengths = np.linalg.norm(self.matrix, axis=0)
-        if np.ptp(lengths) > 1e-9:
+        i, j, _ = PLANE_AXES[plane]
+        lengths = np.linalg.norm(self.matrix[:, [i, j]], axis=0)
+        if np.ptp(lengths) > 1e-9 or abs(float(self.matrix[:, i] @ self.matrix[:, j])) > 1e-9:
             raise BlockError("an arc, or cutter radius compensation, while the axes have different scales: a circle is "
                              "no circle then")
         return float(lengths[0])

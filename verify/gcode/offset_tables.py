@@ -23,11 +23,9 @@ class OffsetTables(Modes):
     written : mm by name, (3,) as the program wrote them in machine coordinates, nan where it has not
     lengths : mm by H number, the first value written and the present one
     wear    : mm by H number
-    cut     : whether a feed move was read
     registers : mm by D number, radius that the program wrote; radius_wear : mm by D number
     """
 
-    cut = False
     zeros: dict[str, list[float]]
     written: dict[str, list[float]]
     lengths: dict[int, tuple[float, float]]
@@ -135,7 +133,7 @@ class OffsetTables(Modes):
             value += written[k]
         first = math.isnan(written[k])
         if name == own and first:
-            if zero[k] != 0 or self.cut:
+            if zero[k] != 0 or self.log.cuts:
                 raise BlockError(f"G10 L2 of {own} after feed moves: the zero before it is unknown")
             self.s.position[k] = math.nan
             written[k] = value

@@ -78,6 +78,10 @@ class Reader(BlockMotion):
         """A parameter that the control serves (``verify.gcode.system_parameters``)."""
         return served(self.s, key)
 
+    def here(self) -> list[float]:
+        """(3,) mm, the programmed place in the coordinates of the blocks; nan where it is unknown."""
+        return self._here()
+
     def enter(self) -> None:
         """A subroutine begins: it has saved no modes."""
         self.saved.enter()

@@ -64,7 +64,7 @@ def translated_blocks(lines: Sequence[str], control: DialectReader, machine: Mac
         control.notes.clear()
         control.remarks.clear()
         for block in blocks:
-            yield number, block
+            yield block if isinstance(block, tuple) else (number, block)
 
 
 def dialect_of(text: str, ending: str = "", wanted: Collection[str] = ()) -> str:

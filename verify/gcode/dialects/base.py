@@ -8,6 +8,7 @@ from typing import Protocol
 from verify.gcode.block_words import NUMBER, WORK_OFFSETS, BlockError
 from verify.gcode.cutter_compensation import FANUC_STYLE, Style
 from verify.gcode.frames import Frame
+from verify.kinematics import Kinematics
 from verify.program.move_log import Log
 from verify.program.program import State
 
@@ -18,11 +19,19 @@ ZEROS = tuple(WORK_OFFSETS.values())
 class Machine(Protocol):
     """The part of the reader that a dialect may look at while it decides which line runs next.
 
-    s   : modal state after the blocks so far; log : record of the reading
+    s       : modal state after the blocks so far; log : record of the reading
+    machine : rotary axes of the machine, or None; rotary : their letters
+    radii   : mm by T number, radius of the tools of the setup
     """
 
     s: State
     log: Log
+    machine: Kinematics | None
+    rotary: str
+    radii: dict[int, float]
+
+    def here(self) -> list[float]:
+        """(3,) mm, the programmed place in the coordinates of the blocks; nan where it is unknown."""
 
     def served(self, key: int | str) -> float:
         """A parameter that the control serves."""
@@ -78,8 +87,10 @@ class DialectReader:
         self._free |= not known
         self.unbounded = self._free
 
-    def blocks(self, raw: str) -> list[str]:
+    def blocks(self, raw: str) -> Sequence[str | tuple[int, str]]:
         """Blocks of one line in the words of ``verify.gcode.block_words``; none for a line without effect.
+
+        A block that belongs to an earlier line comes with that line's number.
 
         Raises BlockError where the line cannot be read, or could be read in two ways.
         """

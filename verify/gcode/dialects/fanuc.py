@@ -15,7 +15,8 @@ import re
 from collections.abc import Iterator, Sequence
 
 from verify.gcode.block_words import FURTHER, bare
-from verify.gcode.dialects.base import NUMBER, BlockError, DialectReader, Machine, zero_word
+from verify.gcode.dialects.base import NUMBER, BlockError, Machine, zero_word
+from verify.gcode.dialects.fanuc_planes import FanucPlanes
 from verify.gcode.macro_flow import MacroFlow, has_macros
 
 _PLAIN = re.compile(r"(?:N[0-9]+ ?)?(?:G0?[01] ?)?(?:[XYZABC][+-]?(?:[0-9]*\.[0-9]*|0) ?)*(?:F[0-9]+\.[0-9]* ?)?\r?")
@@ -39,13 +40,13 @@ REFUSED = {
     41.2: "compensation in space",
     42.2: "compensation in space", 45: "a tool offset", 46: "a tool offset", 47: "a tool offset", 48: "a tool offset",
     60: "positioning from one side", 65: "a macro call", 66: "a macro call", 66.1: "a macro call",
-    68.3: "a tilted plane", 68.4: "a tilted plane", 70: "a pattern of holes", 71: "a pattern of holes",
-    72: "a pattern of holes", 77: "back boring", 87: "back boring", 88: "boring with a manual retract",
-    96: "constant surface speed"}
+    53.6: "a turn of the tool", 68.3: "a tilted plane", 68.4: "a tilted plane", 70: "a pattern of holes",
+    71: "a pattern of holes", 72: "a pattern of holes", 77: "back boring", 87: "back boring",
+    88: "boring with a manual retract", 96: "constant surface speed"}
 """G words that move or cut and are not followed, and what they are."""
 
 
-class FanucReader(DialectReader):
+class FanucReader(FanucPlanes):
     """Fanuc 0i, 30i and relatives."""
 
     title = "Fanuc"
@@ -64,6 +65,7 @@ class FanucReader(DialectReader):
 
     def order(self, lines: Sequence[str], machine: Machine) -> Iterator[tuple[int, str]]:
         """As in the base class; subprograms, macros, jumps and variables are followed (``verify.gcode.macro_flow``)."""
+        self.machine = machine
         if has_macros(lines):
             return MacroFlow(lines, machine, self.local_calls).lines_run()
         return super().order(lines, machine)
@@ -76,7 +78,7 @@ class FanucReader(DialectReader):
         BlockError
             The line cannot be read, or could be read in two ways.
         """
-        if _PLAIN.fullmatch(raw) and not self.polar:
+        if not self.polar and _PLAIN.fullmatch(raw):
             return [raw]
         text = self._bare(raw)
         if not text or text == "%":
@@ -101,13 +103,25 @@ class FanucReader(DialectReader):
         values = dict(words)
         codes = [float(b) for a, b in words if a == "G"]
         self._follow(codes)
+        if 68.2 in codes:
+            if 91 in codes:
+                raise BlockError("G68.2 in incremental coordinates (G91)")
+            self.plane(values)
+            return []
+        if 53.1 in codes:
+            return self.square(values)
+        before = self.level() if 69 in codes and self.frame is not None else []
         out = []
+        if self.vectors and not values.keys().isdisjoint("IJK"):
+            arc = not {2.0, 3.0}.isdisjoint(codes) or (self.machine.s.motion in (2, 3) and {0.0, 1.0}.isdisjoint(codes))
+            out = self.vector(values, arc)
+            words = [(a, b) for a, b in words if a not in "IJK"]
         for letter, digits in words:
             out += self._word(letter, digits, codes, values)
         block = " ".join(out)
         if deleted and not re.search(r"[XYZABCGTFH]", block):  # nothing of it moves the tool
             deleted = False
-        return [f"/{block}" if deleted else block, *self._after(codes)] if block else self._after(codes)
+        return [*before, *([f"/{block}" if deleted else block] if block else []), *self._after(codes)]
 
     def _follow(self, codes: list[float]) -> None:
         """Keep the modes that the words of later blocks depend on."""
@@ -117,6 +131,8 @@ class FanucReader(DialectReader):
             self.polar = False
         if 16 in codes:
             self.polar = True
+        if not {43.5, 43, 43.4, 49}.isdisjoint(codes):
+            self.vectors = 43.5 in codes
         for code in codes:
             if code in (0, 1, 2, 3, 80):
                 self.hole = False
@@ -141,7 +157,8 @@ class FanucReader(DialectReader):
             raise BlockError(f"{letter}{digits} is a word of LinuxCNC with another meaning, or none, on {self.title}")
         if letter == "G" and number in REFUSED and not self._followed(number):
             raise BlockError(f"unknown word G{number:g} ({REFUSED[number]})")
-        if letter in _PLACES and "." not in digits and number != 0 and not (letter == "K" and self.hole):
+        if letter in _PLACES and "." not in digits and number != 0 and not (letter in "IJK" and (
+                self.vectors or letter == "K" and self.hole)):
             raise BlockError(f"{letter}{digits} without a decimal point is {digits} or {number / 1000:g}, depending on "
                              "a parameter of the machine", "write the decimal point: X10. is 10 mm everywhere")
 
@@ -190,6 +207,8 @@ class FanucReader(DialectReader):
     def _code(self, code: float, values: dict[str, str]) -> list[str]:
         if code == self.further:
             return [zero_word(6 + int(float(values.get("P", "0"))), f"G{code:g} P{values.get('P', '')}")]
+        if code == 43.5:
+            return ["G43.4"]
         if code == 5.1 and float(values.get("Q", "-1")) not in (0.0, 1.0):
             raise BlockError("G05.1 without Q0 or Q1")
         if code in SMOOTHING:

@@ -54,7 +54,7 @@ def test_macros_compute_and_branch(body, expected):
 @pytest.mark.parametrize(("body", "line", "words"), [
     ("M98 P2000\nM30\n", 8, "M98 P2000: the program O2000 is not in the file"),
     ("G1 F100.\nG65 P9010 X1.\nM30\n", 9, "the program O9010 is not in the file"),
-    ("M98\nM30\n", 8, "M98 without P"), ("M98 P20\nM30\nO20\nG1 X1. F100.\n", 12, "O20 ends without M99"),
+    ("M98\nM30\n", 8, "M98 without P"), ("M98 P20\nM30\nO20\nG1 X1. F100.\n", 11, "O20 ends without M99"),
     ("M98 P20\nM30\nO20\nM98 P20\nM99\n", 11, "more than 10 nested calls"),
     ("G1 X#100 F100.\nM30\n", 8, "#100 has no value"), ("G1 X#7 F100.\nM30\n", 8, "X#7 uses #7, which has no value"),
     ("#1=#5221\nM30\n", 8, "#5221 is a variable of the control"), ("#5221=3.\nM30\n", 8, "#5221 is a variable"),

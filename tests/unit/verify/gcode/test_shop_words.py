@@ -5,6 +5,7 @@ import pytest
 
 from geometry.errors import ProgramError
 from verify.gcode.reader import FEED, read_program
+from verify.kinematics import Kinematics
 
 HEAD = "%\nO1000\nG21 G90 G17\nT1 M6\nS1000 M3\nG0 G54 X0 Y0\nG43 H1 Z10.\n"
 F = " F100."
@@ -160,3 +161,51 @@ def test_what_moves_and_is_not_followed_is_refused_by_name(dialect, body, words)
     with pytest.raises(ProgramError) as caught:
         read(body, dialect)
     assert words in caught.value.message and f"line {7 + body.count(chr(10))}:" in caught.value.message
+
+
+AC = Kinematics("table-table-AC", ((0.0, 0.0, -50.0), (0.0, 0.0, -50.0)))
+UNKNOWN = Kinematics("table-table-AC")
+START = "%\nO1\nG21 G90 G17\nT1 M6\nS1000 M3\nG54 G0 X0. Y0.\nG43 H1 Z100.\nG53 Z0.\n"
+TILT = np.array([[1, 0, 0], [0, np.cos(np.pi / 6), -0.5], [0, 0.5, np.cos(np.pi / 6)]])  # 30 deg about X
+
+
+def spatial(body, machine=AC):
+    return read_program(START + body + "M30\n%\n", dialect="fanuc", kinematics=machine, gauge_length={1: 100.0})
+
+
+@pytest.mark.parametrize("machine", [AC, UNKNOWN], ids=["pivots", "no pivots"])
+def test_a_tilted_plane_turns_the_tool_and_the_coordinates(machine):
+    """Origin (10, 0, 5), turned 30 deg about X: the tool stands along the Z of the plane, arcs and holes lie in it."""
+    p = spatial("G68.2 X10. Y0. Z5. I0. J30. K0.\nG53.1\nG0 X1. Y2.\nZ20.\nG1 Z-1. F100.\nX5.\nG3 X5. Y8. R3.\n"
+                "G0 Z20.\nG98 G81 X7. Y1. Z-3. R2.\nG80\nG53 Z0.\nG69\n", machine)
+    cut = p.end[p.kind == FEED]
+    place = (cut - [10, 0, 5]) @ TILT
+    np.testing.assert_allclose(place[0], [1, 2, -1], atol=1e-9)
+    np.testing.assert_allclose(place[1], [5, 2, -1], atol=1e-9)
+    np.testing.assert_allclose(np.hypot(*(place[2:-1, :2] - [5, 5]).T), 3, atol=1e-9)
+    np.testing.assert_allclose(place[2:-1, 2], -1, atol=1e-9)
+    np.testing.assert_allclose(place[-1], [7, 1, -3], atol=1e-9)
+    np.testing.assert_allclose(p.poses.end_axis[p.kind == FEED] - TILT[:, 2], 0, atol=1e-9)
+
+
+def test_tool_vectors_turn_the_axes():
+    p = spatial("G43.5 H1\nG0 X0. Y0. Z50. I0. J0. K1.\nG1 X10. I0.5 J0. K0.8660254 F100.\nX20.\nG49\n")
+    axes = p.poses.end_axis[p.kind == FEED]
+    np.testing.assert_allclose(axes[-1], [0.5, 0, 0.8660254], atol=1e-6)
+    np.testing.assert_allclose(p.end[p.kind == FEED][-1], [20, 0, 50])
+
+
+@pytest.mark.parametrize(("body", "words"), [
+    ("G53.1\n", "G53.1 without G68.2"), ("G68.2 P2 Q1 X0. Y0. Z0.\n", "G68.2 in another form"),
+    ("G68.2 J30.\nG68.2 J40.\n", "G68.2 while a plane"), ("G91 G68.2 J30.\n", "incremental"),
+    ("G43.5 H1\nG0 Z50.\nG2 X5. I5. J0. F100.\n", "tool vectors"), ("G43.5 H1\nG0 Z50. I0. J0. K0.\n", "length 0")])
+def test_planes_and_vectors_that_cannot_be_read(body, words):
+    with pytest.raises(ProgramError) as caught:
+        spatial(body)
+    assert words in caught.value.message
+
+
+def test_a_plane_needs_rotary_axes():
+    with pytest.raises(ProgramError) as caught:
+        read("G68.2 J30.\nG53.1\n")
+    assert "G53.1 turns the tool axis" in caught.value.message
