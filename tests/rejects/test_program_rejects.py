@@ -155,7 +155,6 @@ TAIL = "M30\n%\n"
     ("G0 X\u0663\n", "'\\u0663'"),
     ("G0 X1\u00a0Y1\n", "'\\xa0'"),
     ("N\u0663 G0 X1\n", "'\\u0663'"),
-    ("G0 Z5\rX1\n", "'\\r'"),
     ("G0 Z1" + "0" * 400 + "\n", "above 1e+15"),
     ("G1 F1" + "0" * 400 + " X1\n", "above 1e+15"),
     ("G1 X-100000001 F100\n", "farther than any machine moves"),

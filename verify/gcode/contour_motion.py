@@ -14,7 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from verify.gcode.block_words import BlockError
-from verify.gcode.cutter_compensation import LINUXCNC_STYLE, CompensationError, Contour, Element, Piece, Style
+from verify.gcode.cutter_compensation import (
+    FANUC_STYLE,
+    LINUXCNC_STYLE,
+    CompensationError,
+    Contour,
+    Element,
+    Piece,
+    Style,
+)
 from verify.gcode.dialects.base import DialectReader
 from verify.gcode.frames import Frame, translation
 from verify.gcode.work_offsets import Origins
@@ -117,6 +125,9 @@ class ContourMotion(Origins):
         s.side = side
         if radius == 0:  # the programmed path is the path of the tool
             return None
+        if self.style is FANUC_STYLE:
+            self.log.note("cutter radius compensation is read with an approach of type A and straight outside corners; "
+                          "parameters or settings of the machine decide")
         where = self.actual or self._here()
         i, j, _ = PLANE_AXES[s.plane]
         self.contour = Contour(side * (1 if radius > 0 else -1), abs(radius), complex(where[i], where[j]))

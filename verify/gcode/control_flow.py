@@ -68,6 +68,7 @@ class Flow:
         self.scope = Parameters(machine.served)
         self.structure = Structure()
         self._back: list[int] = []
+        self._latest: dict[int, tuple[int, int]] = {}
         self._programs: dict[int, int] = {}
         self._runs_left: list[list[int]] = []  # of M98: line to come back to, first line, runs left
         self._kept: dict[int, ParametricLine] = {}
@@ -115,6 +116,7 @@ class Flow:
                 return None
             if plain[at]:
                 at += 1
+                self.scope.changes += 1
                 yield at, self.lines[at - 1]
                 continue
             self.machine.log.line = at + 1
@@ -127,6 +129,7 @@ class Flow:
                 return self.machine.log.error(str(problem))
             at += 1
             if text:
+                self.scope.changes += 1
                 yield at, text
         if len(plain) < len(self.lines):
             yield len(plain) + 1, "%"
@@ -185,9 +188,13 @@ class Flow:
         return step.at + 1
 
     def _while(self, step: OWordStep) -> int:
+        holds = self._holds(step)
+        if holds and self._latest.get(step.at) == (self.scope.changes, len(self._back)):
+            self._endless(step.at + 1)  # nothing has changed since the condition held before
+        self._latest[step.at] = self.scope.changes, len(self._back)
         if step.kind == "do":
-            return step.start + 1 if self._holds(step) else step.at + 1
-        return step.at + 1 if self._holds(step) else step.end + 1
+            return step.start + 1 if holds else step.at + 1
+        return step.at + 1 if holds else step.end + 1
 
     def _repeat(self, step: OWordStep) -> int:
         times = step.word.values[0](self.scope)
@@ -196,6 +203,7 @@ class Flow:
 
     def _again(self, step: OWordStep) -> int:
         self.scope.frame.repeats[step.start] -= 1
+        self.scope.changes += 1
         return step.start + 1 if self.scope.frame.repeats[step.start] > 0 else step.at + 1
 
     def _call(self, step: OWordStep) -> int:
@@ -211,6 +219,7 @@ class Flow:
         numbers.update(enumerate((value(self.scope) for value in word.values), 1))
         self.scope.frames.append(CallFrame(numbers))
         self._back.append(step.at + 1)
+        self.scope.changes += 1
         self.machine.enter()
         return sub.at + 1
 
@@ -218,6 +227,7 @@ class Flow:
         values = step.word.values
         self.scope.returned = (values[0](self.scope), 1.0) if values else (0.0, 0.0)
         self.scope.frames.pop()
+        self.scope.changes += 1
         self.machine.leave()
         return self._back.pop()
 

@@ -368,6 +368,7 @@ class MacroFlow:
         call = self.calls[-1]
         if call.left > 0 and "P" not in words:
             call.left -= 1
+            self.scope.changes += 1
             return call.section, call.start
         self.calls.pop()
         if call.level:

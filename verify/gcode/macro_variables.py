@@ -31,11 +31,10 @@ ARGUMENTS = dict(zip("ABCIJKDEFHMQRSTUVWXYZ",
 class MacroVariables(Parameters):
     """All variables at one time; the levels of G65 are its frames.
 
-    vacant  : the latest number that was read without a value, for messages
-    changes : how often a value changed, or the program made a block
+    vacant : the latest number that was read without a value, for messages
     """
 
-    vacant = changes = 0
+    vacant = 0
 
     def numbered(self, number: float) -> float:
         """Value of a variable, nan where it is vacant.

@@ -16,6 +16,7 @@ and rotary axes stand at 0; ``Program.assumed`` lists these assumptions.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
 import numpy as np
@@ -34,6 +35,7 @@ from verify.program.program import NAN, Program, Remark
 from verify.progress import Report, silent
 
 BLEND_LIMIT = 0.01
+_BINARY = re.compile("[\x00-\x08]")
 REPORT_LINES = 4096  # lines between two reports of progress
 
 
@@ -236,7 +238,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
         raise VerificationError(f"no reader knows the dialect '{dialect}'", code="unknown_dialect", measured=dialect,
                                 limit=sorted(DIALECTS), remedy=f"name one of {', '.join(sorted(DIALECTS))}")
     text = cleaned(text)
-    if "\x00" in text:
+    if _BINARY.search(text):
         raise ProgramError(f"{name} is not a text file", remedy="send the NC program as text")
     if spindle_tool and tools is not None and spindle_tool not in tools:
         raise ProgramError(f"{name}: the tool in the spindle, T{spindle_tool}, is not in the tool table",

@@ -214,6 +214,8 @@ class FanucReader(FanucPlanes):
         if code in SMOOTHING:
             self.notes.append(ROUNDING)
             return []
+        if code == 76:
+            self.notes.append("G76 is read without its shift at the bottom: a parameter decides its direction")
         if code in (15, 16) or code in IDLE_G:
             return []
         if code == 10 and float(values.get("L", "0")) == 20:
