@@ -116,7 +116,6 @@ class Flow:
                 return None
             if plain[at]:
                 at += 1
-                self.scope.changes += 1
                 yield at, self.lines[at - 1]
                 continue
             self.machine.log.line = at + 1
@@ -129,7 +128,6 @@ class Flow:
                 return self.machine.log.error(str(problem))
             at += 1
             if text:
-                self.scope.changes += 1
                 yield at, text
         if len(plain) < len(self.lines):
             yield len(plain) + 1, "%"
@@ -190,7 +188,7 @@ class Flow:
     def _while(self, step: OWordStep) -> int:
         holds = self._holds(step)
         if holds and self._latest.get(step.at) == (self.scope.changes, len(self._back)):
-            self._endless(step.at + 1)  # nothing has changed since the condition held before
+            self._endless(step.at + 1)  # no parameter has changed since the condition held before
         self._latest[step.at] = self.scope.changes, len(self._back)
         if step.kind == "do":
             return step.start + 1 if holds else step.at + 1

@@ -33,12 +33,17 @@ class Frame:
 
     def out(self, place: Sequence[float]) -> list[float]:
         """(3,) mm, a programmed place in the work offset; nan where it depends on an unknown coordinate."""
-        return _mapped(self.matrix, place, self.shift)
+        return [constant + sum([m * place[k] for k, m in terms]) for constant, terms in self._rows]
 
     def back(self, place: Sequence[float]) -> list[float]:
         """(3,) mm, a place of the work offset in programmed coordinates; nan where that is unknown."""
-        inverse = self._inverse
-        return _mapped(inverse.matrix, place, inverse.shift)
+        return self._inverse.out(place)
+
+    @cached_property
+    def _rows(self) -> list[tuple[float, list[tuple[int, float]]]]:
+        """By row: the shift, and the columns that count with their factors; an unknown place spoils no other row."""
+        return [(constant, [(k, m) for k, m in enumerate(row) if abs(m) > _TINY])
+                for row, constant in zip(self.matrix.tolist(), self.shift.tolist(), strict=True)]
 
     @cached_property
     def _inverse(self) -> Frame:
@@ -59,14 +64,6 @@ class Frame:
             raise BlockError("an arc, or cutter radius compensation, while the axes have different scales: a circle is "
                              "no circle then")
         return float(lengths[0])
-
-
-def _mapped(matrix: F64, place: Sequence[float], shift: F64) -> list[float]:
-    """Place times matrix, plus shift; an unknown coordinate spoils only what depends on it."""
-    out = []
-    for row, constant in zip(matrix.tolist(), shift.tolist(), strict=True):
-        out.append(constant + sum(m * p for m, p in zip(row, place, strict=True) if abs(m) > _TINY))
-    return out
 
 
 def about(matrix: F64, centre: Sequence[float]) -> Frame:

@@ -51,6 +51,7 @@ class MacroVariables(Parameters):
                 self.vacant = n
             return found
         if n in POSITIONS:
+            self.changes += 1
             return self._served(POSITIONS[n])
         if n not in self._numbers:
             if any(n in r for r in _COMMON):

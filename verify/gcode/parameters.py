@@ -31,7 +31,7 @@ class CallFrame:
 class Parameters:
     """All parameters at one time.
 
-    changes : how often a value changed; the flow adds the blocks that it made
+    changes : how often a value changed, or one of the control was read; the flow adds its calls
     served : gives the value of a number or name that the control serves; raises BlockError where the reader does not
              know it
     """
@@ -58,6 +58,7 @@ class Parameters:
         """
         n = _index(number)
         if n > LAST:
+            self.changes += 1
             return self._served(n)
         held = self.frame.numbers if n <= LOCAL else self._numbers
         if n not in held:
@@ -82,6 +83,7 @@ class Parameters:
         if name in held:
             return held[name]
         if is_served(name):
+            self.changes += 1
             return self._served(name)
         raise BlockError(f"#<{name}> has no value yet; set it first")
 

@@ -195,8 +195,8 @@ class State:
     @property
     def origin(self) -> list[float]:
         """mm, where program zero lies in the setup frame."""
-        x, y, z = (a + b for a, b in zip(self.table, self.shift, strict=True))
-        return [x, y, z + self.length]
+        table, shift = self.table, self.shift
+        return [table[0] + shift[0], table[1] + shift[1], table[2] + shift[2] + self.length]
 
     @property
     def length_off(self) -> bool:

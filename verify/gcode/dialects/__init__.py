@@ -15,7 +15,7 @@ from verify.gcode.dialects.fanuc import FanucReader
 from verify.gcode.dialects.haas import HaasReader
 from verify.gcode.dialects.heidenhain import HeidenhainReader, is_conversational
 from verify.gcode.dialects.siemens import SiemensReader, is_siemens
-from verify.program.move_log import MAX_ERRORS
+from verify.program.move_log import MAX_ERRORS, Log
 
 LINUXCNC = "linuxcnc"
 CONTROLS: dict[str, type[DialectReader]] = {
@@ -37,34 +37,36 @@ def translated_blocks(lines: Sequence[str], control: DialectReader, machine: Mac
 
     control : the reader of the words; machine : the reader that runs the blocks
     """
-    log, ordered = machine.log, control.order(lines, machine)
-    while True:
-        frame = control.frame
-        try:
-            number, raw = next(ordered)
-        except StopIteration:
-            return
-        except BlockError as problem:
-            log.error(str(problem), log.line or 1, remedy=problem.remedy)
-            return
-        try:
-            blocks = control.blocks(raw)
-        except BlockError as problem:
-            log.error(str(problem), number, remedy=problem.remedy)
-            if len(log.errors) >= MAX_ERRORS:
-                return
-            continue
-        if control.frame is not frame:
-            yield number, NEWS
-        log.unbounded = control.unbounded
-        for note in control.notes:
-            log.note(note)
-        for remark in control.remarks:
-            log.remark("control", remark, remark, number)
-        control.notes.clear()
-        control.remarks.clear()
-        for block in blocks:
-            yield block if isinstance(block, tuple) else (number, block)
+    log, frame = machine.log, control.frame
+    try:
+        for number, raw in control.order(lines, machine):
+            try:
+                blocks = control.blocks(raw)
+            except BlockError as problem:
+                log.error(str(problem), number, remedy=problem.remedy)
+                if len(log.errors) >= MAX_ERRORS:
+                    return
+                continue
+            if control.frame is not frame:
+                frame = control.frame
+                yield number, NEWS
+            if control.notes or control.remarks:
+                _report(control, number, log)
+            log.unbounded = control.unbounded
+            for block in blocks:
+                yield block if isinstance(block, tuple) else (number, block)
+    except BlockError as problem:
+        log.error(str(problem), log.line or 1, remedy=problem.remedy)
+
+
+def _report(control: DialectReader, number: int, log: Log) -> None:
+    """Pass on what a control notes and remarks on a line."""
+    for note in control.notes:
+        log.note(note)
+    for remark in control.remarks:
+        log.remark("control", remark, remark, number)
+    control.notes.clear()
+    control.remarks.clear()
 
 
 def dialect_of(text: str, ending: str = "", wanted: Collection[str] = ()) -> str:

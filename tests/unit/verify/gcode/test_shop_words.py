@@ -1,9 +1,12 @@
 """Words of Fanuc and Haas as shops write them: places by hand, and what is refused by name."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from geometry.errors import ProgramError
+from verify.gcode.dialects.fanuc import REFUSED
 from verify.gcode.reader import FEED, read_program
 from verify.kinematics import Kinematics
 
@@ -209,3 +212,9 @@ def test_a_plane_needs_rotary_axes():
     with pytest.raises(ProgramError) as caught:
         read("G68.2 J30.\nG53.1\n")
     assert "G53.1 turns the tool axis" in caught.value.message
+
+
+def test_the_page_lists_every_word_that_is_refused():
+    page = (Path(__file__).resolve().parents[4] / "docs" / "verify.md").read_text().partition("## Words it refuses")[2]
+    listed = set(page.replace(",", " ").split())
+    assert not [f"G{code:g}" for code in REFUSED if f"G{code:g}" not in listed]
