@@ -162,7 +162,7 @@ class ContourMotion(Origins):
             raise BlockError(f"G{word:g} needs the radius of T{number}, and the setup has no such tool",
                              "give the tool in the setup, or set the register with G10 L12")
         radius = self.radii[number]
-        if number != s.tool:
+        if number != s.tool or (s.d != s.tool and not self._own_register(s.d)):
             self.log.remark("radius_offset", f"cutter radius D{s.d} with tool T{s.tool} in the spindle", (s.d, s.tool))
         self.log.note(f"D{s.d} counts as the radius of T{number}, {radius:g} mm; a contour that is the path of the "
                       "tool's centre needs 0 there instead")

@@ -91,6 +91,10 @@ class Modes(Rotary):
         """mm, by which a length offset differs from the length of its tool."""
         raise NotImplementedError
 
+    def _own_register(self, number: int) -> bool:
+        """Whether a register that no tool has by number belongs to the tool in the spindle."""
+        raise NotImplementedError
+
     def _unturn(self, word: float) -> None:
         """End a rotation (G69) or a scale (G50) of the programmed coordinates."""
         raise NotImplementedError
@@ -229,7 +233,7 @@ class Modes(Rotary):
             return
         number = int(values["H"]) if "H" in values else s.tool
         s.length = self._length_error(number)
-        if number != s.tool and self.tools is not None and number not in self.tools and number > 0 and s.tool > 0:
+        if number != s.tool and self.tools is not None and number not in self.tools and self._own_register(number):
             self.log.note(f"H{number} counts as the length of T{s.tool}: the setup has no tool of that number")
             number = s.tool
         s.offset = number

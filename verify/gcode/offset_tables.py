@@ -86,6 +86,14 @@ class OffsetTables(Modes):
         first, now = self.lengths.get(number, (0.0, 0.0))
         return now - first + self.wear.get(number, 0.0)
 
+    def _own_register(self, number: int) -> bool:
+        """Whether a register that no tool has by number belongs to the tool in the spindle.
+
+        Shops number further registers in tens: H21, H51 or H101 with T1. Another difference may be a mistake.
+        """
+        tool = self.s.tool
+        return number in self.lengths or (self._foreign and tool > 0 and number > tool and (number - tool) % 10 == 0)
+
     def _written_radius(self, number: int, tool: float | None) -> float | None:
         """mm, radius in D ``number`` where the program wrote it; ``tool`` is the radius of the tool, or None.
 

@@ -118,6 +118,10 @@ def test_which_radius(body, radius):
     assert any("radius D3 with tool T10" in r.message for r in p.remarks) == ("D3" in body)
 
 
+def test_a_register_that_is_no_tool_s_and_no_habit_is_a_finding():
+    assert any("radius D11 with tool T10" in r.message for r in read("G41 D11 X0. Y0. F800.\nG40 X9.\n").remarks)
+
+
 @pytest.mark.parametrize(("body", "words"), [
     ("G41 D10 G2 X0. Y0. R30. F800.\n", ("line 7", "an arc in the block that begins")),
     ("G41 D10 X0. Y0. F800.\nX20.\nG3 X20. Y8. J4.\nG1 X0.\n", ("line 9", "inside arc of radius")),

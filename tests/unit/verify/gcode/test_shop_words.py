@@ -85,8 +85,11 @@ def test_a_register_of_no_tool_is_the_length_of_the_one_in_the_spindle():
     """H51 with T1 is a habit; H2 with T1 is the length of another tool of the setup."""
     assert read("G43 H51\nG1 Z1. F100.\n", tools={1, 2}).remarks == ()
     assert any("H51 counts as the length of T1" in n for n in read("G43 H51\n", tools={1, 2}).notes)
-    other = read("G43 H2\nG1 Z1. F100.\n", tools={1, 2})
-    assert any("length offset H2 with tool T1" in r.message for r in other.remarks)
+    for h in (2, 5, 12):
+        other = read(f"G43 H{h}\nG1 Z1. F100.\n", tools={1, 2})
+        assert any(f"length offset H{h} with tool T1" in r.message for r in other.remarks)
+    written = read("G10 L10 P7 R120.\nG43 H7\nG1 Z1. F100.\n", tools={1, 2})
+    assert written.remarks == ()
 
 
 R, Z0 = 2.0, -5.0
