@@ -1,0 +1,92 @@
+"""Programs with words of Siemens controls, each with the same moves in plain G0, G1, G2 and G3."""
+
+import math
+
+PAIRS = {
+    # places
+    "centre by AC": ("G1 X10 Y10\nG2 X10 Y10 I=AC(15) J=AC(10)", "G1 X10 Y10\nG2 X10 Y10 I5 J0"),
+    "IC in G90": ("G1 X10 Y5\nX=IC(5) Y=IC(-2)\nZ=IC(-50)", "G1 X10 Y5\nX15 Y3\nZ0"),
+    "AC in G91": ("G1 X10 Y5\nG91 X=AC(12) Y2\nX1 Z=AC(3)\nG90", "G1 X10 Y5\nX12 Y7\nX13 Z3"),
+    "words run together": ("G1X10Y5F300\nN20G2X20Y5I5J0", "G1 X10 Y5 F300\nG2 X20 Y5 I5 J0"),
+    "circle by a point": ("G1 X10 Y0\nCIP X20 Y10 I1=AC(17.0710678118655) J1=2.92893218813452",
+                          "G1 X10 Y0\nG3 X20 Y10 I0 J10"),
+    "circle by a point, relative": ("G1 X10 Y0\nCIP X20 Y10 I1=IC(7.0710678118655) J1=IC(2.92893218813452)",
+                                    "G1 X10 Y0\nG3 X20 Y10 I0 J10"),
+    "tangent arc": ("G1 X10 Y0\nCT X20 Y10\nG1 Y20", "G1 X10 Y0\nG3 X20 Y10 I0 J10\nG1 Y20"),
+    "tangent arcs in a row": ("G1 X10 Y0\nCT X20 Y10\nX30 Y20\nG1 X40",
+                              "G1 X10 Y0\nG3 X20 Y10 I0 J10\nG2 X30 Y20 I10 J0\n"
+                                                                          "G1 X40"),
+    "polar": ("G111 X30 Y20\nG0 AP=30 RP=10\nG1 AP=90\nG2 AP=0 RP=10 Z40",
+              f"G0 X{30 + 10 * math.cos(math.pi / 6):.9f} Y25\nG1 X30 Y30\nG2 X40 Y20 Z40 I0 J-10"),
+    "pole from here": ("G1 X10 Y0\nG110 X10 Y0\nG1 AP=180 RP=5", "G1 X10 Y0\nX15 Y0"),
+    "radius": ("G3 X15 Y15 CR=15", "G3 X15 Y15 I0 J15"),
+    # frames
+    "shift": ("TRANS X20 Y5\nG0 X0 Y0\nATRANS X1\nG1 X2\nTRANS\nX0", "G0 X20 Y5\nG1 X23\nX0"),
+    "shift replaces": ("TRANS X20\nTRANS Y5\nG0 X1 Y1", "G0 X1 Y6"),
+    "rotation": ("TRANS X30 Y20\nAROT Z90\nG1 X10 Y0\nG2 X0 Y10 I-10 J0\nROT\nG1 X0 Y0",
+                 "G1 X30 Y30\nG2 X20 Y20 I0 J-10\nG1 X0 Y0"),
+    "rotation in the plane": ("ROT RPL=30\nG1 X10 Y0\nX20\nG91 Y5\nG90",
+                              f"G1 X{10 * math.cos(math.pi / 6):.9f} Y5\nX{20 * math.cos(math.pi / 6):.9f} Y10\n"
+                              f"X{20 * math.cos(math.pi / 6) - 2.5:.9f} Y{10 + 5 * math.cos(math.pi / 6):.9f}"),
+    "mirror": ("MIRROR X0\nG1 X10 Y5\nG2 X20 Y5 I5 J0\nMIRROR\nG1 X0", "G1 X-10 Y5\nG3 X-20 Y5 I-5 J0\nG1 X0"),
+    "scale": ("SCALE X2 Y2\nG1 X10 Y5\nG3 X20 Y5 CR=5\nSCALE", "G1 X20 Y10\nG3 X40 Y10 I10 J0"),
+    "scale, then shift": ("SCALE X2 Y2\nATRANS X5\nG1 X1 Y1", "G1 X12 Y2"),
+    "frame with a drill": ("TRANS X20\nAROT Z90\nG0 X10 Y0\nCYCLE81(5,0,2,-3)", "G0 X20 Y10\nZ2\nG1 Z-3\nG0 Z5"),
+    # values
+    "parameters": ("R1=-3 R2=R1*2+10\nG1 Z=R1 X=R2", "G1 Z-3 X4"),
+    "indirect": ("R1=7 R7=2.5\nG1 X=R[R1]", "G1 X2.5"),
+    "variables": ("DEF REAL A=2.5,B\nDEF INT N=7/2\nB=A*N\nG1 X=B Y=-A", "G1 X10 Y-2.5"),
+    "arrays": ("DEF REAL P[3]=SET(1,2,4)\nP[1]=P[2]+3\nG1 X=P[1]", "G1 X7"),
+    "functions": ("G1 X=10*COS(60) Y=SQRT(POT(3)+POT(4)) Z=ATAN2(1,1)-TRUNC(1.9)", "G1 X5 Y5 Z44"),
+    "precedence": ("R1=1+2*3-8/4 R2=7 DIV 2 R3=7 MOD 3\nG1 X=R1 Y=R2 Z=R3", "G1 X5 Y3 Z1"),
+    # flow
+    "subprogram": ("L10 P2\nG1 X0\nM30\nPROC L10\nG1 X=IC(3)\nG1 Y=IC(1)\nRET", "G1 X3\nY1\nX6\nY2\nX0"),
+    "named subprogram": ("R1=4\nPOCKET_ROUGH\nPOCKET_ROUGH\nM30\nPROC POCKET_ROUGH\nG1 X=R1\nR1=R1+1\nM17",
+                         "G1 X4\nX5"),
+    "parameters of a call": ("WAY(3,2.5)\nM30\nPROC WAY(REAL A, REAL B, INT C=4)\nG1 X=A Y=B Z=C\nRET",
+                             "G1 X3 Y2.5 Z4"),
+    "results of a call": ("DEF REAL Q=1\nTWICE(Q)\nG1 X=Q\nM30\nPROC TWICE(VAR REAL V)\nV=V*2+3\nRET", "G1 X5"),
+    "modes saved": ("WAY\nX10\nM30\nPROC WAY SAVE\nG91 G1 X3\nRET", "G1 X3\nG0 X10"),
+    "if": ("R1=5\nIF R1>3\nG1 X1\nELSE\nG1 X2\nENDIF\nIF R1==4\nX9\nENDIF\nX3", "G1 X1\nX3"),
+    "while": ("R1=0\nWHILE R1<3\nG1 X=R1+1\nR1=R1+1\nENDWHILE", "G1 X1\nX2\nX3"),
+    "for": ("DEF INT K\nFOR K=1 TO 3\nG1 X=K\nENDFOR\nY=K", "G1 X1\nX2\nX3\nY4"),
+    "repeat until": ("R1=3\nREPEAT\nG1 X=R1\nR1=R1-1\nUNTIL R1==0", "G1 X3\nX2\nX1"),
+    "loop": ("R1=0\nLOOP\nR1=R1+1\nG1 X=R1\nIF R1>2 GOTOF OUT\nENDLOOP\nOUT: X9", "G1 X1\nX2\nX3\nX9"),
+    "jumps": ("R1=1\nBACK:\nG1 X=R1\nR1=R1+1\nIF R1<4 GOTOB BACK\nGOTOF N200\nX99\nN200 Y1", "G1 X1\nX2\nX3\nY1"),
+    "case": ("R1=2\nCASE R1 OF 1 GOTOF ONE 2 GOTOF TWO DEFAULT GOTOF REST\nONE: X1\nTWO: G1 X2\nREST: X3", "G1 X2\nX3"),
+    "repeat of labels": ("R1=1\nAA: G1 X=R1\nR1=R1+1\nBB:\nY=R1\nREPEAT AA BB P=2\nZ1", "G1 X1\nY2\nX2\nX3\nZ1"),
+    "repeat to here": ("R1=1\nAA: G1 X=R1\nR1=R1+1\nREPEAT AA P=2\nZ1", "G1 X1\nX2\nX3\nZ1"),
+    "repeat of a block": ("R1=1\nAA: G1 X=IC(2)\nY1\nREPEATB AA P=3", "G1 X2\nY1\nX4\nX6\nX8"),
+    "modal subprogram": ("MCALL L5\nG0 X10\nX20\nMCALL\nX30\nM30\nPROC L5\nG1 Z=IC(-2)\nG0 Z=IC(2)\nRET",
+                         "G0 X10\nG1 Z48\nG0 Z50\nX20\nG1 Z48\nG0 Z50\nX30"),
+    # cycles
+    "drill": ("G0 X5 Y5\nCYCLE82(10,0,2,-8,,1)\nX9", "G0 X5 Y5\nZ2\nG1 Z-8\nG4 F1\nG0 Z10\nX9"),
+    "drill by its depth": ("G0 X5 Y5\nCYCLE81(10,1,2,,8)\nG1 X9", "G0 X5 Y5\nZ3\nG1 Z-7\nG0 Z10\nG1 X9"),
+    "modal drill": ("MCALL CYCLE81(5,0,1,-4)\nG0 X1 Y1\nX2\nMCALL\nX3",
+                    "G0 X1 Y1\nZ1\nG1 Z-4\nG0 Z5\nX2\nZ1\nG1 Z-4\nG0 Z5\nX3"),
+    "ream": ("CYCLE85(5,0,1,-4,,0,100,400)", "G0 Z1\nG1 Z-4 F100\nZ1 F400\nG0 Z5"),
+    "peck with swarf": ("CYCLE83(5,0,1,-10,,-4,,1,,,,1)",
+                        "G0 Z1\nG1 Z-4\nG0 Z1\nZ-3.8\nG1 Z-7\nG0 Z1\nZ-6.8\nG1 Z-9\nG0 Z1\nZ-8.8\nG1 Z-10\nG0 Z5"),
+    "peck to break chips": ("CYCLE83(5,0,1,-10,,,6,,,,,0)", "G0 Z1\nG1 Z-6\nG0 Z-5\nG1 Z-10\nG0 Z5"),
+    "tap": ("CYCLE84(5,0,2,-10,,,3,,1.25,,400)\nG1 X9", "G0 Z2\nG1 Z-10 F500\nZ2\nG0 Z5\nF200\nG1 X9"),
+    "tap of a size": ("CYCLE84(5,0,2,-10,,,3,6,,,400)", "G0 Z2\nG1 Z-10 F400\nZ2\nG0 Z5"),
+    "tap with a chuck": ("CYCLE840(5,0,2,-10,,,4,3,,,1)", "G0 Z2\nG1 Z-10 F1000\nZ2\nG0 Z5"),
+    "rigid tap": ("G331 Z-10 K1.5 S200\nG332 Z5 K1.5\nG1 X1", "G1 Z-10 F300\nZ5\nX1 F200"),
+    "row of holes": ("MCALL CYCLE81(5,0,1,-4)\nHOLES1(10,20,90,5,2,2)\nMCALL",
+                     "G0 X10 Y25\nZ1\nG1 Z-4\nG0 Z5\nX10 Y27\nZ1\nG1 Z-4\nG0 Z5"),
+    "circle of holes": ("MCALL CYCLE81(5,0,1,-4)\nHOLES2(0,0,10,0,90,2)\nMCALL",
+                        "G0 X10 Y0\nZ1\nG1 Z-4\nG0 Z5\nX0 Y10\nZ1\nG1 Z-4\nG0 Z5"),
+    # words without a move
+    "idle words": ("MSG(\"a; b\")\nWORKPIECE(,,,\"BOX\",112,0,-20,-80,-20,-20,60,60)\nSOFT FFWON DYNFINISH\nG1 X1 G9 "
+                   "G601\n"
+                   "FGROUP(X,Y,Z)\nOVR=80 ACC[X]=50\n$AC_TIMER[1]=0\nGROUP_BEGIN(0,\"a\",0,0)\nMSG()\nY1 M41 H5",
+                   "G1 X1\nY1"),
+    "labels and skips": ("AAA: G1 X1\n/N20 Y1\n/1 X2", "G1 X1\nY1\nX2"),
+    "fixed point": ("G1 X5\nG75 Z0\nY3", "G1 X5\nG0 G53 Z0\nG1 Y3"),
+    "all frames suppressed": ("G1 X5\nSUPA G0 Z0 D0\nD1\nX3 Y3\nZ10", "G1 X5\nG0 G53 Z0\nX3 Y3\nZ10"),
+    # compensation
+    "left of the path": ("G41 G1 X20 Y0\nX20 Y30\nX-20\nG40 X-30 Y50",
+                         "G1 X15 Y0\nY25\nX-20\nX-30 Y50"),
+    "mirrored side": ("MIRROR X0\nG41 G1 X20 Y0\nX20 Y30\nX-20\nG40 X-30 Y50",
+                      "G1 X-15 Y0\nY25\nX20\nX30 Y50"),
+}
