@@ -20,6 +20,16 @@ PAIRS = {
               f"G0 X{30 + 10 * math.cos(math.pi / 6):.9f} Y25\nG1 X30 Y30\nG2 X40 Y20 Z40 I0 J-10"),
     "pole from here": ("G1 X10 Y0\nG110 X10 Y0\nG1 AP=180 RP=5", "G1 X10 Y0\nX15 Y0"),
     "radius": ("G3 X15 Y15 CR=15", "G3 X15 Y15 I0 J15"),
+    # corners
+    "rounding": ("G1 X20 RND=5\nY20 RND=5\nX40", "G1 X15\nG3 X20 Y5 I0 J5\nG1 Y15\nG2 X25 Y20 I5 J0\nG1 X40"),
+    "chamfer by its width": ("G1 X20 F300 CHR=5\nY20 F100\nX0", "G1 X15 F300\nX20 Y5\nY20 F100\nX0"),
+    "chamfer by its length": (f"G1 X20 CHF={5 * math.sqrt(2):.12f}\nY20", "G1 X15\nX20 Y5\nY20"),
+    "rounding to an arc": ("G1 X20 RND=5\nM8\nG3 X10 Y10 CR=-10\nG1 Y20", None),
+    "roundings on and on": ("RNDM=5\nG1 X20\nY20\nZ0\nX40\nRNDM=0\nY0\nX50",
+                            "G1 X15\nG3 X20 Y5 I0 J5\nG1 Y20\nZ0\nX35\nG2 X40 Y15 I0 J-5\nG1 Y0\nX50"),
+    "rounding with compensation": ("G41 G1 X20 Y0\nY30 RND=8\nX-20\nG40 X-30 Y50",
+                                   "G1 X15 Y0\nY22\nG3 X12 Y25 I-3 J0\nG1 X-20\nX-30 Y50"),
+    "last corner": ("G1 X20 RND=5", "G1 X20"),
     # frames
     "shift": ("TRANS X20 Y5\nG0 X0 Y0\nATRANS X1\nG1 X2\nTRANS\nX0", "G0 X20 Y5\nG1 X23\nX0"),
     "shift replaces": ("TRANS X20\nTRANS Y5\nG0 X1 Y1", "G0 X1 Y6"),

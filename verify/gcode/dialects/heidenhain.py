@@ -47,7 +47,7 @@ _IDLE = ("BLK FORM", "TOOL DEF", "* -", "*", "FUNCTION PROG PATH", "FUNCTION MOD
          "FUNCTION S-PULSE",
          "FUNCTION DWELL", "WMAT", "CYCL DEF 13.", "FUNCTION COUNT", "FUNCTION FILE", "OPEN TABLE",
          "FUNCTION FEED RESET",
-         "FUNCTION AFC", "SEL TABLE", "FUNCTION DCM", "FUNCTION SPINDLE", "INFO", "ERROR", "CYCL DEF 14.",
+         "FUNCTION AFC", "SEL TABLE", "FUNCTION DCM", "FUNCTION SPINDLE", "CYCL DEF 14.",
          "FUNCTION DRESS OFF")
 _REFUSED = {
     "FPOL": "a free contour", "FL": "a free contour", "FC": "a free contour", "FLT": "a free contour",
@@ -351,6 +351,7 @@ class HeidenhainReader(HeidenhainPaths):
         BlockError
             No cycle is defined, or it cannot be followed.
         """
+        self.uncompensated("a drilling cycle")
         here = self.here() if place is None else place
         call = self.cycle
         if call is None:

@@ -55,6 +55,7 @@ class HeidenhainFrames(OrientedMoves):
 
     def _reframe(self) -> None:
         """State the frame of the blocks that follow."""
+        self.uncompensated("a change of the coordinates")
         parts: list[Frame] = []
         if self.longer:
             axis = np.array([0.0, 0.0, 1.0]) if self.plane is None else self.plane[:, 2]

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from verify.gcode.dialects.base import BlockError
 from verify.gcode.dialects.heidenhain_edges import HeidenhainEdges
-from verify.gcode.dialects.heidenhain_words import M_AFTER, M_BEFORE, M_WORDS, Blocks, Move, Words
+from verify.gcode.dialects.heidenhain_words import M_AFTER, M_BEFORE, M_REFUSED, M_WORDS, Blocks, Move, Words
 from verify.gcode.dialects.stated_places import digits
 from verify.gcode.dialects.tilted_planes import turn
 
@@ -103,6 +103,8 @@ class HeidenhainPaths(HeidenhainEdges):
     def _go(self, key: str, w: Words) -> Blocks:
         machine = 91 in w.ms
         self._check_m91(machine)
+        if w.side in ("RL", "RR") and (corners := {97, 98, 197} & set(w.ms)):
+            raise BlockError(f"M{min(corners)} ({M_REFUSED[min(corners)]}) is not followed")
         before, after = self._ms(w.ms)
         self.calls |= self.modal_call and not machine
         if machine:

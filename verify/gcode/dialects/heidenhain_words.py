@@ -23,22 +23,23 @@ M_BEFORE = frozenset({3, 4, 6, 8, 13, 14, 128})
 M_AFTER = frozenset({0, 1, 2, 5, 9, 30, 129})
 """M words that act at the end of their block."""
 M_WORDS = {6: "M5", 13: "M3 M8", 14: "M4 M8", 128: "M428", 129: "M429"}
-M_IDLE = frozenset({7, 101, 102, 103, 104, 105, 106, 107, 108, 109, 110, 111, 112, 113, 115, 116, 117, 118, 120, 137,
-                    141, 145,
-                    148, 149, 150, 197, 126, 127})
+M_IDLE = frozenset({7, 101, 102, 103, 105, 106, 107, 108, 109, 110, 111, 113, 115, 116, 117, 118, 120, 126, 127, 137,
+                    141,
+                    145, 148, 149, 150})
 """M words that change feed, tool life or messages only; M126 and M127 are kept as state."""
 M_REFUSED = {92: "a place of the machine's maker", 97: "other corners of radius compensation",
-             98: "open contours of radius compensation", 114: "another compensation of rotary axes",
+             98: "open contours of radius compensation", 104: "the zero of before", 112: "rounded corners",
+             114: "another compensation of rotary axes",
              124: "points that are left out", 130: "coordinates that are not tilted", 136: "feed per turn",
-             138: "a choice of tilting axes", 143: "the end of a basic rotation", 144: "the kinematics of the moment"}
+             138: "a choice of tilting axes", 143: "the end of a basic rotation", 144: "the kinematics of the moment",
+             197: "other corners of radius compensation"}
 """M words that move or cut and are not followed, and what they do."""
 _WORD = re.compile(rf"""\s*(?:M\s*(?P<m>[0-9]+)(?![0-9.])
     |(?P<side>R0|RL|RR)(?![A-Z0-9.])
     |DR\s*(?P<sense>[+-])(?![0-9.])
     |F\s*(?P<feed>MAX|AUTO|{VALUE})
     |(?P<name>I?[XYZABC]|I?P[AR]|N[XYZ]|T[XYZ]|CCA|LEN|R)\s*(?P<value>{VALUE}))(?![A-Z0-9.])""", re.VERBOSE)
-_STRIPPED = re.compile(rf"\bM118(?:\s+[XYZABC]\s*{VALUE})*|\bM120(?:\s+LA\s*[0-9]+)?|\bM103(?:\s+F\s*{VALUE})?|"
-                       rf"\bM197(?:\s+DL\s*{VALUE})?")
+_STRIPPED = re.compile(rf"\bM118(?:\s+[XYZABC]\s*{VALUE})*|\bM120(?:\s+LA\s*[0-9]+)?|\bM103(?:\s+F\s*{VALUE})?")
 _RETRACT = re.compile(rf"\bM140(?:\s+MB\s*(MAX|{VALUE}))(?:\s+F\s*(MAX|{VALUE}))?")
 _TCP_FEED = re.compile(rf"\b(M128)\s+F\s*{VALUE}")
 _COUNTS = re.compile(r"\bM94(?:\s+([ABC]))?(?![0-9])")
@@ -222,9 +223,9 @@ class HeidenhainWords(HeidenhainFrames):
     def _ms(self, ms: list[int]) -> tuple[list[str], list[str]]:
         """M words as blocks before and after the move."""
         for m in ms:
-            if m in M_REFUSED and not (m in (97, 98) and self.side == 0) and not (m == 130 and self.plane is None):
+            if m in M_REFUSED and not (m in (97, 98, 197) and self.side == 0) and not (m == 130 and self.plane is None):
                 raise BlockError(f"M{m} ({M_REFUSED[m]}) is not followed")
-            if m not in M_BEFORE and m not in M_AFTER and m not in M_IDLE and m not in (89, 91, 97, 98, 99, 130):
+            if m not in M_BEFORE and m not in M_AFTER and m not in M_IDLE and m not in (89, 91, 97, 98, 99, 130, 197):
                 raise BlockError(f"unknown word M{m}")
         if 89 in ms or 99 in ms:
             self.modal_call, self.calls = 99 not in ms, True

@@ -84,7 +84,9 @@ class SiemensReader(SiemensMoves):
         self.machine = machine
         self.tool = self.selected = machine.s.tool
         flow = SiemensFlow(lines, self.variables, machine, self._modes)
-        yield from flow.run(lambda: self.moved)
+        for number, raw in flow.run(lambda: self.moved):
+            self.number = number
+            yield number, raw
 
     def _modes(self) -> str:
         """Words that restore the modes of now."""
@@ -108,7 +110,7 @@ class SiemensReader(SiemensMoves):
         raise BlockError(f"{name}{f'[{index}]' if index else ''} is a value of the control that the proof cannot know",
                          "write the number instead")
 
-    def blocks(self, raw: str) -> list[str]:
+    def blocks(self, raw: str) -> list[str | tuple[int, str]]:
         """A plain straight move unchanged; every other line word by word.
 
         Raises
@@ -117,9 +119,7 @@ class SiemensReader(SiemensMoves):
             The line cannot be read, or could be read in two ways.
         """
         self.moved = False
-        s = self.machine.s
-        if PLAIN.fullmatch(raw) and not self.lost and self.frame is None and self.motion not in CURVES and (
-                self.cycle is None and s.motion in (self.motion, None) and self.circle is not True):
+        if PLAIN.fullmatch(raw) and self._is_plain():
             self.note_place()
             self.moved = "X" in raw or "Y" in raw or "Z" in raw
             if (at := raw.find("G")) >= 0:
@@ -137,10 +137,15 @@ class SiemensReader(SiemensMoves):
             text = text[number.end():].strip()
         if not text:
             return []
-        out = self._definition(text) if text.startswith("DEF ") else self._words(text)
-        if skipped:
-            out = [f"/{b}" for b in out]
-        return out
+        if text.startswith("DEF "):
+            return list(self._definition(text))
+        out = self._words(text)
+        return [f"/{b}" if isinstance(b, str) else b for b in out] if skipped else out
+
+    def _is_plain(self) -> bool:
+        """Whether a straight move needs nothing but its words now."""
+        return (not self.lost and self.frame is None and not self.cornering and self.motion not in CURVES
+                and self.cycle is None and self.machine.s.motion in (self.motion, None) and self.circle is not True)
 
     def _definition(self, text: str) -> list[str]:
         """DEF: new variables, with their first values."""
@@ -184,7 +189,7 @@ class SiemensReader(SiemensMoves):
                 reader.need(")")
         self.variables.define(kind, name, held)
 
-    def _words(self, text: str) -> list[str]:
+    def _words(self, text: str) -> list[str | tuple[int, str]]:
         line = Line()
         reader = ValueReader(text, self.variables)
         if text.startswith("MCALL"):
@@ -196,7 +201,7 @@ class SiemensReader(SiemensMoves):
                 break
             self._word(reader, line)
         if line.frame:
-            return self._framed(line)
+            return list(self._framed(line))
         return self._block(line)
 
     def _word(self, reader: ValueReader, line: Line) -> None:
@@ -386,7 +391,8 @@ class SiemensReader(SiemensMoves):
             self._code(int(number), line)
         elif name == "D" and number == int(number) and number >= 0:
             self._edge(int(number), line)
-        elif name in ("CR", "TURN", "ADIS", "ADISPOS", "AP", "RP", "I1", "J1", "K1", "A3", "B3", "C3", "RPL", "CTOL",
+        elif name in ("RND", "RNDM", "CHF", "CHR", "CR", "TURN", "ADIS", "ADISPOS", "AP", "RP", "I1", "J1", "K1", "A3",
+                      "B3", "C3", "RPL", "CTOL",
                       "X1",
                       "Y1", "Z1", "A1", "B1", "C1", "FP", "OTOL", "ATOL"):
             line.values[name], line.kinds[name] = number, kind
@@ -468,6 +474,7 @@ class SiemensReader(SiemensMoves):
         return number
 
     def _drill(self, call: DrillingCall, line: Line) -> None:
+        self.uncompensated(call.name)
         if line.modal:
             self.cycle = call
             return
@@ -514,22 +521,37 @@ class SiemensReader(SiemensMoves):
         amount = f"of {parts[2]} deg" if stated else "that setting data decide"
         self.loose = f"CYCLE832 allows the tool axis a deviation {amount}: the error bound does not include it"
 
+    def _check_context(self, line: Line) -> None:
+        """Refuse names whose value nothing in the block uses."""
+        allowed = {"CR": self.motion in (2, 3), "TURN": self.motion in (2, 3), "RPL": False}
+        allowed |= dict.fromkeys(("I1", "J1", "K1"), self.motion == "CIP")
+        fixed = not {74, 75}.isdisjoint(line.codes)
+        allowed |= dict.fromkeys(("X1", "Y1", "Z1", "A1", "B1", "C1", "FP"), fixed)
+        for name in line.values:
+            if not allowed.get(name, True):
+                raise BlockError(f"{name}= is used by no word of its block")
+        if line.centre and self.motion not in (2, 3) and not {63, 331, 332} & set(line.codes):
+            raise BlockError(f"{next(iter(line.centre))} without an arc (G2, G3)")
+
     def _framed(self, line: Line) -> list[str]:
         """A block of TRANS, ROT, MIRROR or SCALE."""
+        self.unheld(line.frame)
         if line.out or line.codes or line.centre or set(line.values) - {"RPL"} or any(
                 k not in "XYZ" or kind for k, (_, kind) in line.places.items()):
             raise BlockError(f"{line.frame} with other words than X, Y, Z or RPL: it needs its own block")
         self.program_frame(line.frame, {k: v for k, (v, _) in line.places.items()}, line.values)
         return []
 
-    def _block(self, line: Line) -> list[str]:
+    def _block(self, line: Line) -> list[str | tuple[int, str]]:
         codes = line.codes
         if any(54 <= n <= 57 or 505 <= n <= 599 for n in codes):
             self.lost = ""
         self.relative = self.relative if 90 not in codes and 91 not in codes else 91 in codes
+        self._check_context(line)
         special = self._special(line)
         if special is not None:
-            return special
+            self.unheld("G4, a pole, a fixed point or tapping")
+            return list(special)
         moves = bool(line.places) or bool(line.values.keys() & {"AP", "RP", "A3", "B3", "C3"}) or (
             self.motion in (2, 3) and bool(line.centre))
         if self.lost and "G53" not in line.out and moves:
@@ -537,13 +559,17 @@ class SiemensReader(SiemensMoves):
                              "state the work offset (G54 to G57, G505 and up) before the move")
         line.out += self._path(line)
         if not moves:
+            self.corner_of({k: v for k, v in line.values.items() if k == "RNDM"})
             head = [*line.out, *self._rates(line)]
-            return [*line.before, *([" ".join(head)] if head else []), *line.after]
+            if line.after or any(w[0] in "TG" for w in line.out):
+                self.unheld("another word")
+            ends = self.flushed() if {"M2", "M30"} & set(line.out) else []
+            return [*line.before, *ends, *([" ".join(head)] if head else []), *line.after]
         if "G53" in line.out:
             self.forget()
         self.note_place()
         self.moved = not {"X", "Y", "Z"}.isdisjoint(line.places) or not {"AP", "RP"}.isdisjoint(line.values)
-        blocks = [*line.before, *self._move(line), *line.after]
+        blocks: list[str | tuple[int, str]] = [*line.before, *self._move(line), *line.after]
         if self.cycle is not None and self.moved and "G53" not in line.out:
             blocks += self._cycle_there(line)
         return blocks

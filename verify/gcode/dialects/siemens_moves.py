@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from verify.gcode.dialects.base import BlockError
+from verify.gcode.dialects.siemens_corners import SiemensCorners
 from verify.gcode.dialects.siemens_cycles import DrillingCall, drilling_blocks
-from verify.gcode.dialects.siemens_paths import SiemensPaths
 from verify.gcode.dialects.siemens_words import UNBOUNDED
 from verify.gcode.dialects.stated_places import digits
 from verify.program.arc_chords import PLANE_AXES
@@ -39,7 +39,7 @@ class Line:
     call: str = ""
 
 
-class SiemensMoves(SiemensPaths):
+class SiemensMoves(SiemensCorners):
     """Motion of the control.
 
     motion    : G number or name of the motion in force, None before the first
@@ -71,9 +71,10 @@ class SiemensMoves(SiemensPaths):
         """Blocks of a cycle, and the motion in force again."""
         return [*blocks, f"G{self.motion}"] if isinstance(self.motion, int) else blocks
 
-    def _move(self, line: Line) -> list[str]:
-        """The move of a block; ``_end`` is its end afterwards, mm in the coordinates of the control."""
+    def _move(self, line: Line) -> list[str | tuple[int, str]]:
+        """The move of a block; ``end`` is its end afterwards."""
         machine_place = "G53" in line.out
+        corner = self.corner_of(line.values)
         words, centre = self._absolute(line, machine_place)
         if {"AP", "RP"} & line.values.keys():
             self._polar(line, words)
@@ -84,8 +85,25 @@ class SiemensMoves(SiemensPaths):
         linear = {k: v for k, v in words.items() if k in "XYZ"}
         turns = {k: v for k, v in words.items() if k not in "XYZ"}
         vector = [line.values.get(k) for k in ("A3", "B3", "C3")]
+        plane = {"XYZ"[n] for n in PLANE_AXES[self.machine.s.plane][:2]}
+        level = all(k in plane or abs(self.end["XYZ".index(k)] - here["XYZ".index(k)]) < 1e-9 for k in linear)
+        if corner is not None and not (plane & linear.keys() and level):
+            if corner[0] != "RNDM":
+                raise BlockError(f"{corner[0]}= at the end of a move that leaves the plane")
+            corner = None
+        if self.held is not None and self.held.corner is not None and self.held.corner[0] == "RNDM" and not level:
+            ends = self.flushed()
+            return [*ends, *self._move(line)]
+        if self.held is not None or corner is not None:
+            if (machine_place or self.relative or turns or any(v is not None for v in vector) or "TURN" in line.values
+                    or self.motion not in (0, 1, 2, 3) or self.cycle is not None):
+                raise BlockError("a corner (RND, RNDM, CHF, CHR) next to a move that is not a plain G0, G1, G2 or G3 "
+                                 "in "
+                                 "absolute coordinates")
+            spin = [f"S{digits(line.values['S'])}"] if "S" in line.values else []
+            return self.cornered([*line.out, *spin], f"G{self.motion}", self.end, centre, line.values, corner)
         if any(v is not None for v in vector) or (self.circle and turns and self.tcp and not machine_place):
-            return self._turned(line, linear, turns, vector)
+            return list(self._turned(line, linear, turns, vector))
         if self.motion == "CT":
             return [self._with(line, self.tangent_arc(linear))]
         if self.motion == "CIP":
@@ -209,13 +227,14 @@ class SiemensMoves(SiemensPaths):
         places = {k: v for k, (v, _) in line.places.items()}
         if 4 in codes:
             return self._dwell(line)
+        head = [" ".join([*line.out, *self._rates(line)])] if line.out else []
         if codes & {25, 26}:
-            return []
+            return head
         if pole := codes & {110, 111, 112}:
             if line.values.keys() & {"AP", "RP"}:
                 raise BlockError("a pole given by polar words")
             self.set_pole(min(pole), places)
-            return []
+            return head
         if codes & {74, 75}:
             names = {k for k in "XYZABC" if k in places or k + "1" in line.values}
             if not names:
@@ -225,7 +244,7 @@ class SiemensMoves(SiemensPaths):
             way = " ".join(["G0 G53", *(f"{k}0" for k in sorted(names))])
             if turned and not set(turned) <= set(self.machine.rotary):
                 raise BlockError(f"G74 or G75 {turned[0]}: the machine has no such rotary axis")
-            return self._restored([*([" ".join([*line.out, *self._rates(line)])] if line.out else []), way])
+            return self._restored([*head, way])
         if codes & {63, 331, 332}:
             return self._tapped(line, places, 63 in codes)
         return None

@@ -39,6 +39,7 @@ class SiemensFrames(OrientedMoves):
 
     def _reframe(self) -> None:
         """State the frame of the blocks that follow."""
+        self.uncompensated("a change of the coordinates (TRANS, ROT, MIRROR, SCALE, CYCLE800)")
         whole = self.swivel
         if self.programmed is not None:
             whole = self.programmed if whole is None else whole @ self.programmed

@@ -53,6 +53,17 @@ class StatedPlaces(DialectReader):
             raise BlockError(f"{word} needs a place that the program has stated, in X, Y and Z")
         return place
 
+    def uncompensated(self, word: str) -> None:
+        """Refuse a block that cutter radius compensation does not go with.
+
+        Raises
+        ------
+        BlockError
+            Compensation is on; ``word`` names the block.
+        """
+        if self.machine.s.side:
+            raise BlockError(f"{word} while cutter radius compensation is on", "end the compensation in a block before")
+
     def forget(self) -> None:
         """Drop what is held back: the tool went to a place of the machine, or the coordinates are others now."""
         self.pending = [math.nan] * 3

@@ -54,6 +54,21 @@ def test_bore_milling_stays_in_its_bore():
     assert np.ptp(angles) > math.tau - 0.2  # a whole turn at the bottom
 
 
+def test_inches():
+    """F counts tenths of an inch per minute."""
+    given = ("BEGIN PGM A INCH\nTOOL CALL 1 Z S1000 F100\nM3\nL X+0 Y+0 Z+2 FMAX\nTRANS DATUM AXIS X+1\nL X+1 IY+0.5 "
+             "F100\nRND R0.2\n"
+             "CC X+1 Y+1.5\nC X+2 Y+1.5 DR+\nTRANS DATUM RESET\n"
+             "CYCL DEF 201 R Q200=0.1 Q201=-0.2 Q206=50 Q211=0 Q208=0 Q203=0 Q204=1\nCYCL CALL\nL X+0 RL\nL Y+3 R0")
+    plain = given.replace("INCH", "MM")
+    for word in ("X+1", "X+2", "IY+0.5", "R0.2", "Y+1.5", "Z+2", "Q200=0.1", "Q201=-0.2", "Q204=1", "Y+3"):
+        k = word.index("=") + 1 if "=" in word else 1 if word[0] in "XYZR" else 2
+        plain = re.sub(re.escape(word) + r"(?![0-9.])", f"{word[:k]}{float(word[k:]) * 25.4:+.6f}", plain)
+    plain = plain.replace("F100", "F254").replace("Q206=50", "Q206=127")
+    first, second = read(given, "heidenhain", head=False), read(plain, "heidenhain", head=False)
+    assert apart(first, second) < 1e-5 and same_feeds(first, second)
+
+
 def test_tools_by_name():
     for word, number in (('"MILL_D10"', 1), ('"mill_d10"', 1), ('"drill 8"', 2), ("3", 3), ('"3"', 3)):
         p = read(f"TOOL CALL {word} Z S500 F9\nM3\nL X+1 Y+1 Z+9 FMAX\nL Z+1", "heidenhain")
@@ -92,7 +107,9 @@ REFUSED = [
     ("CYCL DEF 247 Q339=+40", "a setup can name"), ("L X+5 RL\nL Z+0 FMAX M91", "M91 with radius"),
     ("SPL X+1", "a spline"),
     ("FUNCTION TCPM F TCP AXIS POS PATHCTRL AXIS REFPNT CENTER-CENTER", "REFPNT CENTER-CENTER"),
-    ("CT X+5 Y+5", "no move came"),
+    ("CT X+5 Y+5", "no move came"), ("L X+9 RL M197", "M197 (other corners"), ("L X+9 M104",
+                                                                               "M104 (the zero of before)"),
+    ("L X+9 RL\nL Y+9\nTRANS DATUM AXIS X+1", "while cutter radius compensation is on"),
 ]
 
 

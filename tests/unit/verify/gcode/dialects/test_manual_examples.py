@@ -1,4 +1,4 @@
-"""Programs of the kind that the manuals of both controls work through, against positions that follow from arithmetic."""
+"""Programs of the kind that the manuals of both controls work through, against positions from arithmetic."""
 
 import math
 
@@ -43,12 +43,14 @@ def test_a_part_turned_by_siemens():
 
 
 def test_drilling_and_a_circle_of_holes_of_siemens():
-    p = read("G0 X40 Y120 Z110\nCYCLE81(110,100,2,35)\nY30\nCYCLE81(110,102,,35)\nX90\nCYCLE81(110,100,2,,65)", "siemens")
+    p = read("G0 X40 Y120 Z110\nCYCLE81(110,100,2,35)\nY30\nCYCLE81(110,102,,35)\nX90\nCYCLE81(110,100,2,,65)",
+             "siemens")
     assert np.allclose(bottoms(p), [[40, 120, 35], [40, 30, 35], [90, 30, 35]])
     assert np.allclose(p.start[p.kind == 1][:, 2], [102, 102, 102])
     p = read("MCALL CYCLE82(30,0,2,,30,0)\nHOLES2(70,60,42,33,0,4)\nMCALL", "siemens")
     angles = np.radians(33 + 90 * np.arange(4))
-    assert np.allclose(bottoms(p), np.column_stack([70 + 42 * np.cos(angles), 60 + 42 * np.sin(angles), np.full(4, -30)]))
+    assert np.allclose(bottoms(p), np.column_stack([70 + 42 * np.cos(angles), 60 + 42 * np.sin(angles),
+                                                    np.full(4, -30)]))
     p = read("MCALL CYCLE83(105,102,2,22,0,62,,20,0,0,1,1)\nHOLES1(30,20,0,10,20,5)\nMCALL", "siemens")
     last = bottoms(p)
     assert np.allclose(last[last[:, 2] == 22][:, :2], [[40 + 20 * k, 20] for k in range(5)])
@@ -58,7 +60,8 @@ def test_drilling_and_a_circle_of_holes_of_siemens():
 
 def test_a_contour_with_chamfers_of_heidenhain():
     """Approach and departure along the contour, radius compensation on the left, two chamfers."""
-    p = read("L Z+250 R0 FMAX\nL X-10 Y-10 R0 FMAX\nL Z-5 R0 F1000 M3\nAPPR LT X+5 Y+5 LEN10 RL F300\nL Y+95\nL X+95\nCHF 10\n"
+    p = read("L Z+250 R0 FMAX\nL X-10 Y-10 R0 FMAX\nL Z-5 R0 F1000 M3\nAPPR LT X+5 Y+5 LEN10 RL F300\nL Y+95\nL "
+             "X+95\nCHF 10\n"
              "L Y+5\nCHF 20\nL X+5\nDEP LT LEN10 F1000\nL Z+250 R0 FMAX M2", "heidenhain")
     contour = np.array([[5, 5], [5, 95], [85, 95], [95, 85], [95, 25], [75, 5], [-5, 5]], dtype=float)
     cut = (p.line >= 9) & (p.line <= 16) & (p.kind == 1) & (p.end[:, 2] == -5)
@@ -70,11 +73,16 @@ def test_a_contour_with_chamfers_of_heidenhain():
 
 def test_an_ellipse_of_heidenhain():
     """Q parameters, a subprogram, a shift, a rotation and a loop by FN 12."""
-    text = ("Q1 = 50\nQ2 = 40\nFN 0: Q3 = +50\nFN 0: Q4 = +30\nFN 0: Q5 = +0\nFN 0: Q6 = +360\nFN 0: Q7 = +40\nFN 0: Q8 = +30\n"
-            "FN 0: Q9 = +5\nFN 0: Q10 = +100\nFN 0: Q11 = +350\nFN 0: Q12 = +2\nCALL LBL 10\nL Z+100 R0 FMAX M2\nLBL 10\n"
-            "CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+Q1\nCYCL DEF 7.2 Y+Q2\nCYCL DEF 10.0 ROTATION\nCYCL DEF 10.1 ROT+Q8\n"
-            "Q35 = (Q6 - Q5) / Q7\nQ36 = Q5\nQ37 = 0\nQ21 = Q3 * COS Q36\nQ22 = Q4 * SIN Q36\nL X+Q21 Y+Q22 R0 FMAX M3\n"
-            "L Z+Q12 R0 FMAX\nL Z-Q9 R0 FQ10\nLBL 1\nQ36 = Q36 + Q35\nQ37 = Q37 + 1\nQ21 = Q3 * COS Q36\nQ22 = Q4 * SIN Q36\n"
+    text = ("Q1 = 50\nQ2 = 40\nFN 0: Q3 = +50\nFN 0: Q4 = +30\nFN 0: Q5 = +0\nFN 0: Q6 = +360\nFN 0: Q7 = +40\nFN 0: "
+            "Q8 = +30\n"
+            "FN 0: Q9 = +5\nFN 0: Q10 = +100\nFN 0: Q11 = +350\nFN 0: Q12 = +2\nCALL LBL 10\nL Z+100 R0 FMAX M2\nLBL "
+            "10\n"
+            "CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+Q1\nCYCL DEF 7.2 Y+Q2\nCYCL DEF 10.0 ROTATION\nCYCL DEF 10.1 "
+            "ROT+Q8\n"
+            "Q35 = (Q6 - Q5) / Q7\nQ36 = Q5\nQ37 = 0\nQ21 = Q3 * COS Q36\nQ22 = Q4 * SIN Q36\nL X+Q21 Y+Q22 R0 FMAX "
+            "M3\n"
+            "L Z+Q12 R0 FMAX\nL Z-Q9 R0 FQ10\nLBL 1\nQ36 = Q36 + Q35\nQ37 = Q37 + 1\nQ21 = Q3 * COS Q36\nQ22 = Q4 * "
+            "SIN Q36\n"
             "L X+Q21 Y+Q22 R0 FQ11\nFN 12: IF +Q37 LT +Q7 GOTO LBL 1\nCYCL DEF 10.0 ROTATION\nCYCL DEF 10.1 ROT+0\n"
             "CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+0\nCYCL DEF 7.2 Y+0\nL Z+Q12 R0 FMAX\nLBL 0")
     p = read(text, "heidenhain")
@@ -82,7 +90,8 @@ def test_an_ellipse_of_heidenhain():
     u, v = 50 * np.cos(t), 30 * np.sin(t)
     c, s = math.cos(math.radians(30)), math.sin(math.radians(30))
     cut = (p.kind == 1) & (p.feed == 350)
-    assert np.allclose(p.end[cut], np.column_stack([50 + c * u - s * v, 40 + s * u + c * v, np.full(40, -5.0)]), atol=1e-9)
+    assert np.allclose(p.end[cut], np.column_stack([50 + c * u - s * v, 40 + s * u + c * v, np.full(40, -5.0)]),
+                       atol=1e-9)
     assert p.end[-1, 2] == 100.0
 
 
@@ -90,7 +99,8 @@ def test_groups_of_holes_of_heidenhain():
     """A cycle, a subprogram with incremental moves and M99, called at three places."""
     p = read("CYCL DEF 200 DRILLING Q200=2 Q201=-10 Q206=250 Q202=10 Q210=0 Q203=0 Q204=10 Q211=0\n"
              "L X+15 Y+10 R0 FMAX M3\nCALL LBL 1\nL X+45 Y+60 R0 FMAX\nCALL LBL 1\nL X+75 Y+10 R0 FMAX\nCALL LBL 1\n"
-             "L Z+250 R0 FMAX M2\nLBL 1\nCYCL CALL\nL IX+20 R0 FMAX M99\nL IY+20 R0 FMAX M99\nL IX-20 R0 FMAX M99\nLBL 0",
+             "L Z+250 R0 FMAX M2\nLBL 1\nCYCL CALL\nL IX+20 R0 FMAX M99\nL IY+20 R0 FMAX M99\nL IX-20 R0 FMAX M99\nLBL "
+             "0",
              "heidenhain")
     group = np.array([[0, 0], [20, 0], [20, 20], [0, 20]])
     wanted = np.vstack([group + s for s in ([15, 10], [45, 60], [75, 10])])
@@ -99,9 +109,11 @@ def test_groups_of_holes_of_heidenhain():
 
 def test_a_datum_shift_with_rotations_of_heidenhain():
     """The same contour eight times, each turned by 45 deg more: IROT and a repeat of a part of the program."""
-    p = read("CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+65\nCYCL DEF 7.2 Y+65\nCALL LBL 1\nLBL 10\nCYCL DEF 10.0 ROTATION\n"
+    p = read("CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+65\nCYCL DEF 7.2 Y+65\nCALL LBL 1\nLBL 10\nCYCL DEF 10.0 "
+             "ROTATION\n"
              "CYCL DEF 10.1 IROT+45\nCALL LBL 1\nCALL LBL 10 REP 6/6\nCYCL DEF 10.0 ROTATION\nCYCL DEF 10.1 ROT+0\n"
-             "TRANS DATUM RESET\nL Z+250 R0 FMAX M2\nLBL 1\nL X+0 Y+0 R0 FMAX\nL X+30 Y+0 F500\nL IY+15\nLBL 0", "heidenhain")
+             "TRANS DATUM RESET\nL Z+250 R0 FMAX M2\nLBL 1\nL X+0 Y+0 R0 FMAX\nL X+30 Y+0 F500\nL IY+15\nLBL 0",
+             "heidenhain")
     cuts = p.end[p.kind == 1][:, :2] - 65.0
     angle = np.radians(45 * np.arange(8))
     assert np.allclose(cuts[::2], 30 * np.column_stack([np.cos(angle), np.sin(angle)]), atol=1e-9)
@@ -128,6 +140,7 @@ def _distance(point, contour):
 
 def test_text_of_another_program_is_not_read_as_this_one():
     """The same words in quotes or comments start nothing."""
-    p = read_program('G710 G17 G90 G94 G54\nT1 M6\nS1 M3 F9\nG0 X0 Y0 Z9 ; GOTOF END; L10\nMSG("IF R1==1 GOTOF X; L99")\n'
+    p = read_program('G710 G17 G90 G94 G54\nT1 M6\nS1 M3 F9\nG0 X0 Y0 Z9 ; GOTOF END; L10\nMSG("IF R1==1 GOTOF X; '
+                     'L99")\n'
                      "G1 X1\nM30\n", dialect="siemens")
     assert p.end[-1].tolist() == [1.0, 0.0, 9.0]
