@@ -323,6 +323,7 @@ class HeidenhainReader(HeidenhainPaths):
         if self.longer:
             raise BlockError("FUNCTION TCPM after TOOL CALL with DL is not followed")
         self.tcp, self.spat, self.circle = True, m[2] == "SPAT", m[3] == "VECTOR"
+        self.spatial = {}
         self.forget()
         return ["M428"]
 

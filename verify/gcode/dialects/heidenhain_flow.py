@@ -14,6 +14,7 @@ MAX_CALLS = 19
 """Nested calls that the control runs."""
 _MAYBE = re.compile(r"LBL|FN|PGM|SEL |SELECTED|CYCL DEF 12|CYCLE", re.IGNORECASE)
 _COMMENT = re.compile(r"\s*(?:[0-9]+\s*)?(?:;|$)")
+_COMMA = re.compile(r"(?<=[0-9]),(?=[0-9])")  # the decimal sign of controls set to German
 _NUMBER = re.compile(r"^\s*[0-9]+\s+(?=[A-Z*])|^\s*[0-9]+\s*$")
 _CALL = re.compile(r'CALL LBL\s*("[^"]*"|[0-9]+)(?:\s+REP\s*([0-9]+)(?:/[0-9]+)?)?')
 _LABEL = re.compile(r'LBL\s*("[^"]*"|[0-9]+)')
@@ -23,6 +24,8 @@ _OTHER = re.compile(r"CALL PGM|SEL PGM|CALL SELECTED|SEL CYCLE|CALL TABLE|CYCL D
 def block_text(raw: str) -> str:
     """A line without its number and comment, upper case outside of quotes, with single blanks."""
     text = raw.split(";", 1)[0] if '"' not in raw else _bare(raw)
+    if "," in text and '"' not in text:
+        text = _COMMA.sub(".", text)
     text = _NUMBER.sub("", text.upper() if '"' not in text else _upper(text))
     return " ".join(text.split()) if "  " in text or "\t" in text or "\r" in text else text.strip()
 

@@ -141,6 +141,8 @@ class HeidenhainFrames(OrientedMoves):
         if not factor > 1e-6:
             raise BlockError(f"cycle 11 with the scale {factor:g}")
         self.factor = factor
+        if factor != 1.0:
+            self.notes.append("cycle 11 scales X, Y and Z; on some controls machine parameter 7410 leaves Z as it is")
         self._reframe()
 
     def lengthen(self, delta: float) -> None:

@@ -161,7 +161,10 @@ class HeidenhainPaths(HeidenhainEdges):
         if spatial:
             if any(adds for k, (_, adds) in w.places.items() if k in "ABC"):
                 raise BlockError("incremental spatial angles")
-            a, b, c = (math.radians(spatial.get(k, 0.0)) for k in "ABC")
+            self.spatial |= spatial
+            if set(self.spatial) != {"A", "B", "C"}:
+                raise BlockError("the first block with spatial angles after FUNCTION TCPM needs A, B and C")
+            a, b, c = (math.radians(self.spatial[k]) for k in "ABC")
             axis = (turn(2, c) @ turn(1, b) @ turn(0, a))[:, 2]
             return (float(axis[0]), float(axis[1]), float(axis[2]))
         given = [w.values.get(k) for k in ("TX", "TY", "TZ")]

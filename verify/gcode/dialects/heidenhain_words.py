@@ -129,6 +129,7 @@ class HeidenhainWords(HeidenhainFrames):
         self.tool = self.side = self.number = 0
         self.wider = 0.0
         self.turned: dict[str, float] = {}
+        self.spatial: dict[str, float] = {}
         self.wound: dict[str, float] = {}
         self.centre = [math.nan] * 2
         self.rate = ""

@@ -200,6 +200,12 @@ class SiemensReader(SiemensMoves):
             if reader.at >= len(text):
                 break
             self._word(reader, line)
+        if line.change:  # T and D may stand behind M6
+            stated = [w for w in line.out if w.startswith(("G43 H", "G49"))]
+            line.out = [w for w in line.out if w not in stated]
+            self.tool, self.edge = self.selected, self.edge if stated else 1
+            self.forget()
+            line.after.insert(0, f"G43 H{self.tool}" if self.edge else "G49")
         if line.frame:
             return list(self._framed(line))
         return self._block(line)
@@ -294,10 +300,7 @@ class SiemensReader(SiemensMoves):
         if n in _GEARS:
             return
         line.out.append(f"M{n}")
-        if n == 6:
-            self.tool, self.edge = self.selected, 1
-            self.forget()
-            line.after.append(f"G43 H{self.tool}")
+        line.change |= n == 6
 
     def _code(self, n: int, line: Line) -> None:
         line.codes.append(n)

@@ -36,7 +36,7 @@ class Line:
     codes: list[int] = field(default_factory=list)
     frame: str = ""
     modal: bool = False
-    call: str = ""
+    change: bool = False
 
 
 class SiemensMoves(SiemensCorners):

@@ -53,6 +53,12 @@ def test_tools_by_name():
     assert "MILL_D10" in refused.value.remedy
 
 
+def test_a_tool_behind_its_m6():
+    for words in ("M6 T2", "T2 M6 D1", "T2 D1 M6", "M6 D1 T2"):
+        p = read(f"{words}\nG0 X1 Y1 Z9", "siemens")
+        assert p.tool[-1] == 2 and not p.remarks, words
+
+
 def test_a_preselected_tool_is_loaded_by_m6():
     p = read("T2\nG0 X1\nM6\nG1 X2 Y1 Z5", "siemens", radii=RADII)
     assert p.tool[p.line == 7][0] == 1 and p.tool[-1] == 2
