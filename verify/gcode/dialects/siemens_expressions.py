@@ -138,8 +138,10 @@ class ValueReader:
 
     def takes(self, sign: str) -> bool:
         """Skip blanks and ``sign`` where it is next."""
-        self.skip()
-        if not self.text.startswith(sign, self.at):
+        text = self.text
+        if text[self.at:self.at + 1] in (" ", "\t"):
+            self.skip()
+        if not text.startswith(sign, self.at):
             return False
         self.at += len(sign)
         return True
@@ -198,6 +200,12 @@ class ValueReader:
 
     def _bare(self) -> Value:
         self.skip()
+        if m := _NUMBER.match(self.text, self.at):
+            self.at, written = m.end(), m[0].replace("EX", "E")
+            return _finite(m[0], lambda: float(written))
+        if m := _NAME.match(self.text, self.at):
+            self.at = m.end()
+            return self._named(m[0])
         if self.takes("("):
             inside = self.value()
             self.need(")")
@@ -209,12 +217,6 @@ class ValueReader:
         if m := _TEXT.match(self.text, self.at):
             self.at = m.end()
             return m[1]
-        if m := _NUMBER.match(self.text, self.at):
-            self.at, written = m.end(), m[0].replace("EX", "E")
-            return _finite(m[0], lambda: float(written))
-        if m := _NAME.match(self.text, self.at):
-            self.at = m.end()
-            return self._named(m[0])
         raise BlockError(f"cannot read a value at '{self.text[self.at:self.at + 30]}'")
 
     def _named(self, name: str) -> Value:

@@ -22,6 +22,7 @@ NUM = r"[+-]?(?:[0-9]{1,8}(?:\.[0-9]*)?|\.[0-9]+)"
 PLAIN = re.compile(rf"(?:N[0-9]+ ?)?(?:G[01] ?)?(?:[XYZABC]{NUM} ?)*(?:F{NUM} ?)?\r?")
 """A straight move without anything else."""
 NUMBERED = re.compile(r"(?:N|:)[0-9]+\s*")
+_NUMBERED_LINE = re.compile(r"\s*N([0-9]{1,9})(?![0-9])", re.IGNORECASE)
 LABEL = re.compile(r"(?:(?:N|:)[0-9]+\s*)?([A-Z_]{2}[A-Z_0-9]*):(?!=)\s*")
 _SECTION = re.compile(r"%_N_([A-Z_0-9]+?)(?:_(?:MPF|SPF|CYC))?\s*(?:;.*)?", re.IGNORECASE)
 _PROC = re.compile(r"PROC\s+([A-Z_][A-Z_0-9]*)\s*(?:\((.*?)\))?\s*([A-Z ]*)")
@@ -97,6 +98,7 @@ class SiemensFlow:
         self._jumps = 0
         self._calls: list[_Frame] = []
         self._paired: set[int] = set()
+        self._labels: dict[str, list[int]] | None = None
 
     @property
     def frame(self) -> _Frame:
@@ -213,15 +215,14 @@ class SiemensFlow:
         return self._jump(found)
 
     def _find(self, name: str, ranges: Sequence[range]) -> int | None:
-        numbered = re.compile(rf"\s*N0*{name[1:].lstrip('0') or '0'}(?![0-9])", re.IGNORECASE)
-        is_number = name[0] == "N" and name[1:].isdigit()
+        """The line of a label or block number that comes first in one of the ranges."""
+        if self._labels is None:
+            self._labels = _label_lines(self.lines)
+        places = self._labels.get(f"N{int(name[1:])}" if name[0] == "N" and name[1:].isdigit() else name, [])
         for lines in ranges:
-            for k in lines:
-                if is_number:
-                    if numbered.match(self.lines[k]):
-                        return k
-                elif ":" in self.lines[k] and (m := LABEL.match(statement(self.lines[k]))) and m[1] == name:
-                    return k
+            found = [k for k in places if k in lines]
+            if found:
+                return found[0] if lines.step > 0 else found[-1]
         return None
 
     def _jump(self, to: int) -> int:
@@ -464,6 +465,17 @@ class _Head:
     proc: bool = False
     parameters: tuple[tuple[str, str, str, bool], ...] = ()
     saves: bool = False
+
+
+def _label_lines(lines: Sequence[str]) -> dict[str, list[int]]:
+    """Lines by their label, and by their block number without leading zeros (N10)."""
+    out: dict[str, list[int]] = {}
+    for k, raw in enumerate(lines):
+        if m := _NUMBERED_LINE.match(raw):
+            out.setdefault(f"N{int(m[1])}", []).append(k)
+        if ":" in raw and (m := LABEL.match(statement(raw))):
+            out.setdefault(m[1], []).append(k)
+    return out
 
 
 def _body(text: str) -> tuple[str, str]:
