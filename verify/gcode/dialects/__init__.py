@@ -28,7 +28,7 @@ NEWS = " "
 DIALECTS = (LINUXCNC, *CONTROLS)
 """All dialects that can be read."""
 
-ENDINGS = {"ngc": (LINUXCNC,), "mpf": ("siemens",), "h": ("heidenhain",), "nc": ("fanuc", "haas")}
+ENDINGS = {"ngc": (LINUXCNC,), "mpf": ("siemens",), "spf": ("siemens",), "h": ("heidenhain",), "nc": ("fanuc", "haas")}
 """Extensions of file names, without the point and in lower case, and the dialects that use them."""
 
 
