@@ -242,3 +242,56 @@ def expression(r, depth=0):
     for _ in range(r.randint(0, 3)):
         text += r.choice(operators) + value()
     return f"[{text}]"
+
+
+class RandomContour:
+    """A contour under cutter radius compensation by seed: lines, arcs, moves along the third axis, modes between."""
+
+    def __init__(self, seed):
+        self.r = random.Random(seed)
+        self.at, self.heading = complex(0, 0), self.r.uniform(0, math.tau)
+
+    def text(self, elements=8, head="G21 G90 G17 G91.1\nF500\nT1 M6 G43 S900 M3\n", word=None):
+        side = word or self.r.choice(["G41 D1", "G42 D1"])
+        plane = self.r.choice([17, 17, 17, 18])
+        self.axes = {17: "XYZIJ", 18: "ZXYKI"}[plane]
+        lines = [head.rstrip("\n"), f"G{plane}", f"G0 {self.place()} {self.axes[2]}5"]
+        if self.r.random() < 0.5:
+            lines.append(side)
+            lines.append(self.line(low=4))
+        else:
+            lines.append(f"{side} {self.line(low=4)}")
+        for _ in range(elements):
+            lines.append(self.r.choice([self.line, self.line, self.line, self.arc, self.arc, self.along, self.mode])())
+        lines.append(self.r.choice(["G40", f"G40 {self.line()}"]))
+        lines += [self.r.choice([f"G0 {self.axes[2]}9", ""]), self.line(), "M2"]
+        return "\n".join(x for x in lines if x) + "\n"
+
+    def place(self):
+        return f"{self.axes[0]}{self.at.real:.6f} {self.axes[1]}{self.at.imag:.6f}"
+
+    def turned(self):
+        """The corner: mostly open, at times tangent or sharp."""
+        self.heading += self.r.choice([0.0, self.r.uniform(-0.02, 0.02), self.r.uniform(-1, 1), self.r.uniform(-3, 3)])
+
+    def line(self, low=1.0):
+        self.turned()
+        self.at += self.r.uniform(low, 25) * complex(math.cos(self.heading), math.sin(self.heading))
+        rise = f" {self.axes[2]}{self.r.uniform(-5, 5):.3f}" if self.r.random() < 0.2 else ""
+        return f"{self.r.choice(['G1', 'G1', 'G1', 'G0'])} {self.place()}{rise}"
+
+    def arc(self):
+        self.turned()
+        turn, radius, sweep = self.r.choice([1, -1]), self.r.uniform(1, 20), self.r.uniform(0.1, 5)
+        normal = 1j * turn * complex(math.cos(self.heading), math.sin(self.heading))
+        arm = radius * normal
+        centre = self.at + arm
+        self.at = centre - arm * complex(math.cos(turn * sweep), math.sin(turn * sweep))
+        self.heading += turn * sweep
+        return (f"G{3 if turn > 0 else 2} {self.place()} {self.axes[3]}{arm.real:.6f} {self.axes[4]}{arm.imag:.6f}")
+
+    def along(self):
+        return f"{self.r.choice(['G1', 'G0'])} {self.axes[2]}{self.r.uniform(-5, 5):.3f}"
+
+    def mode(self):
+        return self.r.choice(["M8", "M9", "F300", "S700", "(comment)"])

@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from verify.gcode.reader import FEED, RAPID
-from verify.program.arc_chords import arc_points
+from verify.program.arc_chords import swept_points
 
 RS274 = shutil.which("rs274")
 ABSENT = "LinuxCNC's interpreter rs274 is not installed"
 INCH = 25.4
+DIAMETER = 6.0
+"""mm, of every tool of the judge; the interpreter takes its table in inches."""
 _CALL = re.compile(r"\s*\d+\s+N\S*\s+([A-Z0-9_]+)\((.*)\)\s*")
 _PLANES = {"XY": (0, 1, 2), "YZ": (1, 2, 0), "XZ": (2, 0, 1)}
 
@@ -39,9 +41,9 @@ class Judged:
 
 
 def judge(text, folder):
-    """Run ``text`` in an empty ``folder``; the tool table has T1 to T99 of length 0."""
+    """Run ``text`` in an empty ``folder``; the tool table has T1 to T99 of length 0 and ``DIAMETER``."""
     folder = Path(folder)
-    (folder / "tool.tbl").write_text("".join(f"T{n} P{n} Z0 D6\n" for n in range(1, 100)))
+    (folder / "tool.tbl").write_text("".join(f"T{n} P{n} Z0 D{DIAMETER / INCH:.12f}\n" for n in range(1, 100)))
     (folder / "check.var").write_text("")
     (folder / "check.ini").write_text(
         "[EMC]\nVERSION=1.1\nMACHINE=judge\n[TRAJ]\nCOORDINATES=XYZABC\nLINEAR_UNITS=mm\nANGULAR_UNITS=degree\n"
@@ -97,7 +99,12 @@ def _arc(at, numbers, unit, plane):
     start = at.copy()
     if np.abs(end - start)[[i, j]].max() <= 2e-4 * unit:  # a full circle, but for the digits printed
         start[i], start[j] = end[i], end[j]
-    return end, arc_points(start, end, centre, turns < 0, (i, j, k), abs(turns))
+    u, v = start[[i, j]] - centre, end[[i, j]] - centre
+    sweep = (math.atan2(v[1], v[0]) - math.atan2(u[1], u[0])) % math.tau
+    sweep = sweep or math.tau
+    sweep = sweep - math.tau if turns < 0 and sweep < math.tau else math.copysign(sweep, turns)
+    sweep += (abs(turns) - 1) * math.copysign(math.tau, turns)
+    return end, swept_points(start.tolist(), end.tolist(), centre.tolist(), sweep, (i, j, k))
 
 
 def difference(program, judged, gaps=False):

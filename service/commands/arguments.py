@@ -106,9 +106,10 @@ def read_program(path: Path) -> str:
         The file cannot be read, or is empty.
     """
     from geometry.errors import ProgramError
+    from verify.gcode.program_text import cleaned, decoded
 
     try:
-        text = path.read_text(encoding="utf-8", errors="replace")
+        text = cleaned(decoded(path.read_bytes()))
     except OSError as error:
         raise ProgramError(f"the program {path.name} cannot be read: {error.strerror}",
                            code="program_unreadable", remedy="give an NC program that this user may read") from None

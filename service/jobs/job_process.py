@@ -54,6 +54,7 @@ def compute(request, progress, resumed):
 
     from service.checkpoint_store import Kept
     from service.from_wire import parse_setup
+    from verify.gcode.program_text import cleaned, decoded
 
     chain = importlib.import_module(request["chain"])
     part, out = Path(request["part"]), Path(request["out"])
@@ -67,7 +68,7 @@ def compute(request, progress, resumed):
         result, name = chain.zones_only(part, setup, progress, **blank), "zones.json"
         state = "done"
     else:
-        text = Path(request["program"]).read_text(encoding="utf-8", errors="replace")
+        text = cleaned(decoded(Path(request["program"]).read_bytes()))
         result = chain.verify_program(part, setup, text, progress, out=out, spindle_tool=request["spindle_tool"],
                                       **blank)
         name = "report.json"

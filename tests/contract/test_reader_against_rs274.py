@@ -8,14 +8,15 @@ from pathlib import Path
 import pytest
 
 from geometry.errors import ProgramError
-from tests.random_programs import RandomProgram, expression
-from tests.rs274 import ABSENT, RS274, difference, judge
+from tests.random_programs import RandomContour, RandomProgram, expression
+from tests.rs274 import ABSENT, DIAMETER, RS274, difference, judge
 from verify.gcode.reader import read_program
 
 pytestmark = pytest.mark.skipif(RS274 is None, reason=ABSENT)
 PREFIX = Path(RS274).resolve().parents[1] if RS274 else Path()
 FOLDERS = [PREFIX / "share" / "doc" / "linuxcnc" / "examples" / "nc_files", PREFIX / "share" / "linuxcnc" / "ncfiles",
            PREFIX / "share" / "doc" / "linuxcnc" / "examples" / "sample-configs"]
+RADII = dict.fromkeys(range(1, 100), DIAMETER / 2)
 _CALLED = re.compile(r"^\s*o<([\w-]+)>\s*call\b", re.IGNORECASE | re.MULTILINE)
 _DEFAULT = re.compile(r"=\s*#([0-9]+)\s*\(=\s*([-+.0-9]+)")
 _SUB = re.compile(r"^\s*o<([\w-]+)>\s*sub\b(.*?)^\s*o<\1>\s*endsub[^\n]*", re.IGNORECASE | re.MULTILINE | re.DOTALL)
@@ -86,7 +87,7 @@ def test_samples_are_read_as_linuxcnc_reads_them(tmp_path):
     moving, wrong = [], []
     for n, (name, text) in enumerate(PROGRAMS):
         try:
-            program = read_program(text, name=name)
+            program = read_program(text, name=name, radii=RADII)
         except ProgramError as refused:
             assert refused.subjects, name
             continue
@@ -113,6 +114,29 @@ def test_random_programs_run_as_linuxcnc_runs_them(tmp_path):
         assert not wrong, f"seed {seed}: {wrong}\n{text}"
         same += 1
     assert same >= 55
+
+
+def test_random_contours_are_offset_as_linuxcnc_offsets_them(tmp_path):
+    """G41 and G42 with lines, arcs, moves along the third axis, sharp and tangent corners, in two planes.
+
+    The reader may refuse a contour that LinuxCNC cuts into with a first or last element that is too short.
+    """
+    same = refused = 0
+    for seed in range(60):
+        text = RandomContour(seed).text()
+        judged = judged_by(text, tmp_path / str(seed))
+        try:
+            program = read_program(text, radii=RADII)
+        except ProgramError as problem:
+            refused += not judged.refused
+            assert "radius" in problem.message, text
+            continue
+        if judged.refused:
+            continue
+        wrong = difference(program, judged)
+        assert not wrong, f"seed {seed}: {wrong}\n{text}"
+        same += 1
+    assert same >= 40 and refused <= 3
 
 
 def test_random_expressions_have_linuxcncs_value(tmp_path):

@@ -104,7 +104,8 @@ def read_all(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], s
             program = read_program(
                 nc.text, name=nc.name, tools=frozenset(t.number for t in tools), work_offset=own.work_offset,
                 blend_limit=max(BLEND, BLEND_SHARE * setup.gouge_tolerance), kinematics=setup.kinematics,
-                gauge_length=setup.gauge_length, spindle_tool=spindle_tool, report=share, dialect=nc.dialect)
+                gauge_length=setup.gauge_length, spindle_tool=spindle_tool, report=share, dialect=nc.dialect,
+                radii={t.number: t.radius for t in tools}, names={t.id: t.number for t in tools})
         read.append(FramedProgram(from_above(program, top + setup.clearance_rapid), nc.turn, own, bounds))
         done += len(nc.text)
     return read

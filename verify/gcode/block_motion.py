@@ -7,18 +7,29 @@ import math
 
 import numpy as np
 
-from verify.gcode.block_words import CYCLES, SHIFTS, Block, whole
+from geometry.mesh import F64
+from verify.gcode.block_words import CYCLES, SHIFTS, TURNS, Block, whole
 from verify.gcode.drilling_cycles import Hole, HoleExit, hole_moves
+from verify.gcode.frame_words import FrameWords
 from verify.gcode.rotary_words import between
-from verify.gcode.work_offsets import Origins
-from verify.program.arc_chords import CHORD, PLANE_AXES, ArcError, ArcTooLong, arc_points, centre_from_radius
+from verify.program.arc_chords import (
+    CHORD,
+    PLANE_AXES,
+    ArcError,
+    ArcTooLong,
+    arc_sweep,
+    centre_from_radius,
+    swept_points,
+)
 from verify.program.move_kinds import FEED, RAPID
 from verify.program.move_log import MAX_MOVES_A_BLOCK
 from verify.program.program import NAN
 from verify.program.turn_subdivision import TIP
 
+_EXITS = {74: HoleExit.FEED_TO_CLEAR, 84: HoleExit.FEED_TO_CLEAR, 85: HoleExit.FEED_TO_CLEAR, 89: HoleExit.FEED}
 
-class BlockMotion(Origins):
+
+class BlockMotion(FrameWords):
     """Moves of the blocks, written to the log; ``dwell`` is the sum of their dwells, s."""
 
     dwell = 0.0
@@ -27,11 +38,16 @@ class BlockMotion(Origins):
         s, values = self.s, block.values
         axes = [values.get(a) for a in "XYZ"]
         self._polar_words(block)
+        plane = PLANE_AXES[s.plane]
+        self.across = bool(self.polar) or axes[plane[0]] is not None or axes[plane[1]] is not None
         turn = self._turn(values, absolute=53 in block.codes)
         if 4 in block.codes:
             return self._wait(turn is not None or bool(self.polar) or any(a is not None for a in axes), values)
         if not SHIFTS.isdisjoint(block.codes):
+            self._settled("a word that moves program zero")
             return self._shift_origin(block, axes)
+        if not TURNS.isdisjoint(block.codes):
+            return self._turn_word(block, axes)
         if 53 in block.codes:
             return self._machine_place(axes, turn)
         if not {28, 30}.isdisjoint(block.codes):
@@ -48,14 +64,14 @@ class BlockMotion(Origins):
             return self._cycle(axes, values)
         target = self._target(axes)
         if s.motion == 0:
-            return self._line_to(target, RAPID, NAN, turn)
+            return self._go(target, RAPID, NAN, turn)
         feed = self._feed(values)
         if feed is None:
             return None
         self._check_cutting(target)
         if s.motion == 1:
-            rate, minutes = self._timing(feed, math.dist(s.position, target), turn)
-            return self._line_to(target, FEED, rate, turn, minutes)
+            rate, minutes = self._timing(feed, math.dist(self._here(), target), turn)
+            return self._go(target, FEED, rate, turn, minutes)
         return self._arc(target, values, feed, turn)
 
     def _wait(self, coordinates: bool, values: dict[str, float]) -> None:
@@ -76,7 +92,7 @@ class BlockMotion(Origins):
                     self.log.remark("incremental_unknown", f"an incremental move ({letter}{a:g}, G91 of line "
                                     f"{self.incremental_line}) starts at a place that the program has not stated")
         target = [p if a is None else (p + a * s.scale if s.relative else a * s.scale + zero)
-                  for a, p, zero in zip(axes, s.position, s.origin, strict=True)]
+                  for a, p, zero in zip(axes, self._here(), s.origin, strict=True)]
         if self.polar:
             target[:2] = self._polar_place(*self.polar)
         return target
@@ -87,7 +103,8 @@ class BlockMotion(Origins):
         Only home is known to lie above everything: another Z gets a remark.
         """
         s = self.s
-        if s.motion != 0:
+        self._settled("G53")
+        if s.motion != 0 and self.control is None:
             return self.log.error("G53 needs G0: the proof cannot see a feed move in machine coordinates")
         if axes[2]:
             self.log.remark("machine_height", f"G53 Z{axes[2]:g} goes to a height that the proof does not know; only "
@@ -100,6 +117,7 @@ class BlockMotion(Origins):
 
     def _home(self, axes: list[float | None], turn: list[float] | None, values: dict[str, float]) -> None:
         """G28 and G30: pass a programmed point, then the axes named (all if none is) go home; rotary home is 0."""
+        self._settled("G28 or G30")
         named = [a is not None for a in axes]
         self.stated_axes.update(letter for letter in self.rotary if letter in values or not (any(named) or turn))
         if not any(named) and turn is None:
@@ -157,34 +175,12 @@ class BlockMotion(Origins):
         if any(math.isnan(v) for v in target):
             remark("unknown", "a feed move starts at a place that the program has not stated")
 
-    def _line_to(self, target: list[float], kind: int, feed: float, turn: list[float] | None = None,
-                 minutes: float = NAN) -> None:
-        """Move straight to ``target`` (3,) mm and turn the axes to ``turn`` (2,) deg where it is given."""
-        s = self.s
-        start = [t if math.isnan(p) else p for p, t in zip(s.position, target, strict=True)]
-        was, s.position = s.position, target
-        level = target[2] == target[2] and was[2] != target[2]
-        if kind == RAPID and s.offset is None and s.tool > 0 and level:
-            self.log.remark("rapid_offset", f"Z moves with the length offset off (no G43 H{s.tool})", s.tool)
-        known = not any(math.isnan(v) for v in target)
-        if s.parked and level and not known:
-            self.log.remark("parked", "Z comes down at an X or Y of machine coordinates: program X and Y first",
-                            self.log.line)
-        s.parked &= math.isnan(target[0]) or math.isnan(target[1])
-        if known:
-            if not self.log.moved:
-                self._assume()
-            axes = sum(1 << k for k, p in enumerate(was) if math.isnan(p))
-            self._write(start, target, kind, feed, axes, turn, minutes)
-        elif turn is not None:
-            self._stand(turn)
-
     def _arc(self, target: list[float], values: dict[str, float], feed: float, turn: list[float] | None) -> None:
         s, error = self.s, self.log.error
         if any(math.isnan(v) for v in s.position):
             return error("an arc starts at a place that the program has not stated")
         axes = PLANE_AXES[s.plane]
-        start, end = np.array(s.position), np.array(target)
+        start, end = np.array(self._here()), np.array(target)
         letters = ["IJK"[axes[0]], "IJK"[axes[1]]]
         turns = whole(values, "P", 1)
         try:
@@ -199,14 +195,21 @@ class BlockMotion(Origins):
                 return error(f"an arc without its centre ({letters[0]}, {letters[1]}) or R in plane G{s.plane}")
             if values.get("IJK"[axes[2]], 0.0) != 0 and "R" not in values:
                 return error(f"the word {'IJK'[axes[2]]} has no meaning in plane G{s.plane}")
-            points = arc_points(start, end, centre, s.motion == 2, axes, turns, self._arc_chord(turn),
-                                max_points=MAX_MOVES_A_BLOCK).tolist()
+            sweep = arc_sweep(start, end, centre, s.motion == 2, axes, turns)
+            middle = float(centre[0]), float(centre[1])
+            if self.contour is not None:
+                rate, _ = self._timing(feed, _length(start, end, centre, sweep, axes), turn)
+                return self._bow(target, complex(*middle), sweep, rate)
+            if self.actual is not None:
+                return error("an arc right after G40: the tool must come back to the contour in a straight move first")
+            points = swept_points(start.tolist(), target, middle, sweep, axes, self._arc_chord(turn),
+                                  MAX_MOVES_A_BLOCK).tolist()
         except ArcTooLong as problem:
             return self.log.room(problem.points)
         except ArcError as problem:
             return error(str(problem))
         self.log.room(len(points))
-        length = sum(math.dist(a, b) for a, b in itertools.pairwise([s.position, *points]))
+        length = sum(math.dist(a, b) for a, b in itertools.pairwise([start.tolist(), *points]))
         rate, minutes = self._timing(feed, length, turn)
         was, n = s.turn, len(points)
         for k, p in enumerate(points, 1):
@@ -216,7 +219,8 @@ class BlockMotion(Origins):
     def _arc_chord(self, turn: list[float] | None) -> float:
         """Largest distance of chords from their arc, mm; half where a turning axis bends the tip path once more."""
         bent = turn is not None and turn != self.s.turn and not self.s.tcp
-        return CHORD - TIP if bent else CHORD
+        frame = self._frame()
+        return (CHORD - TIP if bent else CHORD) / (1.0 if frame is None else frame.scale_in(self.s.plane))
 
     def _cycle(self, axes: list[float | None], values: dict[str, float]) -> None:
         """Write a drilling cycle along the third axis of the plane as rapids and feeds [Kramer2000].
@@ -225,7 +229,8 @@ class BlockMotion(Origins):
         move to the next hole climbs on its way where the last hole was left at R.
         """
         s, error = self.s, self.log.error
-        k = PLANE_AXES[s.plane][2]
+        self._settled("a drilling cycle")
+        k, here = PLANE_AXES[s.plane][2], self._here()
         if s.cycle.setdefault("plane", s.plane) != s.plane:
             return error("a drilling cycle continues in another plane: end it with G80 first")
         s.cycle.update({c: values[c] for c in "RQP" if c in values})
@@ -234,19 +239,19 @@ class BlockMotion(Origins):
         missing = [c for c in ("XYZ"[k], "R", *(("Q",) if s.motion in (73, 83) else ())) if c not in s.cycle]
         if missing:
             return error(f"a drilling cycle without {', '.join(missing)}")
-        if math.isnan(s.position[k]):
+        if math.isnan(here[k]):
             return error("a drilling cycle starts at a height that the program has not stated")
         if s.cycle.get("P", 0.0) < 0:
             return error(f"P{s.cycle['P']:g} is a negative dwell")
         feed = self._feed(values)
-        repeats = whole(values, "L" if "L" in values else "K", 1)
-        hole = self._hole(k) if feed is not None else None
+        repeats = self._holes(values)
+        hole = self._hole(k, values, depth) if feed is not None else None
         if hole is None or feed is None:
             return None
         self.log.room(repeats * hole.moves)
         across = [None if axis == k else a for axis, a in enumerate(axes)]
-        if s.cycle["top"] + s.origin[k] < hole.clear != s.position[k]:
-            self._line_to([hole.clear if axis == k else p for axis, p in enumerate(s.position)], RAPID, NAN)
+        if repeats and s.cycle["top"] + s.origin[k] < hole.clear != here[k]:
+            self._line_to([hole.clear if axis == k else p for axis, p in enumerate(here)], RAPID, NAN)
         for _ in range(repeats):
             at = self._target(across)
             at[k] = at[k] if at[k] > hole.clear else hole.back
@@ -256,14 +261,28 @@ class BlockMotion(Origins):
             self.dwell += 0.0 if s.motion in (81, 85) else s.cycle.get("P", 0.0)
         return None
 
-    def _hole(self, k: int) -> Hole | None:
-        """The hole of the cycle in force along axis ``k``."""
+    def _holes(self, values: dict[str, float]) -> int:
+        """Number of holes of a block; 0 where the control only keeps its words."""
+        letters = "LK" if self.control is None else self.control.repeats
+        letter = next((c for c in letters if c in values), letters[0])
+        return 0 if values.get(letter) == 0 and self.control is not None else whole(values, letter, 1)
+
+    def _hole(self, k: int, values: dict[str, float], depth: float | None) -> Hole | None:
+        """The hole of the cycle in force along axis ``k``; ``values`` and ``depth`` are the words of its block.
+
+        LinuxCNC counts R and depth anew in each block, other controls where their words stand.
+        """
         s = self.s
-        top = s.cycle.setdefault("top", s.position[k] - s.origin[k]) + s.origin[k]
+        top = s.cycle.setdefault("top", self._here()[k] - s.origin[k]) + s.origin[k]
         clear = s.cycle["R"] * s.scale + (top if s.relative else s.origin[k])
+        if self.control is not None:
+            clear = s.cycle["clear"] = clear if "R" in values else s.cycle.get("clear", clear)
         bottom = s.cycle["XYZ"[k]] * s.scale + (clear if s.relative else s.origin[k])
+        if self.control is not None:
+            bottom = s.cycle["bottom"] = bottom if depth is not None else s.cycle.get("bottom", bottom)
         if top > clear and self.stated.isdisjoint((98, 99)):
-            self.log.note("neither G98 nor G99 is stated: drilling cycles are read with G98 (return to start height)")
+            word = "G99 (return to R)" if s.retract_to_r else "G98 (return to start height)"
+            self.log.note(f"neither G98 nor G99 is stated: drilling cycles are read with {word}")
         if bottom > clear:
             self.log.error(f"the drilling depth {'XYZ'[k]} is above R")
             return None
@@ -272,5 +291,14 @@ class BlockMotion(Origins):
         if peck <= 0 and clear > bottom:
             self.log.error("a drilling cycle with Q0 has no end")
             return None
-        out = {85: HoleExit.FEED_TO_CLEAR, 89: HoleExit.FEED}.get(int(s.motion or 0), HoleExit.RAPID)
+        out = _EXITS.get(int(s.motion or 0), HoleExit.RAPID)
+        if s.motion in (74, 84) and self.control is None:  # LinuxCNC feeds a tap all the way up
+            out = HoleExit.FEED
         return Hole(clear, bottom, clear if s.retract_to_r else max(top, clear), peck, s.motion == 83, out)
+
+
+def _length(start: F64, end: F64, centre: F64, sweep: float, axes: tuple[int, int, int]) -> float:
+    """mm, length of an arc or helix; arguments as those of ``arc_points``."""
+    i, j, k = axes
+    radius = 0.5 * (math.dist(start[[i, j]], centre) + math.dist(end[[i, j]], centre))
+    return math.hypot(radius * sweep, end[k] - start[k])

@@ -8,13 +8,22 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 
-CYCLES = frozenset({73, 81, 82, 83, 85, 86, 89})
+CYCLES = frozenset({73, 74, 76, 81, 82, 83, 84, 85, 86, 89})
 MOTION_CODES = frozenset({0, 1, 2, 3, 80}) | CYCLES
 SHIFTS: frozenset[float] = frozenset({10, 52, 92, 92.1, 92.2, 92.3})
 """Words that move program zero."""
+COMPENSATES: frozenset[float] = frozenset({40, 41, 42, 41.1, 42.1})
+"""Words of cutter radius compensation."""
+TURNS: frozenset[float] = frozenset({68, 51, 51.1, 50.1})
+"""Words that turn, scale or mirror the programmed coordinates and take coordinates themselves."""
+IDLE: frozenset[float] = frozenset({8, 97})
+IDLE_M = frozenset({19, 48, 49, 50, 51, 52, 53, 60, 62, 63, 64, 65, 66, 67, 68})
+"""G and M words of LinuxCNC that move nothing: radius mode, speeds, overrides, orientation, inputs and outputs."""
+FURTHER: frozenset[float] = TURNS | {76}
+"""Words that LinuxCNC does not have, or has with another meaning; a dialect names those that it has."""
 SAVES = frozenset({70, 71, 72, 73})
 """M words that save modes, discard them and restore them."""
 WORK_OFFSETS = {54: "G54", 55: "G55", 56: "G56", 57: "G57", 58: "G58", 59: "G59", 59.1: "G59.1", 59.2: "G59.2",
@@ -40,27 +49,27 @@ _WORD = re.compile(rf"([A-Z@^])({NUMBER})")
 _COMMENT = re.compile(r"\([^()]*\)")
 _SCRIPT = re.compile(r"[;(]\s*PY\s*,", re.IGNORECASE)
 _FOREIGN = re.compile(r"[^\t -~]")
-_M_CODES = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30}) | SAVES
+_M_CODES = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 61}) | SAVES
 _ROTARY = "ABC"
 _TCP_G, _TCP_M = 43.4, frozenset({428, 429})  # tool centre point control: Fanuc's word, LinuxCNC's switch
-_WHOLE = "THDLM"
+_WHOLE = "THLM"
 
 # The modal groups of RS274: a control refuses two words of one, or takes the last; G80 has a group of its own on Fanuc.
 _G_GROUPS: tuple[frozenset[float], ...] = (
-    frozenset({4, 28, 30, 53}) | SHIFTS, MOTION_CODES - {80}, CYCLES | {80}, frozenset({17, 18, 19}),
+    frozenset({4, 28, 30, 53}) | SHIFTS | TURNS, MOTION_CODES - {80}, CYCLES | {80}, frozenset({17, 18, 19}),
     frozenset({90, 91}), frozenset({90.1, 91.1}), frozenset({93, 94, 95}), frozenset({20, 21}),
     frozenset({43, 43.4, 49}),
-    frozenset({98, 99}), frozenset(WORK_OFFSETS), frozenset({61, 61.1, 64}), frozenset({40}), frozenset({15}),
-    frozenset({50}), frozenset({69}),
+    frozenset({98, 99}), frozenset(WORK_OFFSETS), frozenset({61, 61.1, 64}), COMPENSATES, frozenset({15}),
+    frozenset({50}), frozenset({69}), IDLE,
 )
-_M_GROUPS: tuple[frozenset[float], ...] = (frozenset({0, 1, 2, 30}), frozenset({6}), frozenset({3, 4, 5}),
+_M_GROUPS: tuple[frozenset[float], ...] = (frozenset({0, 1, 2, 30}), frozenset({6, 61}), frozenset({3, 4, 5}),
                                            frozenset({7, 8, 9}), _TCP_M, SAVES)
-_G_CODES = frozenset().union(*_G_GROUPS) - {_TCP_G}
+_G_CODES = frozenset().union(*_G_GROUPS) - {_TCP_G} - FURTHER
 _HINTS = {
-    5: "a spline", 5.1: "a spline", 5.2: "a spline", 33: "threading", 38.2: "probing", 41: "cutter radius compensation",
-    42: "cutter radius compensation", 43.4: "tool centre point control", 43.5: "tool centre point control by vectors",
-    65: "a macro call", 66: "a macro call", 68: "a rotated frame", 68.2: "a tilted plane", 74: "tapping",
-    76: "threading", 84: "tapping", 87: "back boring", 88: "boring with a manual retract",
+    5: "a spline", 5.1: "a spline", 5.2: "a spline", 33: "threading", 38.2: "probing",
+    43.4: "tool centre point control", 43.5: "tool centre point control by vectors",
+    65: "a macro call", 66: "a macro call", 68: "a rotated frame", 68.2: "a tilted plane", 76: "threading",
+    87: "back boring", 88: "boring with a manual retract",
 }
 _M_HINTS = {428: "tool centre point control", 429: "tool centre point control", 430: "user-defined kinematics"}
 NO_MACHINE = "give the machine of the setup its rotary axes: machine.kind 5-axis and machine.kinematics"
@@ -85,19 +94,22 @@ class Block:
     ms      : M words
     values  : number of every other letter but N, as written (units and modes of the program)
     deleted : whether it begins with the block delete sign /
+    idle    : whether it has M words of ``IDLE_M``
     """
 
     codes: list[float] = field(default_factory=list)
     ms: list[int] = field(default_factory=list)
     values: dict[str, float] = field(default_factory=dict)
     deleted: bool = False
+    idle: bool = False
 
 
-def parse_block(text: str, rotary: str = "") -> Block:
+def parse_block(text: str, rotary: str = "", further: Collection[float] = ()) -> Block:
     """Words of one line of a program; comments, blank lines and Fanuc O numbers give an empty block.
 
     text   : the line
     rotary : letters of the machine's rotary axes, such as 'AC'; '' where it has none
+    further : G words of ``FURTHER`` that the control has
 
     Raises
     ------
@@ -120,7 +132,10 @@ def parse_block(text: str, rotary: str = "") -> Block:
     if "".join(a + b for a, b in words) != text:
         raise BlockError(f"cannot read '{text[:60]}'")
     for letter, digits in words:
-        _add(block, letter, digits, rotary)
+        _add(block, letter, digits, rotary, further)
+    if block.values.get("D", 0.0) % 1 or block.values.get("D", 0.0) < 0:
+        if {41.1, 42.1}.isdisjoint(block.codes):
+            raise BlockError(f"unknown word D{block.values['D']:g}: D takes a whole number from 0")
     _check_groups("G", block.codes, _G_GROUPS)
     _check_groups("M", block.ms, _M_GROUPS)
     return block
@@ -144,7 +159,7 @@ def bare(text: str) -> str:
     return text
 
 
-def _add(block: Block, letter: str, digits: str, rotary: str) -> None:
+def _add(block: Block, letter: str, digits: str, rotary: str, further: Collection[float]) -> None:
     number = float(digits)
     if not abs(number) <= LARGEST:
         raise BlockError(f"{letter}{digits[:12]}... is a number of {len(digits)} characters, above {LARGEST:g}")
@@ -152,7 +167,7 @@ def _add(block: Block, letter: str, digits: str, rotary: str) -> None:
         raise BlockError(f"{letter}{digits} is farther than any machine moves ({FARTHEST:g})",
                          "look for a missing decimal point")
     if letter == "G":
-        if number not in _G_CODES and not (rotary and number == _TCP_G):
+        if number not in _G_CODES and number not in further and not (rotary and number == _TCP_G):
             hint = _HINTS.get(number)
             name = digits if "." in digits else f"{number:g}"
             raise BlockError(f"unknown word G{name}" + (f" ({hint})" if hint else ""),
@@ -162,10 +177,15 @@ def _add(block: Block, letter: str, digits: str, rotary: str) -> None:
     if letter == "N":
         return
     if letter in _ROTARY and letter not in rotary:
+        if number == 0:  # an axis that the machine has not, or that the setup does not name, stays where it is
+            return
         raise BlockError(f"unknown word {letter}{digits} (the rotary axes of the machine are {' and '.join(rotary)})"
                          if rotary else f"unknown word {letter}{digits} (the machine has no rotary axis)",
                          None if rotary else NO_MACHINE)
-    if letter not in "XYZABCIJKRPQLFSTHDM@^":
+    if letter == "M" and number in IDLE_M:
+        block.idle = True
+        return
+    if letter not in "XYZABCIJKRPQLFSTHDM@^" and not (letter == "E" and block.idle):
         raise BlockError(f"unknown word {letter}{digits}")
     if letter in _WHOLE and (number != int(number) or number < 0):
         raise BlockError(f"unknown word {letter}{digits}: {letter} takes a whole number from 0")
@@ -197,13 +217,17 @@ def used_letters(block: Block, motion: float | None, moves: bool) -> str:
     motion : G number in force
     moves  : whether the block makes a move of that motion
     """
-    used = "XYZABCFST"
+    used = "XYZABCFST" + ("PQRLE" if block.idle else "") + ("Q" if 61 in block.ms else "")
     if 10 in block.codes:
-        return used + "LP"
+        return used + "LPR"
+    if not TURNS.isdisjoint(block.codes):
+        return used + ("R" if 68 in block.codes else "PIJK" if 51 in block.codes else "")
     if 43 in block.codes or _TCP_G in block.codes:
         used += "H"
     if 64 in block.codes:
         used += "PQ"
+    if not {41, 42, 41.1, 42.1}.isdisjoint(block.codes):
+        used += "D"
     if 4 in block.codes:
         return used + "P"
     if not moves:
@@ -213,7 +237,7 @@ def used_letters(block: Block, motion: float | None, moves: bool) -> str:
         return used + ("RP" if "R" in block.values else "IJKP")
     if motion in CYCLES:
         used += "R" + ("L" if "L" in block.values else "K")
-        return used + {81: "", 85: "", 82: "P", 86: "P", 89: "P"}.get(int(motion or 0), "PQ")
+        return used + {81: "", 85: "", 82: "P", 86: "P", 89: "P", 76: "PQIJ"}.get(int(motion or 0), "PQ")
     return used
 
 

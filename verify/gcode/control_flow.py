@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol
 
 from geometry.errors import VerificationError
-from verify.gcode.block_words import BlockError
+from verify.gcode.block_words import BlockError, bare
 from verify.gcode.expressions import Value
 from verify.gcode.o_words import OWordStep, Structure, StructureError, find_structure
 from verify.gcode.parameters import LOCAL, CallFrame, Parameters
@@ -22,12 +22,15 @@ MAX_BLOCKS = 5_000_000
 MAX_CALLS = 9
 """Nested calls that LinuxCNC runs."""
 MAX_KEPT = 20_000
+_CALL = re.compile(r"[mM][ \t]*0*9([89])(?![0-9])")
+_LABEL = re.compile(r"\s*[oO][ \t]*0*([0-9]+)\s*(?:[;(].*)?")
+_LETTER = re.compile(r"([A-Z])([0-9.]+)")
 _O_WORD = re.compile(r"[oO][ \t]*(?:[<\[#]|[0-9]+[ \t]*[a-zA-Z])")
 
 
 def has_flow(text: str) -> bool:
     """Whether a program has parameters, expressions or O-words; also True where only a comment seems to have them."""
-    if "#" in text or "[" in text:
+    if "#" in text or "[" in text or _CALL.search(text):
         return True
     for letter in "oO":
         at = text.find(letter)
@@ -65,6 +68,9 @@ class Flow:
         self.scope = Parameters(machine.served)
         self.structure = Structure()
         self._back: list[int] = []
+        self._latest: dict[int, tuple[int, int]] = {}
+        self._programs: dict[int, int] = {}
+        self._runs_left: list[list[int]] = []  # of M98: line to come back to, first line, runs left
         self._kept: dict[int, ParametricLine] = {}
         self._runs: dict[str, Callable[[OWordStep], int]] = {
             "sub": lambda step: step.end + 1, "endsub": self._return, "return": self._return, "call": self._call,
@@ -87,6 +93,9 @@ class Flow:
         except StructureError as problem:
             return self.machine.log.error(str(problem), problem.line)
         at, runs = 0, 0
+        if any(map(_CALL.search, self.lines)):
+            self._programs = {int(m[1]): k for k, line in enumerate(self.lines) if (m := _LABEL.fullmatch(line))}
+            self._programs.setdefault(-1, 0)
         plain, steps = self.structure.plain, self.structure.steps
         if not all(plain):
             self.machine.log.note("parameters, expressions and O-words are read as in LinuxCNC; other controls differ")
@@ -94,6 +103,17 @@ class Flow:
             runs += 1
             if runs > MAX_BLOCKS:
                 self._endless(at + 1)
+            if plain[at] and self._programs and (call := _CALL.search(self.lines[at])):
+                self.machine.log.line = at + 1
+                try:
+                    goal = self._fanuc_call(at, call[1])
+                except BlockError as problem:
+                    return self.machine.log.error(str(problem))
+                if goal is not None:
+                    at = goal
+                    continue
+                yield at + 1, "M2"
+                return None
             if plain[at]:
                 at += 1
                 yield at, self.lines[at - 1]
@@ -112,6 +132,32 @@ class Flow:
         if len(plain) < len(self.lines):
             yield len(plain) + 1, "%"
         return None
+
+    def _fanuc_call(self, at: int, word: str) -> int | None:
+        """Line after M98 (P, L) or M99, which LinuxCNC has beside its O-words; None where M99 ends the main program."""
+        text = "".join(bare(self.lines[at]).upper().split())
+        if not text.strip():
+            return at + 1
+        words = {a: float(b) for a, b in _LETTER.findall(text)}
+        if text != "".join(a + b for a, b in _LETTER.findall(text)) or not words.keys() <= set("NMPL"):
+            raise BlockError(f"M9{word} with other words in its block: give it its own block")
+        if word == "9":
+            if not self._runs_left:
+                self.machine.log.note(f"line {at + 1}: M99 repeats the main program without end; the proof reads it "
+                                      "once")
+                return None
+            call = self._runs_left[-1]
+            call[2] -= 1
+            return call[1] if call[2] > 0 else self._runs_left.pop()[0]
+        number, times = int(words.get("P", -1)), int(words.get("L", 1))
+        if number not in self._programs or "P" not in words:
+            raise BlockError(f"M98 P{number}: the program O{number} is not in the file")
+        if len(self._runs_left) >= MAX_CALLS:
+            raise BlockError(f"more than {MAX_CALLS} nested calls; LinuxCNC runs no more")
+        if times < 1:
+            return at + 1
+        self._runs_left.append([at + 1, self._programs[number] + 1, times])
+        return self._programs[number] + 1
 
     def _line(self, at: int) -> ParametricLine:
         """The parsed line; it is cached only where it can run again, as caching all lines slows garbage collection."""
@@ -140,9 +186,13 @@ class Flow:
         return step.at + 1
 
     def _while(self, step: OWordStep) -> int:
+        holds = self._holds(step)
+        if holds and self._latest.get(step.at) == (self.scope.changes, len(self._back)):
+            self._endless(step.at + 1)  # no parameter has changed since the condition held before
+        self._latest[step.at] = self.scope.changes, len(self._back)
         if step.kind == "do":
-            return step.start + 1 if self._holds(step) else step.at + 1
-        return step.at + 1 if self._holds(step) else step.end + 1
+            return step.start + 1 if holds else step.at + 1
+        return step.at + 1 if holds else step.end + 1
 
     def _repeat(self, step: OWordStep) -> int:
         times = step.word.values[0](self.scope)
@@ -151,6 +201,7 @@ class Flow:
 
     def _again(self, step: OWordStep) -> int:
         self.scope.frame.repeats[step.start] -= 1
+        self.scope.changes += 1
         return step.start + 1 if self.scope.frame.repeats[step.start] > 0 else step.at + 1
 
     def _call(self, step: OWordStep) -> int:
@@ -166,6 +217,7 @@ class Flow:
         numbers.update(enumerate((value(self.scope) for value in word.values), 1))
         self.scope.frames.append(CallFrame(numbers))
         self._back.append(step.at + 1)
+        self.scope.changes += 1
         self.machine.enter()
         return sub.at + 1
 
@@ -173,6 +225,7 @@ class Flow:
         values = step.word.values
         self.scope.returned = (values[0](self.scope), 1.0) if values else (0.0, 0.0)
         self.scope.frames.pop()
+        self.scope.changes += 1
         self.machine.leave()
         return self._back.pop()
 

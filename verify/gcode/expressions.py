@@ -1,7 +1,8 @@
-"""Numbers, parameters and expressions of LinuxCNC: parsed once, evaluated whenever their line runs.
+"""Numbers, parameters and expressions of LinuxCNC and of macros: parsed once, evaluated whenever their line runs.
 
-Precedence, from the highest: ** ; * / MOD ; + - ; EQ NE GT GE LT LE ; AND OR XOR. Operators of one level run from left
-to right, and a sign belongs to the value after it. Angles are degrees. EQ and NE treat numbers within 1e-5 as equal.
+Precedence in LinuxCNC, from the highest: ** ; * / MOD ; + - ; EQ NE GT GE LT LE ; AND OR XOR. Operators of one level
+run from left to right, and a sign belongs to the value after it. Angles are degrees. EQ and NE treat numbers within
+1e-5 as equal. Another ``Grammar`` has other functions, operators and levels (``verify.gcode.macro_variables``).
 """
 
 from __future__ import annotations
@@ -9,8 +10,9 @@ from __future__ import annotations
 import math
 import operator
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from verify.gcode.block_words import NUMBER, BlockError
 from verify.gcode.parameters import Parameters
@@ -22,8 +24,6 @@ EQUAL = 1e-5
 
 _NUMBER = re.compile(NUMBER)
 _NAME = re.compile(r"<([^<>]*)>")
-_FUNCTION = re.compile(r"abs|acos|asin|atan|cos|exists|exp|fix|fup|ln|round|sin|sqrt|tan")
-_OPERATOR = re.compile(r"\*\*|[*/+-]|mod|eq|ne|gt|ge|lt|le|and|or|xor")
 _PRECEDENCE = {"**": 5, "*": 4, "/": 4, "mod": 4, "+": 3, "-": 3, "eq": 2, "ne": 2, "gt": 2, "ge": 2, "lt": 2, "le": 2,
                "and": 1, "or": 1, "xor": 1}
 
@@ -40,11 +40,39 @@ class ParameterReference:
         return scope.named(self.name) if self.number is None else scope.numbered(self.number(scope))
 
 
+@dataclass(frozen=True)
+class Grammar:
+    """Functions and operators of a control.
+
+    functions  : of one value, by name; atan takes two, exists a name
+    operators  : of two values, by sign
+    precedence : level of each operator, from 1
+    """
+
+    functions: Mapping[str, Callable[[float], float]]
+    operators: Mapping[str, Callable[[float, float], float]]
+    precedence: Mapping[str, int]
+
+    @cached_property
+    def function(self) -> re.Pattern[str]:
+        """Matches the name of a function."""
+        return _one_of({*self.functions, "atan", "exists"})
+
+    @cached_property
+    def operator(self) -> re.Pattern[str]:
+        """Matches an operator."""
+        return _one_of(self.operators)
+
+
+def _one_of(words: Iterable[str]) -> re.Pattern[str]:
+    return re.compile("|".join(re.escape(w) for w in sorted(words, key=len, reverse=True)))
+
+
 class ExpressionReader:
     """Parser of one line from left to right; the text is without blanks and in lower case."""
 
-    def __init__(self, text: str) -> None:
-        self.text, self.at, self._depth = text, 0, 0
+    def __init__(self, text: str, grammar: Grammar | None = None) -> None:
+        self.text, self.at, self._depth, self.grammar = text, 0, 0, grammar or LINUXCNC_GRAMMAR
 
     @property
     def rest(self) -> str:
@@ -92,10 +120,14 @@ class ExpressionReader:
             self.at += 1
             behind = self.value()
             return behind if sign == "+" else lambda scope: -behind(scope)
-        if function := _FUNCTION.match(self.text, self.at):
+        if function := self.grammar.function.match(self.text, self.at):
             self.at = function.end()
             return self._function(function.group())
         raise BlockError(f"cannot read a number, parameter or expression at '{self.rest}'")
+
+    def whole(self) -> Value:
+        """An expression without brackets round it; it may be vacant."""
+        return self._joined(1)
 
     def bracket(self) -> Value:
         """An expression in brackets."""
@@ -121,9 +153,10 @@ class ExpressionReader:
     def _joined(self, min_precedence: int) -> Value:
         """Values joined by operators of at least this precedence."""
         left = self.value()
-        while (sign := _OPERATOR.match(self.text, self.at)) and _PRECEDENCE[sign.group()] >= min_precedence:
+        g = self.grammar
+        while (sign := g.operator.match(self.text, self.at)) and g.precedence[sign.group()] >= min_precedence:
             self.at = sign.end()
-            left = _join(_OPERATIONS[sign.group()], left, self._joined(_PRECEDENCE[sign.group()] + 1))
+            left = _join(g.operators[sign.group()], left, self._joined(g.precedence[sign.group()] + 1))
         return left
 
     def _function(self, name: str) -> Value:
@@ -138,7 +171,7 @@ class ExpressionReader:
         if name == "atan":
             self.take("/")
             return _join(lambda y, x: math.degrees(math.atan2(y, x)), first, self.bracket())
-        function = _FUNCTIONS[name]
+        function = self.grammar.functions[name]
         return lambda scope: function(first(scope))
 
 
@@ -146,14 +179,27 @@ def _join(operation: Callable[[float, float], float], left: Value, right: Value)
     return lambda scope: operation(left(scope), right(scope))
 
 
-def _divided(left: float, right: float) -> float:
+def divided(left: float, right: float) -> float:
+    """The quotient.
+
+    Raises
+    ------
+    BlockError
+        A division by zero.
+    """
     if right == 0:
         raise BlockError(f"{left:g} is divided by zero")
     return left / right
 
 
-def _modulo(left: float, right: float) -> float:
-    """The remainder, never negative."""
+def modulo(left: float, right: float) -> float:
+    """The remainder, never negative.
+
+    Raises
+    ------
+    BlockError
+        A division by zero.
+    """
     if right == 0:
         raise BlockError(f"{left:g} MOD zero has no value")
     return left % abs(right)
@@ -164,18 +210,25 @@ def _power(left: float, right: float) -> float:
         raise BlockError(f"{left:g} ** {right:g} has no value: a negative number has whole powers only")
     if left == 0 and right < 0:
         raise BlockError(f"0 ** {right:g} has no value")
-    return _small_enough(f"{left:g} ** {right:g}", lambda: math.pow(left, right))
+    return small_enough(f"{left:g} ** {right:g}", lambda: math.pow(left, right))
 
 
-def _small_enough(name: str, compute: Callable[[], float]) -> float:
+def small_enough(name: str, compute: Callable[[], float]) -> float:
+    """The computed number.
+
+    Raises
+    ------
+    BlockError
+        It overflows.
+    """
     try:
         return compute()
     except OverflowError:
         raise BlockError(f"{name} is not a finite number") from None
 
 
-def _within(name: str, function: Callable[[float], float], low: float, high: float) -> Callable[[float], float]:
-    """``function`` of a number from ``low`` to ``high``; any other number is refused."""
+def within(name: str, function: Callable[[float], float], low: float, high: float) -> Callable[[float], float]:
+    """A function that refuses numbers not from ``low`` to ``high``; ``name`` stands for it in the message."""
     def applied(number: float) -> float:
         if not low <= number <= high:
             raise BlockError(f"{name}[{number:g}] has no value: it takes numbers from {low:g} to {high:g}")
@@ -183,24 +236,26 @@ def _within(name: str, function: Callable[[float], float], low: float, high: flo
     return applied
 
 
-def _rounded(number: float) -> float:
+def rounded(number: float) -> float:
     """Nearest whole number, halves away from zero."""
     return math.copysign(math.floor(abs(number) + 0.5), number)
 
 
 _OPERATIONS: dict[str, Callable[[float, float], float]] = {
-    "**": _power, "*": operator.mul, "/": _divided, "mod": _modulo, "+": operator.add, "-": operator.sub,
+    "**": _power, "*": operator.mul, "/": divided, "mod": modulo, "+": operator.add, "-": operator.sub,
     "eq": lambda a, b: float(abs(a - b) < EQUAL), "ne": lambda a, b: float(abs(a - b) >= EQUAL),
     "gt": lambda a, b: float(a > b), "ge": lambda a, b: float(a >= b), "lt": lambda a, b: float(a < b),
     "le": lambda a, b: float(a <= b), "and": lambda a, b: float(a != 0 and b != 0),
     "or": lambda a, b: float(a != 0 or b != 0), "xor": lambda a, b: float((a != 0) != (b != 0)),
 }
 _FUNCTIONS: dict[str, Callable[[float], float]] = {
-    "abs": abs, "fix": math.floor, "fup": math.ceil, "round": _rounded,
-    "exp": lambda v: _small_enough(f"EXP[{v:g}]", lambda: math.exp(v)),
-    "acos": _within("ACOS", lambda v: math.degrees(math.acos(v)), -1, 1),
-    "asin": _within("ASIN", lambda v: math.degrees(math.asin(v)), -1, 1),
+    "abs": abs, "fix": math.floor, "fup": math.ceil, "round": rounded,
+    "exp": lambda v: small_enough(f"EXP[{v:g}]", lambda: math.exp(v)),
+    "acos": within("ACOS", lambda v: math.degrees(math.acos(v)), -1, 1),
+    "asin": within("ASIN", lambda v: math.degrees(math.asin(v)), -1, 1),
     "cos": lambda v: math.cos(math.radians(v)), "sin": lambda v: math.sin(math.radians(v)),
     "tan": lambda v: math.tan(math.radians(v)),
-    "ln": _within("LN", math.log, math.ulp(0.0), math.inf), "sqrt": _within("SQRT", math.sqrt, 0, math.inf),
+    "ln": within("LN", math.log, math.ulp(0.0), math.inf), "sqrt": within("SQRT", math.sqrt, 0, math.inf),
 }
+LINUXCNC_GRAMMAR = Grammar(_FUNCTIONS, _OPERATIONS, _PRECEDENCE)
+"""LinuxCNC."""

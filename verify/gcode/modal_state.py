@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 
-from verify.gcode.block_words import CYCLES, MOTION_CODES, SAVES, WORK_OFFSETS, Block, BlockError
+from verify.gcode.block_words import COMPENSATES, CYCLES, MOTION_CODES, SAVES, WORK_OFFSETS, Block, BlockError
 from verify.gcode.rotary_words import Rotary
 from verify.gcode.saved_modes import SavedModes
 from verify.kinematics import Kinematics
@@ -57,12 +57,13 @@ class Modes(Rotary):
                 self.log.remark("speed", f"S{s.speed:g} is not a spindle speed", self.log.line)
         if "T" in values:
             self._select(int(values["T"]))
-        self._spindle(block.ms)
+        self._spindle(block.ms, values)
         if s.turning:
             self.log.turns(s.tool, s.speed)
         if not {7, 8, 9}.isdisjoint(block.ms):
             s.coolant = 9 not in block.ms
-        self.log.runs(s.speed if s.turning else 0.0, s.coolant)
+        speed, coolant = s.speed if s.turning else 0.0, s.coolant
+        self._in_order(lambda: self.log.runs(speed, coolant))
         if not {428, 429}.isdisjoint(block.ms):
             self._control(s.tcp_word, 428 in block.ms)
         for g in sorted(block.codes, key=lambda g: g != 80):  # with a motion word G80 only ends the cycle before it
@@ -73,19 +74,53 @@ class Modes(Rotary):
             self.log.remark("unit_feed", f"F{values['F']:g} in the block that changes the unit: LinuxCNC reads it "
                             "in the old unit, other controls in the new one; give F its own line", self.log.line)
         if "F" in values:
-            s.feed = values["F"] * (1.0 if s.feed_mode == 93 else s.scale)
+            s.feed = values["F"] * (1.0 if s.feed_mode == 93 else scale if self.fits else s.scale)
+
+    def _in_order(self, run: Callable[[], None]) -> None:
+        """Do something after the moves before it are written."""
+        run()
+
+    def _settled(self, word: str) -> None:
+        """Refuse a block that cutter radius compensation does not go with, where it is on; ``word`` names it."""
+
+    def _select_zero(self, name: str) -> None:
+        """Put a work offset in force."""
+        raise NotImplementedError
+
+    def _length_error(self, number: int) -> float:
+        """mm, by which a length offset differs from the length of its tool."""
+        raise NotImplementedError
+
+    def _own_register(self, number: int) -> bool:
+        """Whether a register that no tool has by number belongs to the tool in the spindle."""
+        raise NotImplementedError
+
+    def _unturn(self, word: float) -> None:
+        """End a rotation (G69) or a scale (G50) of the programmed coordinates."""
+        raise NotImplementedError
+
+    def _compensation(self, word: float, values: dict[str, float]) -> None:
+        """Begin or end cutter radius compensation."""
+        raise NotImplementedError
 
     def _select(self, number: int) -> None:
         if self.tools is not None and number not in self.tools and number != 0:
             self.log.error(f"T{number} is not in the tool table")
         self.s.selected = number
 
-    def _spindle(self, ms: list[int]) -> None:
+    def _spindle(self, ms: list[int], values: dict[str, float]) -> None:
         s = self.s
+        if 61 in ms and (values.get("Q", -1.0) < 0 or values["Q"] % 1):
+            raise BlockError("M61 without Q, the number of the tool in the spindle")
         for m in (0, 1):
             if m in ms:
                 self.pause(f"M{m}", s.tool)
+        if 61 in ms:
+            self._settled("M61")
+            s.tool = s.selected = int(values["Q"])
+            self.loaded = True
         if 6 in ms:
+            self._settled("M6")
             self.pause("tool change", s.selected)
             self.stop("tool change")
             if s.selected != s.tool:
@@ -106,7 +141,13 @@ class Modes(Rotary):
         if g in MOTION_CODES:
             self._motion(g)
         elif g in (17, 18, 19):
+            if g != s.plane:
+                self._settled(f"G{g:g}")
             s.plane = int(g)
+        elif g in (50, 69):
+            self._unturn(g)
+        elif g in COMPENSATES:
+            self._compensation(g, values)
         elif g in (20, 21):
             self._unit(int(g))
         elif g in (90, 91):
@@ -121,10 +162,7 @@ class Modes(Rotary):
         elif g in (43, 43.4, 49):
             self._length_offset(g, values)
         elif g in WORK_OFFSETS:
-            s.work_offset = WORK_OFFSETS[g]
-            if s.work_offset != self.work_offset:
-                self.log.remark("work_offset", f"{s.work_offset} is not the work offset of the setup "
-                                f"({self.work_offset})", s.work_offset)
+            self._select_zero(WORK_OFFSETS[g])
 
     def _assume(self) -> None:
         """Record the modes that the first move assumes: a control keeps the modes of the program before."""
@@ -191,9 +229,16 @@ class Modes(Rotary):
         s = self.s
         self._control(g == 43.4, s.tcp_switch)
         if g == 49:
-            s.offset = None
+            s.offset, s.length = None, 0.0
             return
-        s.offset = int(values["H"]) if "H" in values else s.tool
+        number = int(values["H"]) if "H" in values else s.tool
+        s.length = self._length_error(number)
+        if number != s.tool and self.tools is not None and number not in self.tools and self._own_register(number):
+            self.log.note(f"H{number} counts as the length of T{s.tool}: the setup has no tool of that number")
+            number = s.tool
+        s.offset = number
+        if s.length and s.tilted:
+            raise BlockError(f"G43 H{number} differs from the length of its tool while a rotary axis stands off 0")
         if s.offset != s.tool:
             self.log.remark("length_offset", f"length offset H{s.offset} with tool T{s.tool} in the spindle",
                             self.log.line)

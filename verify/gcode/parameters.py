@@ -31,12 +31,13 @@ class CallFrame:
 class Parameters:
     """All parameters at one time.
 
+    changes : how often a value changed, or one of the control was read; the flow adds its calls
     served : gives the value of a number or name that the control serves; raises BlockError where the reader does not
              know it
     """
 
     def __init__(self, served: Callable[[int | str], float]) -> None:
-        self._served = served
+        self._served, self.changes = served, 0
         self.frames = [CallFrame()]
         self._numbers: dict[int, float] = {}
         self._names: dict[str, float] = {}
@@ -57,6 +58,7 @@ class Parameters:
         """
         n = _index(number)
         if n > LAST:
+            self.changes += 1
             return self._served(n)
         held = self.frame.numbers if n <= LOCAL else self._numbers
         if n not in held:
@@ -81,6 +83,7 @@ class Parameters:
         if name in held:
             return held[name]
         if is_served(name):
+            self.changes += 1
             return self._served(name)
         raise BlockError(f"#<{name}> has no value yet; set it first")
 
@@ -108,7 +111,9 @@ class Parameters:
         if n > LAST and n != MESSAGES:
             raise BlockError(f"#{n} is a parameter of the control (offsets, probing, position); the proof does not "
                              "know the effect of setting it")
-        (self.frame.numbers if n <= LOCAL else self._numbers)[n] = value
+        held = self.frame.numbers if n <= LOCAL else self._numbers
+        self.changes += held.get(n) != value
+        held[n] = value
 
     def put_name(self, name: str, value: float) -> None:
         """Give a named parameter a value.
@@ -120,7 +125,9 @@ class Parameters:
         """
         if not name or name in NAMES:
             raise BlockError(f"a program cannot set #<{name}>")
-        self._held(name)[name] = value
+        held = self._held(name)
+        self.changes += held.get(name) != value
+        held[name] = value
 
     def _held(self, name: str) -> dict[str, float]:
         return self._names if name.startswith("_") else self.frame.names

@@ -36,10 +36,10 @@ class ParametricLine:
 
     def run(self, scope: Parameters) -> str:
         """Evaluate the line, make its assignments, and return the plain block that is left, '' for none."""
-        words = "".join([letter + _digits(letter, value(scope)) for letter, value in self.words])
+        words = "".join([letter + digits(letter, value(scope)) for letter, value in self.words])
         results = [(target, target.number and target.number(scope), value(scope)) for target, value in self.assigned]
         for target, number, result in results:
-            _digits("#", result)
+            digits("#", result)
             if number is None:
                 scope.put_name(target.name, result)
             else:
@@ -140,10 +140,15 @@ def _compact(raw: str) -> str:
     return "".join(bare(raw).lower().split())
 
 
-def _digits(letter: str, number: float) -> str:
+def digits(letter: str, number: float) -> str:
     """The number as text that reads back to the same bits; whole where the letter takes whole numbers only.
 
     There a quotient such as 2.99999 counts as 3, as on the control: within 1e-4, for G words within 1e-4 of a tenth.
+
+    Raises
+    ------
+    BlockError
+        It is not finite.
     """
     if not math.isfinite(number):
         raise BlockError(f"the value of {letter} is not a finite number")

@@ -16,6 +16,7 @@ and rotary axes stand at 0; ``Program.assumed`` lists these assumptions.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
 import numpy as np
@@ -24,7 +25,8 @@ from geometry.errors import ProgramError, VerificationError
 from verify.gcode.block_motion import BlockMotion
 from verify.gcode.block_words import Block, BlockError, parse_block, straight, used_letters
 from verify.gcode.control_flow import Flow, has_flow
-from verify.gcode.dialects import DIALECTS, LINUXCNC, translated_blocks
+from verify.gcode.dialects import CONTROLS, DIALECTS, LINUXCNC, translated_blocks
+from verify.gcode.program_text import cleaned
 from verify.gcode.system_parameters import served
 from verify.kinematics import Kinematics
 from verify.program.move_kinds import FEED, RAPID
@@ -33,6 +35,7 @@ from verify.program.program import NAN, Program, Remark
 from verify.progress import Report, silent
 
 BLEND_LIMIT = 0.01
+_BINARY = re.compile("[\x00-\x08]")
 REPORT_LINES = 4096  # lines between two reports of progress
 
 
@@ -42,12 +45,16 @@ class Reader(BlockMotion):
     def read(self, text: str, report: Report = silent, dialect: str = LINUXCNC) -> Program:
         """Moves and remarks of ``text``; raises as ``read_program`` says, and what ``report`` raises."""
         log, lines, self.fits = self.log, text.split("\n"), dialect == LINUXCNC
+        self.s.retract_to_r = dialect == LINUXCNC  # as it starts
         blocks: Iterable[tuple[int, str]] = enumerate(lines, 1)
         if dialect != LINUXCNC:
-            blocks = translated_blocks(lines, dialect, log)
+            self.control = CONTROLS[dialect]()
+            self.control.names = self.names
+            blocks = translated_blocks(lines, self.control, self)
         elif has_flow(text):
             blocks = Flow(lines, self).blocks()
         percents = self._scan(_reported(blocks, len(lines), report))
+        self._finish()
         self.stop("end of the program")
         self.pause("end of the program", self.s.tool)
         if not self.s.ended and percents < 2 and not log.errors:
@@ -73,6 +80,10 @@ class Reader(BlockMotion):
         """A parameter that the control serves (``verify.gcode.system_parameters``)."""
         return served(self.s, key)
 
+    def here(self) -> list[float]:
+        """(3,) mm, the programmed place in the coordinates of the blocks; nan where it is unknown."""
+        return self._here()
+
     def enter(self) -> None:
         """A subroutine begins: it has saved no modes."""
         self.saved.enter()
@@ -80,6 +91,13 @@ class Reader(BlockMotion):
     def leave(self) -> None:
         """A subroutine ends: the modes that its M73 saved come back."""
         self.saved.leave(self.s)
+
+    def _finish(self) -> None:
+        """Write what a contour still holds back."""
+        try:
+            self._end_contour()
+        except BlockError as problem:
+            self.log.error(str(problem), remedy=problem.remedy)
 
     def _scan(self, blocks: Iterable[tuple[int, str]]) -> int:
         """Run blocks with their lines; the fast path serves plain straight moves in the plain state only."""
@@ -138,14 +156,14 @@ class Reader(BlockMotion):
         s = self.s
         return (not s.relative and s.scale == 1.0 and s.feed_mode == 94 and s.turning and s.tool > 0
                 and s.offset == s.tool and s.work_offset == self.work_offset and (s.tcp or not s.tilted)
-                and not any(s.origin)
+                and not any(s.origin) and self.actual is None and self._frame() is None
                 and not any(math.isnan(v) for v in s.position))
 
     def _block(self, text: str) -> None:
         """Run one block. Order as on the control: speed, tool, spindle, modes, feed, motion, end."""
         before = len(self.log.errors)
         try:
-            block = parse_block(text, self.rotary)
+            block = parse_block(text, self.rotary, self.control.further_words if self.control else ())
             self._set_modes(block)
             self._move(block)
         except BlockError as problem:
@@ -179,7 +197,8 @@ def _reported(blocks: Iterable[tuple[int, str]], lines: int, report: Report) -> 
 def read_program(text: str, *, name: str = "program", tools: Collection[int] | None = None,
                  work_offset: str = "G54", blend_limit: float = BLEND_LIMIT, kinematics: Kinematics | None = None,
                  gauge_length: Mapping[int, float] | None = None, spindle_tool: int = 0,
-                 report: Report = silent, dialect: str = LINUXCNC) -> Program:
+                 report: Report = silent, dialect: str = LINUXCNC, radii: Mapping[int, float] | None = None,
+                 names: Mapping[str, int] | None = None) -> Program:
     """Read a program of three, four or five axes.
 
     text        : the program
@@ -192,6 +211,8 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
     spindle_tool : T number in the spindle, its length offset on, before the first line; 0 for none
     report      : called with the share read, 0 to 1, every 4096 lines; an exception from it ends the reading
     dialect     : one of ``verify.gcode.dialects.DIALECTS``
+    radii       : mm by T number, radius of the cutting part, for cutter radius compensation
+    names       : T numbers by the ids of the tools, for programs that name their tools
 
     Returns
     -------
@@ -216,13 +237,15 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
     if dialect not in DIALECTS:
         raise VerificationError(f"no reader knows the dialect '{dialect}'", code="unknown_dialect", measured=dialect,
                                 limit=sorted(DIALECTS), remedy=f"name one of {', '.join(sorted(DIALECTS))}")
-    if "\x00" in text:
+    text = cleaned(text)
+    if _BINARY.search(text):
         raise ProgramError(f"{name} is not a text file", remedy="send the NC program as text")
     if spindle_tool and tools is not None and spindle_tool not in tools:
         raise ProgramError(f"{name}: the tool in the spindle, T{spindle_tool}, is not in the tool table",
                            subjects=(f"T{spindle_tool}",), measured=spindle_tool, limit=sorted(tools),
                            remedy="give a tool of the table as spindle_tool")
     reader = Reader(Log(name), tools, work_offset, blend_limit, kinematics, gauge_length, spindle_tool)
+    reader.radii, reader.names = dict(radii or {}), dict(names or {})
     return reader.read(text, report, dialect)
 
 

@@ -57,7 +57,8 @@ def _mode(s: State, name: str) -> float | None:
     offset = next(g for g, word in WORK_OFFSETS.items() if word == s.work_offset)
     motion = math.nan if s.motion is None else s.motion * 10
     modes: dict[str, float] = {
-        "_motion_mode": motion, "_plane": s.plane * 10, "_ccomp": 400, "_metric": s.scale == 1.0,
+        "_motion_mode": motion, "_plane": s.plane * 10, "_ccomp": {0: 400, 1: 410}.get(s.side, 420),
+        "_metric": s.scale == 1.0,
         "_imperial": s.scale != 1.0, "_absolute": not s.relative, "_incremental": s.relative,
         "_inverse_time": s.feed_mode == 93, "_units_per_minute": s.feed_mode == 94, "_units_per_rev": s.feed_mode == 95,
         "_coord_system": offset * 10, "_coord_number": list(WORK_OFFSETS).index(offset) + 1,

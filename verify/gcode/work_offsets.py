@@ -1,7 +1,7 @@
 """Program zero: G92 to G92.3, G52, G10 L20, and the places of polar words.
 
 All of them are exact, because the zero of the setup is known: a shift is the place of the tip minus its programmed
-number. The reader refuses only words that depend on the zero of the machine (G10 L2).
+number. ``verify.gcode.offset_tables`` runs the other forms of G10.
 """
 
 from __future__ import annotations
@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 
 from verify.gcode.block_words import MOTION_CODES, WORK_OFFSETS, Block, BlockError, whole
-from verify.gcode.modal_state import Modes
+from verify.gcode.offset_tables import OffsetTables
 
 Axes = list[float | None]
 
 
-class Origins(Modes):
+class Origins(OffsetTables):
     """Shifts of program zero, and polar words of the running block."""
 
     polar: tuple[float | None, float | None] | None = None
@@ -33,14 +33,19 @@ class Origins(Modes):
             if any(a is not None for a in axes):
                 raise BlockError(f"G{word:g} takes no coordinates")
             return self._recall(word)
+        s = self.s
+        if word == 10 and block.values.get("L") in (1, 2, 10, 11, 12, 13):
+            return self._set_table(block.values, axes)
         if all(a is None for a in axes):
             raise BlockError(f"G{word:g} needs X, Y or Z")
+        if s.frame is not None:
+            raise BlockError(f"G{word:g} while the coordinates are rotated, scaled or mirrored")
         if word == 10:
             return self._table(block.values, axes)
-        s = self.s
         for k, axis in enumerate(axes):
             if axis is not None:
-                s.shift[k] = axis * s.scale if word == 52 else self._known(k, word) - s.table[k] - axis * s.scale
+                s.shift[k] = axis * s.scale if word == 52 else (
+                    self._known(k, word) - s.table[k] - axis * s.scale - (s.length if k == 2 else 0.0))
         s.kept = list(s.shift)
         self._tell(f"G{word:g}")
         return None
@@ -69,12 +74,14 @@ class Origins(Modes):
         if number > len(names):
             raise BlockError(f"G10 L20 needs P, the number of the work offset from 0 to {len(names)}")
         own = names[number - 1] if number else s.work_offset
-        if own != self.work_offset or s.work_offset != self.work_offset:
-            raise BlockError(f"G10 L20 of {own} with {s.work_offset} in force: only the work offset of the setup, "
-                             f"{self.work_offset}, is known")
+        zero = self.zeros.setdefault(own, [math.nan] * 3)
         for k, axis in enumerate(axes):
             if axis is not None:
-                s.table[k] = self._known(k, 10) - s.shift[k] - axis * s.scale
+                moved = self._known(k, 10) - s.shift[k] - axis * s.scale - (s.length if k == 2 else 0.0)
+                if own in self.written:
+                    self.written[own][k] += moved - zero[k]
+                zero[k] = moved
+        self._take_zero()
         self.log.remark("offset_table", f"G10 L20 writes {own} into the offset table of the control: the next run of "
                         "the program starts from another zero", self.log.line)
 

@@ -6,6 +6,7 @@ Plane axes by G17/G18/G19: (X, Y), (Z, X), (Y, Z); G2 runs clockwise seen from t
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -77,7 +78,23 @@ def arc_points(start: F64, end: F64, centre: F64, clockwise: bool, axes: tuple[i
     Sense, helix and turns are those of RS274/NGC [Kramer2000]. A chord of the angle a leaves a circle of radius r by
     r (1 - cos(a / 2)).
     """
-    i, j, k = axes
+    i, j, _ = axes
+    sweep, middle = arc_sweep(start, end, centre, clockwise, axes, turns), (float(centre[0]), float(centre[1]))
+    return swept_points(start.tolist(), end.tolist(), middle, sweep, axes, chord, max_points)
+
+
+def arc_sweep(start: F64, end: F64, centre: F64, clockwise: bool, axes: tuple[int, int, int], turns: int = 1) -> float:
+    """Signed angle of an arc, rad, counterclockwise positive.
+
+    start, end, centre : (3,), (3,) and (2,) float64, mm, as those of ``arc_points``
+    clockwise, axes, turns : as those of ``arc_points``
+
+    Raises
+    ------
+    ArcError
+        The two radii differ by more than 0.01 mm and 0.1 %, or by 0.5 mm.
+    """
+    i, j, _ = axes
     u, v = start[[i, j]] - centre, end[[i, j]] - centre
     r0, r1 = float(np.hypot(*u)), float(np.hypot(*v))
     if r0 < 1e-9:
@@ -91,7 +108,28 @@ def arc_points(start: F64, end: F64, centre: F64, clockwise: bool, axes: tuple[i
     if abs(sweep) < 1e-9 or abs(abs(sweep) - math.tau) < 1e-9:
         same = float(np.hypot(*(end[[i, j]] - start[[i, j]]))) < 1e-6
         sweep = (-math.tau if clockwise else math.tau) if same else sweep
-    sweep += (turns - 1) * (-math.tau if clockwise else math.tau)
+    return sweep + (turns - 1) * (-math.tau if clockwise else math.tau)
+
+
+def swept_points(start: Sequence[float], end: Sequence[float], centre: tuple[float, float], sweep: float,
+                 axes: tuple[int, int, int], chord: float = CHORD, max_points: int = 200_000) -> F64:
+    """Points of an arc or helix of a known angle after its start.
+
+    start, end, centre : as those of ``arc_points``, as sequences
+    sweep      : rad, signed, counterclockwise positive
+    chord, max_points : as those of ``arc_points``
+
+    Returns (k, 3) float64, mm, the last row equal to ``end``.
+
+    Raises
+    ------
+    ArcTooLong
+        The arc needs more than ``max_points``; no memory is used before.
+    """
+    i, j, k = axes
+    u, v = (start[i] - centre[0], start[j] - centre[1]), (end[i] - centre[0], end[j] - centre[1])
+    r0, r1 = float(np.hypot(*u)), float(np.hypot(*v))
+    a0 = math.atan2(u[1], u[0])
     # 4 asin(sqrt(c / 2r)) is 2 acos(1 - c / r) without its loss of digits on large radii
     step = 4 * math.asin(math.sqrt(min(chord / max(r0, r1), 0.5) / 2))
     n = max(1, math.ceil(abs(sweep) / step))

@@ -64,6 +64,11 @@ class Log:
         """Whether any move was written."""
         return bool(self.rows) or self._moves > 0
 
+    @property
+    def cuts(self) -> bool:
+        """Whether any feed move was written."""
+        return any(row[6] == FEED for row in self.rows) or any((c[:, 6] == FEED).any() for c in self._chunks)
+
     def error(self, message: str, line: int | None = None, remedy: str | None = None) -> None:
         """Record a line that cannot be read, the current one where ``line`` is None; the first remedy is reported."""
         if not self.errors:

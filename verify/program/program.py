@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64, I32
+
+if TYPE_CHECKING:
+    from verify.gcode.frames import Frame
 
 NAN = math.nan
 
@@ -152,6 +156,9 @@ class State:
     table     : mm, shift of the work offset by G10
     shift     : mm, shift of program zero by G92 or G52
     kept      : mm, the shift that G92.3 restores
+    length    : mm, by which the length offset in force differs from the length of the tool
+    side      : of the cutter radius compensation in force, 1 left, -1 right, 0 off; d : its register
+    frame     : rotation, mirror and scale of the programmed coordinates, None for none
     """
 
     position: list[float] = field(default_factory=lambda: [NAN, NAN, NAN])
@@ -180,11 +187,16 @@ class State:
     table: list[float] = field(default_factory=lambda: [0.0] * 3)
     shift: list[float] = field(default_factory=lambda: [0.0] * 3)
     kept: list[float] = field(default_factory=lambda: [0.0] * 3)
+    length: float = 0.0
+    side: int = 0
+    d: int | None = None
+    frame: Frame | None = None
 
     @property
     def origin(self) -> list[float]:
         """mm, where program zero lies in the setup frame."""
-        return [a + b for a, b in zip(self.table, self.shift, strict=True)]
+        table, shift = self.table, self.shift
+        return [table[0] + shift[0], table[1] + shift[1], table[2] + shift[2] + self.length]
 
     @property
     def length_off(self) -> bool:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 
 from verify.gcode.block_words import BlockError
-from verify.gcode.dialects.base import DialectReader
+from verify.gcode.dialects.base import DialectReader, Machine
 from verify.gcode.dialects.fanuc import FanucReader
 from verify.gcode.dialects.haas import HaasReader
 from verify.gcode.dialects.heidenhain import HeidenhainReader, is_conversational
@@ -22,33 +22,51 @@ CONTROLS: dict[str, type[DialectReader]] = {
     "fanuc": FanucReader, "haas": HaasReader, "siemens": SiemensReader, "heidenhain": HeidenhainReader}
 """Readers by dialect; ``LINUXCNC`` needs none."""
 
+NEWS = " "
+"""A block without words that keeps the next one off the fast path."""
+
 DIALECTS = (LINUXCNC, *CONTROLS)
 """All dialects that can be read."""
 
-ENDINGS = {"ngc": (LINUXCNC,), "mpf": ("siemens",), "h": ("heidenhain",), "nc": ("fanuc", "haas")}
+ENDINGS = {"ngc": (LINUXCNC,), "mpf": ("siemens",), "spf": ("siemens",), "h": ("heidenhain",), "nc": ("fanuc", "haas")}
 """Extensions of file names, without the point and in lower case, and the dialects that use them."""
 
 
-def translated_blocks(lines: Sequence[str], dialect: str, log: Log) -> Iterator[tuple[int, str]]:
-    """Blocks with the numbers of their lines, from 1; a line that cannot be read becomes an error of the log."""
-    control = CONTROLS[dialect]()
-    for number, raw in enumerate(lines, 1):
-        try:
-            blocks = control.blocks(raw)
-        except BlockError as problem:
-            log.error(str(problem), number, remedy=problem.remedy)
-            if len(log.errors) >= MAX_ERRORS:
-                return
-            continue
-        log.unbounded = control.unbounded
-        for note in control.notes:
-            log.note(note)
-        for remark in control.remarks:
-            log.remark("control", remark, remark, number)
-        control.notes.clear()
-        control.remarks.clear()
-        for block in blocks:
-            yield number, block
+def translated_blocks(lines: Sequence[str], control: DialectReader, machine: Machine) -> Iterator[tuple[int, str]]:
+    """Blocks with the numbers of their lines, from 1; a line that cannot be read becomes an error of the log.
+
+    control : the reader of the words; machine : the reader that runs the blocks
+    """
+    log, frame = machine.log, control.frame
+    try:
+        for number, raw in control.order(lines, machine):
+            try:
+                blocks = control.blocks(raw)
+            except BlockError as problem:
+                log.error(str(problem), number, remedy=problem.remedy)
+                if len(log.errors) >= MAX_ERRORS:
+                    return
+                continue
+            if control.frame is not frame:
+                frame = control.frame
+                yield number, NEWS
+            if control.notes or control.remarks:
+                _report(control, number, log)
+            log.unbounded = control.unbounded
+            for block in blocks:
+                yield block if isinstance(block, tuple) else (number, block)
+    except BlockError as problem:
+        log.error(str(problem), log.line or 1, remedy=problem.remedy)
+
+
+def _report(control: DialectReader, number: int, log: Log) -> None:
+    """Pass on what a control notes and remarks on a line."""
+    for note in control.notes:
+        log.note(note)
+    for remark in control.remarks:
+        log.remark("control", remark, remark, number)
+    control.notes.clear()
+    control.remarks.clear()
 
 
 def dialect_of(text: str, ending: str = "", wanted: Collection[str] = ()) -> str:

@@ -2,10 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Protocol
+
 from verify.gcode.block_words import NUMBER, WORK_OFFSETS, BlockError
+from verify.gcode.cutter_compensation import FANUC_STYLE, Style
+from verify.gcode.frames import Frame
+from verify.kinematics import Kinematics
+from verify.program.move_log import Log
+from verify.program.program import State
 
 ZEROS = tuple(WORK_OFFSETS.values())
 """The work offsets of a control from the first on, as setups name them."""
+
+
+class Machine(Protocol):
+    """The part of the reader that a dialect may look at while it decides which line runs next.
+
+    s       : modal state after the blocks so far; log : record of the reading
+    machine : rotary axes of the machine, or None; rotary : their letters
+    radii   : mm by T number, radius of the tools of the setup
+    """
+
+    s: State
+    log: Log
+    machine: Kinematics | None
+    rotary: str
+    radii: dict[int, float]
+
+    def here(self) -> list[float]:
+        """(3,) mm, the programmed place in the coordinates of the blocks; nan where it is unknown."""
+
+    def served(self, key: int | str) -> float:
+        """A parameter that the control serves."""
 
 
 class DialectReader:
@@ -18,7 +47,18 @@ class DialectReader:
     home_from : first tool change, counted from 0, before which our programs send the spindle home; None: the control
                 retracts by itself
     gives_up_length : whether the length offset is off at these tool changes too
+    further_words : G words of ``block_words.FURTHER`` that the control has
+    repeats : letters that give the number of holes of a drilling cycle, the first one present counts
+    style   : how the control compensates a cutter radius; it may change from line to line
+    frame   : from programmed coordinates to those of the work offset, mm, None where both are the same. The reader
+              applies it to X, Y, Z, arcs and cycles of the blocks that follow; shifts by words of blocks (G92, G10)
+              come after it
+    names   : T numbers by the names (ids) of the tools of the setup
     """
+
+    style: Style = FANUC_STYLE
+    further_words: frozenset[float] = frozenset()
+    repeats = "LK"
 
     bounds_path = True
     home_from: int | None = None
@@ -29,14 +69,28 @@ class DialectReader:
         self.remarks: list[str] = []
         self.unbounded = False
         self._free = False
+        self.frame: Frame | None = None
+        self.names: Mapping[str, int] = {}
+
+    def order(self, lines: Sequence[str], machine: Machine) -> Iterator[tuple[int, str]]:
+        """Lines with their numbers, from 1, in the order they run: repeats, calls and jumps are followed here.
+
+        Each line goes through ``blocks``, and its blocks run, before the next one is drawn: the state of ``machine`` is
+        then that before the line. A line may come as other text than it has in the program (variables replaced).
+
+        Raises BlockError where the order cannot be known; the reading ends there, at ``machine.log.line``.
+        """
+        yield from enumerate(lines, 1)
 
     def bound(self, known: bool) -> None:
         """From here on a word bounds the deviation from the path (``known``), or none does."""
         self._free |= not known
         self.unbounded = self._free
 
-    def blocks(self, raw: str) -> list[str]:
+    def blocks(self, raw: str) -> Sequence[str | tuple[int, str]]:
         """Blocks of one line in the words of ``verify.gcode.block_words``; none for a line without effect.
+
+        A block that belongs to an earlier line comes with that line's number.
 
         Raises BlockError where the line cannot be read, or could be read in two ways.
         """

@@ -1,36 +1,74 @@
 """Fanuc: nearly the words of the reader itself.
 
-Differences: further work offsets are G54.1 P, fast contouring is G05.1 Q, G04 counts ms, ';' ends a block. X10 without
-a decimal point is 10 mm or 0.010 mm, depending on a parameter. Macros (#, [ ]) are refused: GOTO, IF and WHILE of Fanuc
-differ from those of LinuxCNC.
+Differences: further work offsets are G54.1 P, fast contouring is G05.1 Q, G04 and P of cycles count ms, Q without a
+decimal point counts thousandths, ';' ends a block. X10 without a decimal point is 10 mm or 0.010 mm, depending on a
+parameter. Subprograms and macros are followed by ``verify.gcode.macro_flow``.
+
+Words that change speed, smoothing, coolant or devices of the machine move nothing and are left out: they are listed
+here, and an M word that is not known counts as one, with a note. A word that moves or cuts and is not followed is
+refused by its name.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Sequence
 
-from verify.gcode.block_words import bare
-from verify.gcode.dialects.base import NUMBER, BlockError, DialectReader, zero_word
+from verify.gcode.block_words import FURTHER, bare
+from verify.gcode.dialects.base import NUMBER, BlockError, Machine, zero_word
+from verify.gcode.dialects.fanuc_planes import FanucPlanes
+from verify.gcode.macro_flow import MacroFlow, has_macros
 
 _PLAIN = re.compile(r"(?:N[0-9]+ ?)?(?:G0?[01] ?)?(?:[XYZABC][+-]?(?:[0-9]*\.[0-9]*|0) ?)*(?:F[0-9]+\.[0-9]* ?)?\r?")
 _WORD = re.compile(rf"([A-Z])({NUMBER})")
+_NAME = re.compile(r"[O:](?:[0-9]+|<[^<>]*>)?(?:<[^<>]*>)?|<[^<>]*>")
+_DELETED = re.compile(r"(N[0-9]+)?/[1-9]?(?=[A-Z]|$)")
 _FOREIGN: dict[str, frozenset[float]] = {
     "M": frozenset({70, 71, 72, 73, 428, 429}), "G": frozenset({59.1, 59.2, 59.3, 92.2, 92.3})}
 ROUNDING = "parameters of the machine set how far the control rounds corners: the error bound does not include it"
-_PLACES = "XYZABCIJKR"
+_PLACES = "XYZABCIJKRUVW"
+_KNOWN_M = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30})
+IDLE_G: frozenset[float] = frozenset({9, 13.1, 22, 23, 25, 26, 40.1, 50.2, 61, 62, 63, 67, 69.1, 94.1, 97, 113})
+"""G words without effect on a move: exact stop, modes of tapping and cutting, stroke checks, ends of modes."""
+SMOOTHING: frozenset[float] = frozenset({5, 5.1, 5.4, 8, 64, 61.1})
+REFUSED = {
+    2.2: "an involute", 3.2: "an involute", 2.3: "an exponential", 3.3: "an exponential", 2.4: "an arc in space",
+    3.4: "an arc in space", 6.2: "a spline", 7.1: "cylindrical interpolation", 10.6: "a retract",
+    12: "a circular pocket", 12.1: "polar interpolation", 13: "a circular pocket",
+    27: "a check of the reference point", 29: "a return from the reference point", 31: "probing", 33: "threading",
+    36: "probing", 37: "probing", 41.1: "normal direction control", 42.1: "normal direction control",
+    41.2: "compensation in space",
+    42.2: "compensation in space", 45: "a tool offset", 46: "a tool offset", 47: "a tool offset", 48: "a tool offset",
+    60: "positioning from one side", 65: "a macro call", 66: "a macro call", 66.1: "a macro call",
+    53.6: "a turn of the tool", 68.3: "a tilted plane", 68.4: "a tilted plane", 70: "a pattern of holes",
+    71: "a pattern of holes", 72: "a pattern of holes", 77: "back boring", 87: "back boring",
+    88: "boring with a manual retract", 96: "constant surface speed"}
+"""G words that move or cut and are not followed, and what they are."""
 
 
-class FanucReader(DialectReader):
+class FanucReader(FanucPlanes):
     """Fanuc 0i, 30i and relatives."""
 
-    title = "FanucReader"
+    title = "Fanuc"
     further = 54.1
+    local_calls = False
     bounds_path = False
+    further_words = FURTHER
+    repeats = "KL"
     home_from, gives_up_length = 0, True
 
     def __init__(self) -> None:
         super().__init__()
         self.unbounded = True
+        self.polar = False
+        self.hole = False
+
+    def order(self, lines: Sequence[str], machine: Machine) -> Iterator[tuple[int, str]]:
+        """As in the base class; subprograms, macros, jumps and variables are followed (``verify.gcode.macro_flow``)."""
+        self.machine = machine
+        if has_macros(lines):
+            return MacroFlow(lines, machine, self.local_calls).lines_run()
+        return super().order(lines, machine)
 
     def blocks(self, raw: str) -> list[str]:
         """A plain straight move unchanged; every other line word by word.
@@ -40,44 +78,101 @@ class FanucReader(DialectReader):
         BlockError
             The line cannot be read, or could be read in two ways.
         """
-        if _PLAIN.fullmatch(raw):
+        if not self.polar and _PLAIN.fullmatch(raw):
             return [raw]
         text = self._bare(raw)
-        if not text or text == "%" or re.fullmatch(r"O[0-9]+", text):
+        if not text or text == "%":
             return [text] if text else []
-        words = [(a, b) for a, b in _WORD.findall(text.removeprefix("/"))]
-        if "".join(a + b for a, b in words) != text.removeprefix("/"):
+        if _NAME.fullmatch(text):
+            return []
+        deleted = _DELETED.match(text)
+        if deleted:
+            text = (deleted[1] or "") + text[deleted.end():]
+        words = _WORD.findall(text)
+        if "".join(a + b for a, b in words) != text:
             raise BlockError(f"cannot read '{text[:60]}'")
+        words = [(a, b) for a, b in words if not (a == "M" and self._idle_m(b))]
         for letter, digits in words:
             self._check(letter, digits)
         if len(ms := [a + b for a, b in words if a == "M"]) > 1:
             self._several(" and ".join(ms))
+        return self._translated(words, deleted is not None)
+
+    def _translated(self, words: list[tuple[str, str]], deleted: bool) -> list[str]:
+        """Blocks of a line from its words."""
         values = dict(words)
         codes = [float(b) for a, b in words if a == "G"]
+        self._follow(codes)
+        if 68.2 in codes:
+            if 91 in codes:
+                raise BlockError("G68.2 in incremental coordinates (G91)")
+            self.plane(values)
+            return []
+        if 53.1 in codes:
+            return self.square(values)
+        before = self.level() if 69 in codes and self.frame is not None else []
         out = []
+        if self.vectors and not values.keys().isdisjoint("IJK"):
+            arc = not {2.0, 3.0}.isdisjoint(codes) or (self.machine.s.motion in (2, 3) and {0.0, 1.0}.isdisjoint(codes))
+            out = self.vector(values, arc)
+            words = [(a, b) for a, b in words if a not in "IJK"]
         for letter, digits in words:
             out += self._word(letter, digits, codes, values)
         block = " ".join(out)
-        return [f"/{block}" if text.startswith("/") else block, *self._after(codes)]
+        if deleted and not re.search(r"[XYZABCGTFH]", block):  # nothing of it moves the tool
+            deleted = False
+        return [*before, *([f"/{block}" if deleted else block] if block else []), *self._after(codes)]
+
+    def _follow(self, codes: list[float]) -> None:
+        """Keep the modes that the words of later blocks depend on."""
+        if 91 in codes and (self.polar or 16 in codes):
+            raise BlockError("G91 with polar coordinates (G16), which controls read differently")
+        if 15 in codes:
+            self.polar = False
+        if 16 in codes:
+            self.polar = True
+        if not {43.5, 43, 43.4, 49}.isdisjoint(codes):
+            self.vectors = 43.5 in codes
+        for code in codes:
+            if code in (0, 1, 2, 3, 80):
+                self.hole = False
+            elif 73 <= code <= 89:
+                self.hole = True
 
     def _bare(self, raw: str) -> str:
         """The line without comments and blanks."""
-        before, _, after = re.sub(r"\([^()]*\)", " ", raw).partition(";")
+        while (less := re.sub(r"\([^()]*\)", " ", raw)) != raw:
+            raw = less
+        before, _, after = raw.partition(";")
         if after.strip():
             raise BlockError(f"'{after.strip()[:40]}' follows a ; which ends the block: give it its own line")
         text = "".join(bare(before).upper().split())
         if "#" in text or "[" in text:
-            raise BlockError(f"a macro of {self.title} ('{text[:40]}')",
-                             "let the post write plain moves: no macro variables, no GOTO, IF or WHILE")
+            raise BlockError(f"cannot read the macro '{text[:40]}'")
         return text
 
     def _check(self, letter: str, digits: str) -> None:
         number = float(digits)
         if number in _FOREIGN.get(letter, frozenset()):
             raise BlockError(f"{letter}{digits} is a word of LinuxCNC with another meaning, or none, on {self.title}")
-        if letter in _PLACES and "." not in digits and number != 0:
+        if letter == "G" and number in REFUSED and not self._followed(number):
+            raise BlockError(f"unknown word G{number:g} ({REFUSED[number]})")
+        if letter in _PLACES and "." not in digits and number != 0 and not (letter in "IJK" and (
+                self.vectors or letter == "K" and self.hole)):
             raise BlockError(f"{letter}{digits} without a decimal point is {digits} or {number / 1000:g}, depending on "
                              "a parameter of the machine", "write the decimal point: X10. is 10 mm everywhere")
+
+    def _followed(self, code: float) -> bool:
+        """Whether the control has another meaning for a refused word, which is followed."""
+        return False
+
+    def _idle_m(self, digits: str) -> bool:
+        """Whether an M word moves nothing that the proof knows."""
+        number = float(digits)
+        if number in _KNOWN_M or number in _FOREIGN["M"] or number in (96, 97, 98, 99) or number % 1:
+            return False
+        self.notes.append(f"M{number:g} counts as a function of the machine that moves nothing")
+        return True
 
     def _several(self, ms: str) -> None:
         """A block has several M words, named by ``ms``."""
@@ -91,8 +186,18 @@ class FanucReader(DialectReader):
         if letter in "PX" and 4 in codes:
             seconds = float(digits) if letter == "X" or self._in_seconds(digits) else float(digits) / 1000.0
             return [f"P{seconds:.6f}"]
-        taken = {"P": self.further in codes or 187 in codes, "E": 187 in codes,
-                 "Q": 5.1 in codes, "R": 5.1 in codes}
+        if self.hole and letter == "P":
+            return [f"P{float(digits) if self._in_seconds(digits) else float(digits) / 1000.0:.6f}"]
+        if self.hole and letter == "Q" and "." not in digits and float(digits) >= 100:
+            return [f"Q{float(digits) / 1000.0:.6f}"]
+        if letter == "P" and 51 in codes and "." not in digits:
+            raise BlockError(f"G51 P{digits} without a decimal point counts thousandths or hundred-thousandths, "
+                             "depending on a parameter of the machine",
+                             "write the decimal point: P2. doubles everywhere")
+        if self.polar and letter in "XY" and codes_move(codes):
+            return [("@" if letter == "X" else "^") + digits]
+        smooth = not SMOOTHING.isdisjoint(codes)
+        taken = {"P": self.further in codes or smooth or 187 in codes, "E": 187 in codes, "Q": smooth, "R": smooth}
         return [] if taken.get(letter) else [letter + digits]
 
     def _in_seconds(self, digits: str) -> bool:
@@ -102,16 +207,26 @@ class FanucReader(DialectReader):
     def _code(self, code: float, values: dict[str, str]) -> list[str]:
         if code == self.further:
             return [zero_word(6 + int(float(values.get("P", "0"))), f"G{code:g} P{values.get('P', '')}")]
-        if code == 5.1:
-            if float(values.get("Q", "-1")) not in (0.0, 1.0):
-                raise BlockError("G05.1 without Q0 or Q1")
+        if code == 43.5:
+            return ["G43.4"]
+        if code == 5.1 and float(values.get("Q", "-1")) not in (0.0, 1.0):
+            raise BlockError("G05.1 without Q0 or Q1")
+        if code in SMOOTHING:
             self.notes.append(ROUNDING)
             return []
-        if code == 64:
-            self.notes.append(ROUNDING)
+        if code == 76:
+            self.notes.append("G76 is read without its shift at the bottom: a parameter decides its direction")
+        if code in (15, 16) or code in IDLE_G:
             return []
+        if code == 10 and float(values.get("L", "0")) == 20:
+            raise BlockError("G10 L20 (an offset of G54.1): it is not followed")
         return [f"G{code:g}"]
 
     def _after(self, codes: list[float]) -> list[str]:
         """Blocks that follow a block with these G words."""
         return []
+
+
+def codes_move(codes: Sequence[float]) -> bool:
+    """Whether X and Y of a block with these G words are places of a move, not of a shift or a machine place."""
+    return {4, 10, 28, 30, 51, 51.1, 50.1, 52, 53, 68, 92}.isdisjoint(codes)

@@ -1,7 +1,8 @@
-"""Haas: the words of Fanuc, except G234 (tool centre point), G154 P (work offsets), G187 E (rounding), and P of G04.
+"""Haas: the words of Fanuc, with differences.
 
-A whole P of G04 counts ms, one with a decimal point s. F without a decimal point is refused like a coordinate. G28
-cancels the length offset.
+G234 is tool centre point control, G154 P a work offset, G187 smoothness (E: its bound), G101 and G100 mirror. A whole P
+of G04 and of cycles counts ms, one with a decimal point s. F without a decimal point is refused like a coordinate. G28
+cancels the length offset. I of a peck cycle is its first peck, and L the number of holes.
 """
 
 from __future__ import annotations
@@ -9,13 +10,16 @@ from __future__ import annotations
 from verify.gcode.dialects.base import BlockError
 from verify.gcode.dialects.fanuc import FanucReader
 
+_MIRRORS = {101: "G51.1", 100: "G50.1"}
+
 
 class HaasReader(FanucReader):
     """Haas mills, Next Generation Control."""
 
-    title = "HaasReader"
+    title = "Haas"
     further = 154.0
-    bounds_path = True
+    local_calls = bounds_path = True
+    repeats = "L"
 
     def _check(self, letter: str, digits: str) -> None:
         super()._check(letter, digits)
@@ -29,9 +33,18 @@ class HaasReader(FanucReader):
     def _in_seconds(self, digits: str) -> bool:
         return "." in digits
 
+    def _word(self, letter: str, digits: str, codes: list[float], values: dict[str, str]) -> list[str]:
+        if self.hole and letter in "IJK" and not {73, 83}.isdisjoint(codes):
+            return [f"Q{digits}"] if letter == "I" and "Q" not in values else []
+        return super()._word(letter, digits, codes, values)
+
     def _code(self, code: float, values: dict[str, str]) -> list[str]:
         if code == 234:
             return ["G43.4"]
+        if code in _MIRRORS:
+            return [_MIRRORS[int(code)]]
+        if code == 150:
+            raise BlockError("unknown word G150 (a pocket)")
         if code == 187:
             if "E" not in values:
                 self.notes.append("G187 without E: a setting of the machine decides how far the control rounds "

@@ -1,37 +1,69 @@
 """Heidenhain, conversational: a keyword opens each block, FMAX makes a rapid for one block, F is modal.
 
-The reader knows BEGIN and END PGM, BLK FORM, TOOL CALL, TOOL DEF, M words, LBL and STOP. Of motion it knows L, CC with
-C or with CP and IPA, and CR, and the cycles 247 (preset) and 32 (tolerance). It knows PLANE SPATIAL with STAY while
-M128 is on: X, Y, Z count in the setup frame turned about its X, then Y, then Z, the tip stays, and no axis moves. It
-reads M126 and M127 where they make no difference. It refuses by name planes that move axes, radius compensation, other
-incremental words (IX), other arcs, Q parameters, calls and shifts. F of an INCH program counts tenths of an inch.
+Straight moves, arcs, polar moves, roundings, chamfers, approaches and departures are in ``heidenhain_paths``,
+transformed coordinates in ``heidenhain_frames``, cycles in ``heidenhain_cycles``, parameters and jumps in
+``heidenhain_q`` and ``heidenhain_flow``. PLANE SPATIAL turns about X, Y and Z of the setup frame in that order. With
+M128 on and STAY it turns coordinates only. Otherwise it turns the rotary axes (MOVE, TURN), or a block after it does
+(STAY), and the reader keeps the tip in the setup frame from there on. A tool's name is its id in the setup. F of an
+INCH program counts tenths of an inch.
 """
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator, Sequence
 
-from geometry.mesh import F64
-from verify.gcode.dialects.base import NUMBER, BlockError, DialectReader, zero_word
-from verify.gcode.dialects.tilted_planes import placed, turn
+from verify.gcode.dialects.base import NUMBER, BlockError, Machine, zero_word
+from verify.gcode.dialects.heidenhain_cycles import (
+    AT_ONCE,
+    NOT_FOLLOWED,
+    OLD,
+    TOUCHES,
+    CycleCall,
+    cycle_blocks,
+    defined,
+    old_cycle,
+)
+from verify.gcode.dialects.heidenhain_flow import HeidenhainFlow, block_text
+from verify.gcode.dialects.heidenhain_paths import HeidenhainPaths
+from verify.gcode.dialects.heidenhain_q import VALUE
+from verify.gcode.dialects.heidenhain_words import M_AFTER, M_BEFORE
+from verify.gcode.dialects.stated_places import digits
 
 _NUM = r"[+-]?(?:[0-9]{1,8}(?:\.[0-9]*)?|\.[0-9]+)"
-_LINE = re.compile(rf"L((?: +[XYZABC]{_NUM})*)(?: +R0)?(?: +(FMAX|F{_NUM}))?((?: +M[0-9]+)*)")
-_CENTRE = re.compile(rf"CC(?: +X({_NUM}))?(?: +Y({_NUM}))?")
-_ARC = re.compile(rf"(C|CR)((?: +[XYZ]{_NUM})*)(?: +R({_NUM}))? +DR([+-])(?: +R0)?(?: +(F{_NUM}))?")
-_POLAR = re.compile(rf"CP +IPA({_NUM})(?: +Z({_NUM}))? +DR([+-])(?: +R0)?(?: +(F{_NUM}))?")
-_TOOL = re.compile(rf'TOOL CALL(?: +"?([0-9]+)"?)?(?: +([XYZ]))?(?: +S({NUMBER}))?(?: +F({NUMBER}))?'
-                   r"(?: +D[LR][+-]?0*\.?0*)*")
+_LINE = re.compile(rf"\s*(?:[0-9]+ +)?L((?: +[XYZABC]{_NUM})*)(?: +R0)?(?: +(FMAX|F{_NUM}))?((?: +M[0-9]+)*)\s*")
+_TOOL = re.compile(rf'TOOL CALL(?:\s*("[^"]*"|{NUMBER}|QS?[0-9]+))?(?:\s+([XYZUVW])(?![A-Z0-9+-]))?(.*)')
+_TOOL_WORD = re.compile(rf"\s*(S|F|DL|DR2|DR)\s*({VALUE})(?=\s|$)|\s*(VC)\s*=?\s*{VALUE}(?=\s|$)")
 _BEGIN = re.compile(r"BEGIN PGM (?:\S.*)? ?(MM|INCH)")
-_PLANE = re.compile(rf"PLANE SPATIAL SPA({_NUM}) SPB({_NUM}) SPC({_NUM}) STAY")
-_START, _END = (3, 4, 8, 13, 14, 128), (0, 1, 2, 5, 9, 30, 129)  # M words that act at the start or end of the block
+_DOTTED = re.compile(r"CYCL DEF ([0-9]+)\.([0-9]+)\s*(.*)")
+_TCPM = re.compile(rf"FUNCTION TCPM(?:\s+F\s*(TCP|CONT))?(?:\s+AXIS\s*(POS|SPAT))?(?:\s+PATHCTRL\s*(AXIS|VECTOR))?"
+                   rf"(?:\s+REFPNT\s*(\S+))?(?:\s+F\s*{VALUE})?")
+_CALLED = re.compile(r"CYCL CALL(?:\s+(POS|PAT))?\s*(.*)")
+_COORDINATE = re.compile(rf"\s*(I?)([XYZABC])\s*({VALUE})(?=\s|$)")
 SMALL = 0.01
 """deg, deviation of a rotary axis that needs no note."""
-_SHORTEST, _AS_WRITTEN = 126, 127
-HALF_A_TURN = 180.000001  # deg, rounding included
-_WORDS = {13: "M3 M8", 14: "M4 M8", 128: "M428", 129: "M429"}
-_IDLE = ("BLK FORM", "TOOL DEF", "CYCL DEF 32.0", "* -")
+_IDLE = ("BLK FORM", "TOOL DEF", "* -", "*", "FUNCTION PROG PATH", "FUNCTION MODE MILL", "FUNCTION FEED DWELL",
+         "FUNCTION S-PULSE",
+         "FUNCTION DWELL", "WMAT", "CYCL DEF 13.", "FUNCTION COUNT", "FUNCTION FILE", "OPEN TABLE",
+         "FUNCTION FEED RESET",
+         "FUNCTION AFC", "SEL TABLE", "FUNCTION DCM", "FUNCTION SPINDLE", "CYCL DEF 14.",
+         "FUNCTION DRESS OFF")
+_REFUSED = {
+    "FPOL": "a free contour", "FL": "a free contour", "FC": "a free contour", "FLT": "a free contour",
+    "FCT": "a free contour",
+    "FSELECT": "a free contour", "SPL": "a spline", "TCH PROBE": "a touch probe", "PATTERN DEF": "a pattern of points",
+    "CONTOUR DEF": "a contour formula", "SEL PATTERN": "a table of points", "SEL CONTOUR": "a contour formula",
+    "SEL PGM": "another program", "FUNCTION PARAXCOMP": "parallel axes", "FUNCTION PARAXMODE": "parallel axes",
+    "FUNCTION TURNDATA": "turning", "FUNCTION MODE TURN": "turning", "FUNCTION LIFTOFF": "a lift of the tool",
+    "TRANS MIRROR": "a mirror", "TRANS ROTATION": "a rotation", "TRANS SCALE": "a scale",
+    "POLARKIN": "polar kinematics",
+    "FUNCTION POLARKIN": "polar kinematics", "SEL CORR-TABLE": "a correction table",
+    "FUNCTION CORRDATA": "a correction table",
+    "TRANS DATUM TABLE": "a datum table", "SEL TABLE": "a datum table", "FUNCTION TURNING": "turning",
+    "CALL PGM": "another program",
+}
+"""Openings of blocks that move or cut and are not followed, and what they are."""
 
 
 def is_conversational(text: str) -> bool:
@@ -39,7 +71,7 @@ def is_conversational(text: str) -> bool:
     return re.match(r"\s*(?:[0-9]+\s+)?BEGIN PGM\b", text.upper()) is not None
 
 
-class HeidenhainReader(DialectReader):
+class HeidenhainReader(HeidenhainPaths):
     """TNC 320 to 640, iTNC 530, TNC7."""
 
     home_from = 1
@@ -47,178 +79,305 @@ class HeidenhainReader(DialectReader):
     def __init__(self) -> None:
         super().__init__()
         self.unbounded = True
-        self.preset = self.tcp = self.inch = self.shortest = False
-        self.turned: dict[str, float] = {}  # angles of the rotary axes after their words, deg
-        self.plane: F64 | None = None  # columns are its axes in the setup frame
-        self.at = [math.nan] * 3  # setup frame, in the unit of the program
-        self.centre = [math.nan] * 2
+        self.cycle: CycleCall | None = None
+        self.dotted: dict[int, dict[int, str]] = {}
 
-    def blocks(self, raw: str) -> list[str]:
+    def order(self, lines: Sequence[str], machine: Machine) -> Iterator[tuple[int, str]]:
+        """Blocks in the order they run, as ``HeidenhainFlow.run`` has it; raises as that does."""
+        self.machine = machine
+        self.tool = machine.s.tool
+        self.flow = HeidenhainFlow(lines, self.q, machine)
+        for number, raw in self.flow.run():
+            self.number = number
+            yield number, raw
+
+    def blocks(self, raw: str) -> list[str | tuple[int, str]]:
         """Blocks of one line, by its keyword; BlockError where it cannot be read."""
-        text = re.sub(r"^\s*[0-9]+\s+(?=[A-Z*;])", "", raw.upper()).split(";", 1)[0].strip()
-        if m := _LINE.fullmatch(text):
-            return self._straight(m[1], m[2], [int(w[1:]) for w in m[3].split()])
-        if self.preset:
-            return self._preset(text)
-        if not text or text.startswith(_IDLE) or re.fullmatch(r'LBL +(?:[0-9]+|"[^"]*")', text):
+        if self.is_simple and (m := _LINE.fullmatch(raw)) and not _corner_ahead(self.flow.ahead):
+            return list(self._simple(m[1], m[2], [int(w[1:]) for w in m[3].split()]))
+        text = block_text(raw)
+        if not text or text.startswith(_IDLE) and not text.startswith("SEL TABLE"):
             return []
+        if (moved := self.motion_blocks(text)) is not None:
+            return self._called_after(moved)
+        return list(self._other(text))
+
+    @property
+    def is_simple(self) -> bool:
+        """Whether a straight move needs nothing but its words now."""
+        return (self.frame is None and self.held is None and self.approach is None and self.side == 0 and not self.spat
+                and self.wanted is None and not self.modal_call and self.circle is not True
+                and not any(self.wound.values()))
+
+    def _simple(self, places: str, feed: str | None, ms: list[int]) -> list[str]:
+        """L with plain numbers, in coordinates of the setup frame."""
+        if any(m not in M_BEFORE and m not in M_AFTER and m not in (91, 126, 127) for m in ms) or 99 in ms or 89 in ms:
+            return [b if isinstance(b, str) else b[1] for b in self._called_after(
+                self.motion_blocks(f"L {places} {feed or ''} {' '.join(f'M{m}' for m in ms)}") or [])]
+        return self.plain_line(" ".join(places.split()), feed, ms)
+
+    def _other(self, text: str) -> list[str]:
         if m := _BEGIN.fullmatch(text):
             self.inch = m[1] == "INCH"
             return [f"G{21 if m[1] == 'MM' else 20} G17 G90 G94 G40"]
         if m := _TOOL.fullmatch(text):
             return self._tool(m)
-        if re.fullmatch(r"(?:STOP)?(?: *M[0-9]+)*", text):
-            return self._machine([int(w) for w in re.findall(r"M([0-9]+)", text)], "M0" if "STOP" in text else "")
-        if m := _CENTRE.fullmatch(text):
-            self.centre = [c if w is None else float(w) for c, w in zip(self.centre, m.groups(), strict=True)]
-            return []
-        if m := _ARC.fullmatch(text):
-            return self._arc(m)
-        if m := _POLAR.fullmatch(text):
-            return self._polar(m)
+        if text.startswith("CYCL DEF"):
+            return self._define(text)
+        if m := _CALLED.fullmatch(text):
+            return self._call(m[1] or "", m[2])
         if text.startswith("PLANE"):
-            return self._tilt(text)
-        if m := re.fullmatch(rf"CYCL DEF 32\.1(?: T({NUMBER}))?", text):
-            self.bound(float(m[1] or 0.0) != 0.0)
-            if not self.unbounded:
-                return [f"G64 P{float(m[1]):.6f}"]
-            self.notes.append("cycle 32 is off: machine parameters decide how far the control rounds corners; the "
-                              "error bound does not include it")
+            self._unheld("PLANE")
+            out = self.tilt(text)
+            self.q.held.update({f"Q{120 + 'ABC'.index(k)}": v for k, v in self.plane_angles.items()})
+            return out
+        if text.startswith("FUNCTION"):
+            return self._function(text)
+        if text.startswith("TRANS DATUM"):
+            return self._datum(text)
+        if re.fullmatch(r"(?:STOP)?\s*(?:M.*)?", text):
+            out = self.machine_words(text)
+            called, self.calls = self.calls and not self.modal_call, False
+            return [*out, *(self.cycle_there(0.0) if called else [])]
+        if self.q.run(text):
             return []
-        if m := re.fullmatch(rf"CYCL DEF 32\.2(?: HSC-MODE:[01])?(?: TA({NUMBER}))?", text):
-            if m[1] and float(m[1]) > SMALL:
-                self.notes.append(f"cycle 32 allows rotary axes a deviation of {m[1]} deg: the error bound does not "
-                                  "include it")
+        if text.startswith("END PGM"):
+            self._unheld("END PGM")
+            return ["M30"]
+        if re.match(r"QS[0-9]+\s*=", text):
             return []
-        if re.fullmatch(r"CYCL DEF 247( [A-Z -]*)? ?~", text):
-            self.preset = True
-            return []
-        return ["M30"] if text.startswith("END PGM") else self._no(text)
-
-    def _no(self, text: str) -> list[str]:
+        for opening, what in _REFUSED.items():
+            if text.startswith(opening):
+                raise BlockError(f"{text[:40]} ({what}) is not followed", "let the post write plain moves (L, C)")
         raise BlockError(f"cannot read '{text[:60]}'")
 
-    def _tilt(self, text: str) -> list[str]:
-        if re.fullmatch(r"PLANE RESET STAY", text):
-            self.plane = None
-            return []
-        m = _PLANE.fullmatch(text)
-        if m is None or not self.tcp:
-            raise BlockError(f"cannot read '{text[:60]}': the reader knows PLANE SPATIAL and PLANE RESET with STAY, "
-                             "and only while M128 is on")
-        a, b, c = (math.radians(float(v)) for v in m.groups())
-        self.plane = turn(2, c) @ turn(1, b) @ turn(0, a)
-        return []
-
-    def _setup(self, words: str, machine: bool) -> str:
-        """The words with X, Y, Z in the setup frame."""
-        named = {w[0]: w[1:] for w in words.split()}
-        linear = [float(named[k]) if k in named else math.nan for k in "XYZ"]
-        self._turn({k: float(v) for k, v in named.items() if k not in "XYZ"})
-        if machine:
-            self.at = [math.nan if k in named else v for k, v in zip("XYZ", self.at, strict=True)]
-            return words
-        if self.plane is None:
-            self.at = [v if math.isnan(w) else w for v, w in zip(self.at, linear, strict=True)]
-            return words
-        if not named.keys() & set("XYZ"):
-            return words
-        self.at = placed(self.plane, self.at, named)
-        turns = [k + v for k, v in named.items() if k not in "XYZ"]
-        return " ".join([*(f"{k}{v:.9f}" for k, v in zip("XYZ", self.at, strict=True)), *turns])
-
-    def _turn(self, angles: dict[str, float]) -> None:
-        """Record the angles of the rotary words, deg. With M126 only turns of half a turn or less are certain."""
-        for letter, angle in angles.items():
-            way = angle - self.turned.get(letter, angle)
-            if self.shortest and abs(way) > HALF_A_TURN:
-                raise BlockError(f"with M126 {letter} turns by {way:g} deg or by {math.remainder(way, 360.0):g}, "
-                                 "depending on whether its display counts beyond 360 deg",
-                                 "turn by half a turn or less in a block")
-        self.turned.update(angles)
-
-    def _preset(self, text: str) -> list[str]:
-        self.preset = False
-        m = re.fullmatch(r"Q339= *\+?([0-9]+)", text)
-        if m is None:
-            raise BlockError(f"cycle 247 continues with '{text[:40]}' instead of Q339, the row of the preset table")
-        return [zero_word(int(m[1]), f"preset {m[1]}")]
-
     def _tool(self, m: re.Match[str]) -> list[str]:
+        self._unheld("TOOL CALL")
         if m[2] not in (None, "Z"):
             raise BlockError(f"TOOL CALL with the tool axis {m[2]}: only Z is read")
         if self.tcp:
             raise BlockError("TOOL CALL while M128 is on", "program M129 before it and M128 after it")
-        out = [f"S{m[3]}"] if m[3] else []
-        out += [self._feed(f"F{m[4]}")] if m[4] else []
-        if m[1]:
-            self.at[2] = math.nan
-            out = [f"T{m[1]} M6", *out, *([f"G43 H{m[1]}"] if int(m[1]) else [])]
+        given, at, rest = {}, 0, m[3]
+        while rest[at:].strip():
+            w = _TOOL_WORD.match(rest, at)
+            if w is None:
+                raise BlockError(f"cannot read '{rest[at:].strip()[:40]}' of TOOL CALL")
+            if w[1]:
+                given[w[1]] = self.q.value(w[2])
+            at = w.end()
+        out = [f"S{digits(given['S'])}"] if "S" in given else []
+        if "F" in given:
+            self.auto = given["F"]
+            self.rate = self.feed_word(given["F"])
+            out.append(self.rate)
+        if m[1] is None:
+            return [*out] if not out else [" ".join(out)]
+        number = self._numbered(m[1])
+        self.tool, self.wider = number, given.get("DR", 0.0) * self.factor_of_unit
+        self.forget()
+        self.lengthen(given.get("DL", 0.0) * self.factor_of_unit)
+        if self.longer and self.swung:
+            raise BlockError("TOOL CALL with DL in a tilted plane")
+        if given.get("DR2", 0.0):
+            self.notes.append("TOOL CALL with DR2 changes the compensation in space only; the reader has none")
+        return [" ".join([f"T{number} M6", *out]), *([f"G43 H{number}"] if number else [])]
+
+    def _numbered(self, word: str) -> int:
+        """T number of a tool by its name (the id of the setup), its number, or a parameter."""
+        if word.startswith('"'):
+            name = word[1:-1]
+            names = {k.upper(): v for k, v in self.names.items()}
+            found = self.names.get(name, names.get(name.upper()))
+            if found is None and re.fullmatch("T?[0-9]+", name.upper()):
+                found = int(name.upper().removeprefix("T"))
+            if found is None:
+                raise BlockError(f'TOOL CALL "{name}": no tool of the setup has this id',
+                                 f"give a tool of the setup the id {name}" + (
+                                     f" (it has {', '.join(sorted(self.names)[:8])})" if self.names else ""))
+            return found
+        if word.startswith("QS"):
+            raise BlockError(f"TOOL CALL {word}: texts in parameters are not followed", "write the name of the tool")
+        number = self.q.value(word)
+        if number != int(number) or number < 0:
+            raise BlockError(f"TOOL CALL {word}: tools with an index are not followed")
+        return int(number)
+
+    def _define(self, text: str) -> list[str]:
+        self._unheld("CYCL DEF")
+        if m := _DOTTED.fullmatch(text):
+            return self._dotted(int(m[1]), int(m[2]), m[3].strip())
+        call = defined(text, self.q.value)
+        if call is None:
+            raise BlockError(f"cannot read '{text[:60]}'")
+        self.q.held.update({k: v for k, v in call.values.items() if math.isfinite(v)})
+        n = call.number
+        if n == 247:
+            row = call.values.get("Q339")
+            if row is None or row != int(row):
+                raise BlockError(f"cycle 247 continues with '{text.partition('247')[2].strip()[:40]}' instead of Q339, "
+                                 f"the row "
+                                 "of the preset table")
+            self.reset_frames()
+            return [zero_word(int(row), f"preset {int(row)}")]
+        if n in AT_ONCE or n in TOUCHES or n in (290, 800, 801, 880) or 1000 <= n:
+            what = NOT_FOLLOWED.get(n, "a touch probe" if n in TOUCHES or n >= 1000 else "turning")
+            raise BlockError(f"cycle {n} ({what}) is not followed")
+        if n in (7, 8, 9, 10, 11, 19, 26, 32):
+            raise BlockError(f"cannot read '{text[:60]}'")
+        self.cycle = call
+        return []
+
+    def _dotted(self, cycle: int, part: int, rest: str) -> list[str]:
+        """A block CYCL DEF n.k of an older cycle."""
+        if part == 0:
+            self.dotted[cycle] = {}
+            if cycle in (20, 21, 22, 23, 24, 25, 27, 28, 29, 39):
+                self.cycle = CycleCall(cycle, {})
+            elif cycle in OLD:
+                self.cycle = None
+            elif cycle not in (7, 8, 9, 10, 11, 13, 14, 32):
+                raise BlockError(f"cycle {cycle} is not followed")
+            return []
+        items = self.dotted.setdefault(cycle, {})
+        items[part] = rest
+        if cycle == 7:
+            self.shift_datum(self._shifts(rest))
+        elif cycle == 8:
+            axes = "".join(rest.split())
+            if re.fullmatch("[XYZ]*", axes) is None:
+                raise BlockError(f"cycle 8 with '{rest[:20]}'")
+            self.mirror(axes)
+        elif cycle == 9:
+            return [f"G4 P{digits(self._single(rest, 'DWELL|V.ZEIT|VZEIT|'))}"]
+        elif cycle == 10:
+            self.rotate(math.radians(self._single(rest, "I?ROT")), "IROT" in rest)
+        elif cycle == 11:
+            self.scale(self._single(rest, "SCL"))
+        elif cycle == 32:
+            return self._tolerant(part, rest)
+        return []
+
+    def _single(self, rest: str, word: str) -> float:
+        m = re.fullmatch(rf"(?:{word})\s*({VALUE})(?:\s+DIST\s*{VALUE})?", rest)
+        if m is None:
+            raise BlockError(f"cannot read '{rest[:40]}' of a cycle")
+        return self.q.value(m[1])
+
+    def _shifts(self, rest: str) -> dict[str, tuple[float, bool]]:
+        """Words of a datum shift, mm."""
+        out: dict[str, tuple[float, bool]] = {}
+        at = 0
+        while rest[at:].strip():
+            m = _COORDINATE.match(rest, at)
+            if m is None or m[2] not in "XYZ":
+                raise BlockError(f"a datum shift with '{rest[at:].strip()[:30]}' is not followed: X, Y and Z are")
+            out[m[2]] = (self.q.value(m[3]) * self.factor_of_unit, bool(m[1]))
+            at = m.end()
         return out
 
-    def _straight(self, places: str, feed: str | None, ms: list[int]) -> list[str]:
-        if self.plane is not None and 91 in ms:
-            raise BlockError("M91 in a tilted plane")
-        if self.tcp and 91 in ms:
-            raise BlockError("M91 while M128 is on", "program M129 in a block before")
-        self.shortest |= _SHORTEST in ms
-        words = self._setup(" ".join(places.split()), 91 in ms)
-        feed = self._feed(feed) if feed and feed != "FMAX" else feed
-        ms = self._switch(ms)
-        if not ms:
-            return [f"G0 {words}" if feed == "FMAX" else f"G1 {words} {feed}" if feed else f"G1 {words}"]
-        if unknown := [m for m in ms if m not in (*_START, *_END, 91)]:
-            raise BlockError(f"unknown word M{unknown[0]}")
-        motion = "G0" if feed == "FMAX" else "G1"
-        machine = "G53 " if 91 in ms else ""
-        rate = feed if feed and feed != "FMAX" else ""
-        block = f"{machine}{motion} {words} {rate}".strip() if words else rate
-        before = [_WORDS.get(m, f"M{m}") for m in ms if m in _START]
-        after = [_WORDS.get(m, f"M{m}") for m in ms if m in _END]
-        return [*before, *([block] if block else []), *after]
+    def _tolerant(self, part: int, rest: str) -> list[str]:
+        """Cycle 32: the tolerance of the path, and that of rotary axes."""
+        if part == 1:
+            m = re.fullmatch(rf"(?:T\s*({VALUE}))?", rest)
+            if m is None:
+                raise BlockError(f"cannot read '{rest[:40]}' of cycle 32")
+            tolerance = self.q.value(m[1]) if m[1] else 0.0
+            self.bound(tolerance != 0.0)
+            if tolerance:
+                return [f"G64 P{tolerance:.6f}"]
+            self.notes.append("cycle 32 is off: machine parameters decide how far the control rounds corners; the "
+                              "error bound does not include it")
+            return []
+        m = re.fullmatch(rf"(?:HSC-MODE:[01])?\s*(?:TA\s*({VALUE}))?", rest)
+        if m is None:
+            raise BlockError(f"cannot read '{rest[:40]}' of cycle 32")
+        if m[1] and self.q.value(m[1]) > SMALL:
+            self.notes.append(f"cycle 32 allows rotary axes a deviation of {m[1]} deg: the error bound does not "
+                              "include it")
+        return []
 
-    def _feed(self, word: str) -> str:
-        """The F word in units of the program per minute: F10 is one inch per minute in an INCH program."""
-        return f"F{0.1 * float(word[1:]):.9f}" if self.inch else word
+    def _datum(self, text: str) -> list[str]:
+        """TRANS DATUM AXIS and TRANS DATUM RESET."""
+        self._unheld("TRANS DATUM")
+        if text == "TRANS DATUM RESET":
+            self.shift_datum(dict.fromkeys("XYZ", (0.0, False)))
+            return []
+        if not text.startswith("TRANS DATUM AXIS"):
+            raise BlockError(f"{text[:40]} (a datum table) is not followed")
+        self.shift_datum(self._shifts(text.removeprefix("TRANS DATUM AXIS")))
+        return []
 
-    def _switch(self, ms: list[int]) -> list[int]:
-        """The M words without M126 and M127, which are kept as state."""
-        self.tcp = 129 not in ms and (self.tcp or 128 in ms)
-        self.shortest = _AS_WRITTEN not in ms and (self.shortest or _SHORTEST in ms)
-        return [m for m in ms if m not in (_SHORTEST, _AS_WRITTEN)]
+    def _function(self, text: str) -> list[str]:
+        self._unheld("FUNCTION")
+        if text.startswith("FUNCTION RESET TCPM"):
+            self.tcp, self.spat, self.circle = False, False, None
+            return ["M429"]
+        m = _TCPM.fullmatch(text)
+        if m is None:
+            for opening, what in _REFUSED.items():
+                if text.startswith(opening):
+                    raise BlockError(f"{text[:40]} ({what}) is not followed")
+            raise BlockError(f"cannot read '{text[:60]}'")
+        if m[4] not in (None, "TIP-TIP"):
+            raise BlockError(f"FUNCTION TCPM with REFPNT {m[4]}: only the tip (TIP-TIP) is followed")
+        if self.longer:
+            raise BlockError("FUNCTION TCPM after TOOL CALL with DL is not followed")
+        self.tcp, self.spat, self.circle = True, m[2] == "SPAT", m[3] == "VECTOR"
+        self.spatial = {}
+        self.forget()
+        return ["M428"]
 
-    def _arc(self, m: re.Match[str]) -> list[str]:
-        """C round the centre of CC, or CR by a radius, whose sign chooses between the two arcs."""
-        start, words = list(self.at), self._setup(" ".join(m[2].split()), False)
-        if (m[1] == "CR") != (m[3] is not None):
-            raise BlockError(f"{m[1]} {'without' if m[1] == 'CR' else 'with'} a radius R")
-        return self._round(words, f"R{m[3]}" if m[3] else self._offset("C", start), m[4], m[5])
+    def _call(self, kind: str, rest: str) -> list[str]:
+        """CYCL CALL, CYCL CALL POS X Y Z."""
+        self._unheld("CYCL CALL")
+        if kind == "PAT":
+            raise BlockError("CYCL CALL PAT (a pattern or table of points) is not followed")
+        over, out = 0.0, []
+        if kind == "POS":
+            words, over = self.position(rest)
+            out += words
+            return [*out, *self.cycle_there(over, self.cycle_place)]
+        before, after = self.ordered_words(rest)
+        self.calls = False
+        return [*before, *self.cycle_there(over), *after]
 
-    def _polar(self, m: re.Match[str]) -> list[str]:
-        """CP round the centre of CC by an angle of less than a turn in the direction DR; Z makes a helix."""
-        angle = math.radians(float(m[1]))
-        if not 0.0 < abs(angle) < 2.0 * math.pi or (angle > 0.0) != (m[3] == "+"):
-            raise BlockError(f"CP IPA{m[1]} DR{m[3]}: the angle must be less than a turn and have the sign of DR")
-        start, centre = list(self.at), self._offset("CP", self.at)
-        (u, v), c, s = [a - b for a, b in zip(start[:2], self.centre, strict=True)], math.cos(angle), math.sin(angle)
-        end = [self.centre[0] + c * u - s * v, self.centre[1] + s * u + c * v]
-        words = " ".join([*(f"{k}{p:.12f}" for k, p in zip("XY", end, strict=True)), *([f"Z{m[2]}"] if m[2] else [])])
-        return self._round(self._setup(words, False), centre, m[3], m[4])
+    def cycle_there(self, over: float, place: Sequence[float] | None = None) -> list[str]:
+        """Blocks of the cycle in force at a place, where the tool stands if None.
 
-    def _offset(self, word: str, start: list[float]) -> str:
-        """Words I and J: the centre of an arc relative to its start."""
-        if any(math.isnan(v) for v in (*start[:2], *self.centre)):
-            raise BlockError(f"{word} needs a centre (CC) and a start that the program has stated")
-        return " ".join(f"{k}{c - s:.12f}" for k, c, s in zip("IJ", self.centre, start, strict=False))
+        over  : mm, added to the surface
+        place : (3,) mm, in the coordinates of the control
 
-    def _round(self, words: str, centre: str, sense: str, feed: str | None) -> list[str]:
-        if self.plane is not None:
-            raise BlockError("an arc in a tilted plane")
-        block = f"{'G3' if sense == '+' else 'G2'} {words} {centre}"
-        return [f"{block} {self._feed(feed)}" if feed else block]
+        Raises
+        ------
+        BlockError
+            No cycle is defined, or it cannot be followed.
+        """
+        self.uncompensated("a drilling cycle")
+        here = self.here() if place is None else place
+        call = self.cycle
+        if call is None:
+            number = max((n for n in self.dotted if n in OLD and self.dotted[n]), default=0)
+            if not number:
+                raise BlockError("a call of a cycle, and none is defined")
+            if math.isnan(here[2]):
+                raise BlockError(f"cycle {number} at a height that the program has not stated")
+            call = old_cycle(number, self.dotted[number], here[2] / self.unit, self.q.value)
+        radius = self.machine.radii.get(self.tool)
+        blocks = cycle_blocks(call, here, self.machine, over, self.feed_word, radius)
+        return [*blocks, *([self.rate] if self.rate and any("F" in b for b in blocks) else [])]
 
-    def _machine(self, ms: list[int], stop: str) -> list[str]:
-        ms = self._switch(ms)
-        if unknown := [m for m in ms if m not in (*_START, *_END)]:
-            raise BlockError(f"unknown word M{unknown[0]}")
-        return [*(_WORDS.get(m, f"M{m}") for m in ms), *([stop] if stop else [])]
+    def _called_after(self, blocks: list[str | tuple[int, str]]) -> list[str | tuple[int, str]]:
+        """Blocks of a move, with the cycle that M99 or M89 calls at its end."""
+        if not self.calls:
+            return blocks
+        self.calls = False
+        if self.held is not None:
+            raise BlockError("M99 or M89 before a rounding or chamfer")
+        return [*blocks, *self.cycle_there(0.0, self.end)]
+
+
+def _corner_ahead(raw: str) -> bool:
+    return "RND" in raw or "CHF" in raw or "rnd" in raw or "chf" in raw
+
+
+__all__ = ["SMALL", "HeidenhainReader", "is_conversational"]

@@ -1,42 +1,61 @@
 """Siemens 840D: names as well as letters, = before a value, ';' before a comment, cycles with arguments.
 
-Only the length of the first cutting edge, D1, is known; a new tool has it at once (machine data 20270). The reader
-refuses by name computed values (R parameters, DEF, IF, GOTO, subprograms) and programmed frames. TRAORI and TRAFOOF may
-switch the work offset off (G500): a move after one of them is refused until the program states a work offset again,
-unless it suppresses all frames (SUPA, G53). Of swivelled planes the reader knows CYCLE800 with direction 0 while TRAORI
-is on, which moves no axis: X, Y, Z count in the setup frame turned about its X, then the new Y and new Z (mode 57).
+Only the length of the first cutting edge, D1, is known; a new tool has it at once (machine data 20270). A tool's name
+is its id in the setup. R parameters, variables, subprograms, loops and jumps are followed where the file has them
+(``siemens_flow``). TRAORI and TRAFOOF may switch the work offset off (G500): a move after one of them is refused until
+the program states a work offset again, unless it suppresses all frames (SUPA, G53). CYCLE800 with direction 0, while
+TRAORI is on, turns coordinates and moves no axis. With direction -1 or 1 it turns the axes, and the reader keeps the
+tip in the setup frame from there on. The coordinates are the setup frame turned about its X, then the new Y and new Z
+(mode 57).
 """
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator, Sequence
 
-from geometry.mesh import F64
-from verify.gcode.dialects.base import NUMBER, ZEROS, BlockError, DialectReader, zero_word
-from verify.gcode.dialects.tilted_planes import placed, turn
+from verify.gcode.dialects.base import NUMBER, ZEROS, BlockError, Machine, zero_word
+from verify.gcode.dialects.siemens_cycles import DrillingCall, drilling_blocks, row_of_holes
+from verify.gcode.dialects.siemens_expressions import MAX_ELEMENTS, Value, ValueReader, Variables
+from verify.gcode.dialects.siemens_flow import LABEL, NUMBERED, PLAIN, SiemensFlow, statement
+from verify.gcode.dialects.siemens_moves import CURVES, Line, SiemensMoves
+from verify.gcode.dialects.siemens_swivel import is_number
+from verify.gcode.dialects.siemens_words import (
+    COMPRESSORS,
+    ENVELOPES,
+    IDLE,
+    IDLE_CALLS,
+    IDLE_CODES,
+    IDLE_VALUES,
+    MOVES,
+    NOT_FOLLOWED,
+    REFUSED,
+    SAME,
+    SHARP_STYLE,
+    SIEMENS_STYLE,
+    UNBOUNDED,
+    UNITS,
+)
+from verify.gcode.dialects.stated_places import digits
+from verify.program.arc_chords import PLANE_AXES
 
-_NUM = r"[+-]?(?:[0-9]{1,8}(?:\.[0-9]*)?|\.[0-9]+)"
-_PLAIN = re.compile(rf"(?:N[0-9]+ ?)?(?:G[01] ?)?(?:[XYZABC]{_NUM} ?)*(?:F{_NUM} ?)?\r?")
-_TOKEN = re.compile(rf"""\s*(?:(?P<call>[A-Z_][A-Z_0-9]*)\s*\((?P<args>[^()]*)\)
-    |(?P<name>[A-Z_][A-Z_0-9]*)\s*=\s*(?P<value>"[^"]*"|[^\s;"]+)
-    |(?P<letter>[A-Z])(?P<digits>{NUMBER})(?![A-Z_0-9.])
-    |(?P<word>[A-Z_][A-Z_0-9]*))""", re.VERBOSE)
-_PLACE = re.compile(rf"([XYZ])({_NUM}|NAN)")
-_LABEL = re.compile(r"(?:N[0-9]+\s+)?[A-Z_]{2}[A-Z_0-9]*:")
 SMALL = 0.01
 """deg, deviation of a tool axis that needs no note: 0.01 mm at 57 mm above the tip."""
-_MARKS = re.compile(r"^\s*(?:N[0-9]+\s+)?[^;(\n]*\b(?:TRAORI|TRAFOOF|CYCLE8[0-9]{2}\s*\(|SUPA|G710|G700|G641|G642|G645"
-                    r"|COMPCAD|COMPOF|FFWON|ORIAXES|ORIMKS|ORIWKS)\b|^%_N_|^;\$PATH", re.MULTILINE)
-_SAME = frozenset({0, 1, 2, 3, 17, 18, 19, 40, 53, 54, 55, 56, 57, 90, 91, 93, 94, 95})
-_UNITS = {700: 20, 710: 21, 71: 21}
-_LOSING = frozenset({"G20", "G21", "M6"})
-"""Words of the reader that change the meaning of coordinates or make the place unknown."""
-_PLANELESS = frozenset({"G2", "G3", "G53", "G91", "G93", "M6", "M428", "M429", *ZEROS})
-"""Words that are refused in a plane of CYCLE800."""
-_IDLE = frozenset({"ORIMKS", "ORIAXES", "FFWON", "FFWOF", "SOFT", "BRISK", "COMPOF", "DIAMOF", "CFTCP"})
-_UNBOUNDED = frozenset({64, 642, 643, 644, 645})
-_M = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30})
+_MARKS = re.compile(r"^\s*(?:N[0-9]+\s+)?[^;(\n]*\b(?:TRAORI|TRAFOOF|CYCLE8[0-9]{1,2}\s*\(|SUPA|G710|G700|G641|G642"
+                    r"|G645|COMPCAD|COMPOF|FFWON|ORIAXES|ORIMKS|ORIWKS|MCALL|WORKPIECE\s*\(|MSG\s*\(|G[123]\b.*\bCR=|A?TRANS\s+[XYZ]"
+                    r"|A?ROT\s+(?:[XYZ]|RPL=)|PROC\s+[A-Z]|R[0-9]+=|GOTO[FB]\s)|^%_N_|^;\$PATH", re.MULTILINE)
+_LETTER = re.compile(r"([A-Z])([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?!_)")
+_NAME = re.compile(r"\$?[A-Z_][A-Z_0-9]*")
+_PLACED = re.compile(r"(AC|IC|DC|ACP|ACN)\s*\(")
+_DEF = re.compile(r"DEF\s+(?:(?:NCK|CHAN)\s+)?(?:SYNR\s+|SYNW\s+|SYNRW\s+)?"
+                  r"(REAL|INT|BOOL|CHAR|STRING\s*\[\s*[0-9]+\s*\])\s+")
+_HARMLESS = re.compile(r"\$(?:AC_TIMER|AC_MARKER|AC_PARAM|A_OUT|A_DB[BWDR]|A_DLB|AC_SYNA)")
+"""Values of the control that move nothing: timers, counters and outputs."""
+_FRAMES = frozenset({"TRANS", "ATRANS", "ROT", "AROT", "MIRROR", "AMIRROR", "SCALE", "ASCALE"})
+_ORIENTS = {"ORIWKS": True, "ORIVECT": True, "ORIPLANE": True, "ORIMKS": False, "ORIAXES": False}
+_M = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 40, 41, 42, 43, 44, 45})
+_GEARS = frozenset({40, 41, 42, 43, 44, 45})
 
 
 def is_siemens(text: str) -> bool:
@@ -44,23 +63,54 @@ def is_siemens(text: str) -> bool:
     return bool(_MARKS.search(text.upper()))
 
 
-class SiemensReader(DialectReader):
+class SiemensReader(SiemensMoves):
     """840D sl, 828D and ONE."""
 
     home_from, gives_up_length = 1, True
+    style = SIEMENS_STYLE
 
     def __init__(self) -> None:
         super().__init__()
         self.unbounded = True
         self.tool = self.selected = 0
+        self.edge = 1
         self.loose = ""
         self.lost = ""  # the word after which the program has not stated a work offset
-        self.tcp = self.relative = False
-        self.plane: F64 | None = None  # columns are its axes in the setup frame
-        self.at = [math.nan] * 3  # setup frame, while a plane is on
-        self.trail: list[str] = []  # blocks with coordinates since the last plane
+        self.moved = False
+        self.variables = Variables(self._served)
 
-    def blocks(self, raw: str) -> list[str]:
+    def order(self, lines: Sequence[str], machine: Machine) -> Iterator[tuple[int, str]]:
+        """Lines in the order they run, as ``SiemensFlow.run`` has it; raises as that does."""
+        self.machine = machine
+        self.tool = self.selected = machine.s.tool
+        flow = SiemensFlow(lines, self.variables, machine, self._modes)
+        for number, raw in flow.run(lambda: self.moved):
+            self.number = number
+            yield number, raw
+
+    def _modes(self) -> str:
+        """Words that restore the modes of now."""
+        s = self.machine.s
+        motion = [f"G{self.motion}"] if isinstance(self.motion, int) else []
+        return " ".join([f"G{s.plane}", "G91" if s.relative else "G90", *motion])
+
+    def _served(self, name: str, index: str) -> Value:
+        """A value of the control."""
+        if name in ("$AA_IW", "$P_EP", "$AA_IWP") and index in ("X", "Y", "Z"):
+            place = self.here()["XYZ".index(index)]
+            if place == place:
+                return place / self.unit
+            raise BlockError(f"{name}[{index}] is unknown because the program has not stated {index}")
+        if name in ("$P_TOOLNO", "$TC_MPP6"):
+            return float(self.tool)
+        if name == "$P_TOOLR" and self.tool in self.machine.radii:
+            return self.machine.radii[self.tool] / self.unit
+        if name == "$PI":
+            return math.pi
+        raise BlockError(f"{name}{f'[{index}]' if index else ''} is a value of the control that the proof cannot know",
+                         "write the number instead")
+
+    def blocks(self, raw: str) -> list[str | tuple[int, str]]:
         """A plain straight move unchanged; every other line word by word.
 
         Raises
@@ -68,233 +118,487 @@ class SiemensReader(DialectReader):
         BlockError
             The line cannot be read, or could be read in two ways.
         """
-        if not self.lost and _PLAIN.fullmatch(raw):
-            if self.plane is not None:
-                return [self._in_plane(raw.split())]
-            self.trail.append(raw)
+        self.moved = False
+        if PLAIN.fullmatch(raw) and self._is_plain():
+            self.note_place()
+            self.moved = "X" in raw or "Y" in raw or "Z" in raw
+            if (at := raw.find("G")) >= 0:
+                self.motion = int(raw[at + 1])
             return [raw]
-        if raw.startswith("%_N_"):
+        if raw.startswith("%"):
             return []
-        text = raw.split(";", 1)[0].upper().strip()
-        if label := _LABEL.match(text):
+        text = statement(raw)
+        skipped = text.startswith("/")
+        if skipped:
+            text = re.sub(r"^/[0-9]?\s*", "", text)
+        if label := LABEL.match(text):
             text = text[label.end():].strip()
+        elif number := NUMBERED.match(text):
+            text = text[number.end():].strip()
         if not text:
             return []
-        if text.startswith(("/", "%")):
-            raise BlockError(f"cannot read '{text[:40]}'")
-        return self._words(text)
+        if text.startswith("DEF "):
+            return list(self._definition(text))
+        out = self._words(text)
+        return [f"/{b}" if isinstance(b, str) else b for b in out] if skipped else out
 
-    def _words(self, text: str) -> list[str]:
-        out: list[str] = []
-        values: dict[str, float] = {}
-        codes: list[int] = []
-        after: list[str] = []
-        at = 0
-        while at < len(text):
-            m = _TOKEN.match(text, at)
-            if m is None:
-                raise BlockError(f"cannot read '{text[at:at + 40].strip()}'")
-            at = m.end()
-            while at < len(text) and text[at] == " ":
-                at += 1
-            if m["call"]:
-                out += self._call(m["call"], m["args"])
-            elif m["name"]:
-                self._value(m["name"], m["value"], values, out)
-            elif m["letter"]:
-                self._letter(m["letter"], m["digits"], codes, out, after)
-            else:
-                out += self._name(m["word"])
-        if any(54 <= n <= 57 or 505 <= n <= 599 for n in codes):
-            self.lost = ""
-        if self.lost and "G53" not in out and any(w[0] in "XYZABC" for w in out):
-            raise BlockError(f"a move after {self.lost} without a work offset: it may be off (G500)",
-                             "state the work offset (G54 to G57, G505 and up) before the move")
-        out += self._path(codes, values)
-        self._follow(out)
-        if self.plane is not None and any(w[0] in "XYZ" for w in out):
-            out = [self._in_plane(out)]
-        if 4 in codes:
-            out = [f"G4 P{w[1:]}" for w in out if w[0] == "F"]
-            if not out:
-                raise BlockError("G4 without F (seconds)")
-        return [" ".join(out), *after] if out or after else []
+    def _is_plain(self) -> bool:
+        """Whether a straight move needs nothing but its words now."""
+        return (not self.lost and self.frame is None and not self.cornering and self.motion not in CURVES
+                and self.cycle is None and self.machine.s.motion in (self.motion, None) and self.circle is not True)
 
-    def _follow(self, out: list[str]) -> None:
-        """Record the place of the tool and the blocks that a plane depends on."""
-        if self.plane is not None:
-            barred = [w for w in out if w in _PLANELESS or w[0] in "IJK"]
-            if barred:
-                raise BlockError(f"{barred[0]} in a plane of CYCLE800", "end the plane with CYCLE800() before")
-            return
-        if self.relative or not _LOSING.isdisjoint(out):
-            self.trail.append("XNAN YNAN ZNAN")
-        if "G91" in out or "G90" in out:
-            self.relative = "G91" in out
-        if not self.relative:
-            self.trail.append(" ".join(f"{w[0]}NAN" if "G53" in out else w for w in out if w[0] in "XYZ"))
-
-    def _in_plane(self, words: list[str]) -> str:
-        """The block with X, Y, Z in the setup frame."""
-        named = {w[0]: w[1:] for w in words if w[0] in "XYZ"}
-        if not named or self.plane is None:
-            return " ".join(words)
-        self.at = placed(self.plane, self.at, named)
-        rest = [w for w in words if w[0] not in "XYZ"]
-        places = [f"{k}{v:.9f}" for k, v in zip("XYZ", self.at, strict=True)]
-        head = [w for w in rest if w[0] in "NG"]
-        return " ".join([*head, *places, *(w for w in rest if w[0] not in "NG")])
-
-    def _swivel(self, parts: list[str]) -> None:
-        """CYCLE800: turn the coordinates, or turn them back."""
-        if parts == [""]:
-            if self.plane is not None:
-                self.trail = [" ".join(k + f"{v:.12f}" for k, v in zip("XYZ", self.at, strict=True))]
-            self.plane = None
-            return
-        call = f"CYCLE800({','.join(parts)})"[:60]
-        numbers = [parts[0], *parts[2:15]]
-        if not 15 <= len(parts) <= 16 or not all(re.fullmatch(NUMBER, p) for p in numbers) or parts[15:] not in (
-                [], [""], ["0"]):
-            raise BlockError(f"{call} needs its 15 arguments as plain numbers, the second a name")
-        given = [float(n) for n in numbers]
-        if given[12] != 0.0 or not self.tcp:
-            raise BlockError(f"{call} needs direction 0, which moves no axis, and TRAORI on")
-        if given[:3] not in ([0.0, 0.0, 57.0], [0.0, 200000.0, 57.0]) or any(given[3:6]) or any(given[9:12]):
-            raise BlockError(f"{call} needs a new plane without retract (0), axis by axis about X, Y, Z (57), without "
-                             "shifts")
-        if self.relative or self.plane is not None:
-            raise BlockError(f"{call} in incremental coordinates, or within the plane of another CYCLE800")
-        a, b, c = (math.radians(v) for v in given[6:9])
-        self.at, self.plane = self._here(), turn(0, a) @ turn(1, b) @ turn(2, c)
-
-    def _here(self) -> list[float]:
-        """Place of the tool after the blocks so far, nan where they do not state it."""
-        found: dict[str, float] = {}
-        for block in reversed(self.trail):
-            for letter, value in _PLACE.findall(block):
-                found.setdefault(letter, float(value))
-            if len(found) == 3:
+    def _definition(self, text: str) -> list[str]:
+        """DEF: new variables, with their first values."""
+        m = _DEF.match(text)
+        if m is None:
+            raise BlockError(f"cannot read '{text[:50]}': variables of REAL, INT, BOOL, CHAR and STRING are followed")
+        kind = m[1].split("[")[0].strip()
+        reader = ValueReader(text, self.variables, m.end())
+        while True:
+            reader.skip()
+            name = _NAME.match(text, reader.at)
+            if name is None:
+                raise BlockError(f"cannot read the name of a variable at '{text[reader.at:reader.at + 30]}'")
+            reader.at = name.end()
+            self._define(kind, name[0], reader)
+            if not reader.takes(","):
                 break
-        return [found.get(k, math.nan) for k in "XYZ"]
+        if text[reader.at:].strip():
+            raise BlockError(f"cannot read '{text[reader.at:].strip()[:40]}'")
+        return []
 
-    def _path(self, codes: list[int], values: dict[str, float]) -> list[str]:
-        """Words that bound the rounding of corners."""
-        if 641 in codes:
-            if "ADIS" not in values:
-                raise BlockError("G641 without ADIS in its block: the rounding of corners is unknown")
-            self.bound(True)
-            return [f"G64 P{max(values['ADIS'], values.get('ADISPOS', 0.0)):.6f}"]
-        if "ADIS" in values or "ADISPOS" in values:
-            raise BlockError("ADIS without G641 in its block")
-        return ["G64"] if not _UNBOUNDED.isdisjoint(codes) else []
-
-    def _letter(self, letter: str, digits: str, codes: list[int], out: list[str], after: list[str]) -> None:
-        number = float(digits)
-        if letter in "XYZABCIJKFS":
-            out.append(letter + digits)
+    def _define(self, kind: str, name: str, reader: ValueReader) -> None:
+        sizes = reader.index()
+        nothing: Value = "" if kind == "STRING" else 0.0
+        if not sizes:
+            self.variables.define(kind, name, reader.value(2) if reader.takes("=") else nothing)
             return
-        if letter not in "GMTDN" or number != int(number) or number < 0:
-            raise BlockError(f"unknown word {letter}{digits}")
+        if min(sizes) < 1 or len(sizes) > 3 or math.prod(sizes) > MAX_ELEMENTS:
+            raise BlockError(f"{name}{list(sizes)} is an array that the reader does not hold")
+        places: list[tuple[int, ...]] = [()]
+        for size in sizes:
+            places = [(*p, k) for p in places for k in range(size)]
+        held = dict.fromkeys(places, nothing)
+        if reader.takes("="):
+            bracketed = reader.takes("SET(") or reader.takes("(")
+            for place in places:
+                held[place] = reader.value(2)
+                if not reader.takes(","):
+                    break
+            if bracketed:
+                reader.need(")")
+        self.variables.define(kind, name, held)
+
+    def _words(self, text: str) -> list[str | tuple[int, str]]:
+        line = Line()
+        reader = ValueReader(text, self.variables)
+        if text.startswith("MCALL"):
+            line.modal, reader.at = True, len("MCALL")
+            self.cycle = None
+        while True:
+            reader.skip()
+            if reader.at >= len(text):
+                break
+            self._word(reader, line)
+        if line.change:  # T and D may stand behind M6
+            stated = [w for w in line.out if w.startswith(("G43 H", "G49"))]
+            line.out = [w for w in line.out if w not in stated]
+            self.tool, self.edge = self.selected, self.edge if stated else 1
+            self.forget()
+            line.after.insert(0, f"G43 H{self.tool}" if self.edge else "G49")
+        if line.frame:
+            return list(self._framed(line))
+        return self._block(line)
+
+    def _word(self, reader: ValueReader, line: Line) -> None:
+        text, at = reader.text, reader.at
+        if name := _NAME.match(text, at):
+            behind = text[name.end():].lstrip()
+            if behind.startswith("("):
+                reader.at = text.index("(", name.end()) + 1
+                return self._call(name[0], _arguments(reader), line)
+            if behind.startswith("=") and not behind.startswith("=="):
+                reader.at = text.index("=", name.end()) + 1
+                return self._value(name[0], reader, line)
+            if behind.startswith("[") and (m := re.compile(r"[^=\]]*\]\s*=(?!=)").match(text,
+                                                                                        text.index("[",
+                                                                                                   name.end()) + 1)):
+                return self._indexed(name[0], reader, line, name.end(), m.end())
+        if (m := _LETTER.match(text, at)) and not (name and self._is_word(name[0])):
+            reader.at = m.end()
+            return self._letter(m[1], m[2], line)
+        if name is None:
+            raise BlockError(f"cannot read '{text[at:at + 40].strip()}'")
+        reader.at = name.end()
+        return self._name(name[0], line)
+
+    def _is_word(self, name: str) -> bool:
+        return name in IDLE or name in REFUSED or name in COMPRESSORS or name in _ORIENTS
+
+    def _indexed(self, name: str, reader: ValueReader, line: Line, behind: int, end: int) -> None:
+        """NAME[...]= : an element of an array, a value of the control, or a limit of an axis."""
+        if name.startswith("$"):
+            return self._system(name, reader, end)
+        if name in IDLE_VALUES:
+            reader.at = end
+            reader.value()
+            return None
+        if name in REFUSED:
+            raise BlockError(f"{name} ({REFUSED[name]}) is not followed")
+        reader.at = behind
+        index = reader.index()
+        reader.need("=")
+        return self.variables.put(name, index, reader.value())
+
+    def _system(self, name: str, reader: ValueReader, at: int) -> None:
+        if not _HARMLESS.match(name):
+            raise BlockError(f"{name} is set: a value of the control whose effect on moves the proof does not know")
+        reader.at = at
+        reader.value()
+
+    def _letter(self, letter: str, written: str, line: Line) -> None:
+        number = float(written)
+        if letter in "XYZABC":
+            return self._place(letter, number, "", line)
+        if letter in "IJK":
+            line.centre[letter] = (number, "")
+            return None
+        if letter in "FS":
+            line.values[letter] = number
+            return None
+        if letter == "H" or letter == "N":
+            return None
+        if letter not in "GMTD" or number != int(number) or number < 0:
+            raise BlockError(f"unknown word {letter}{written}")
         n = int(number)
         if letter == "G":
-            codes.append(n)
-            out += self._code(n)
-        elif letter == "T":
-            self.selected = n
-            out.append(f"T{n}")
-        elif letter == "D":
-            if n > 1:
-                raise BlockError(f"D{n}: only the length of the first cutting edge (D1) is known")
-            out.append(f"G43 H{self.tool}" if n else "G49")
-        elif letter == "M":
-            if n not in _M:
-                raise BlockError(f"unknown word M{n}")
-            out.append(f"M{n}")
-            if n == 6:
-                self.tool = self.selected
-                after.append(f"G43 H{self.tool}")
+            return self._code(n, line)
+        if letter == "M":
+            return self._m(n, line)
+        if letter == "T":
+            return self._select(n, line)
+        return self._edge(n, line)
 
-    def _code(self, n: int) -> list[str]:
-        if n in _SAME:
-            return [f"G{n}"]
-        if n == 70:
+    def _place(self, letter: str, number: float, kind: str, line: Line) -> None:
+        if letter in line.places:
+            raise BlockError(f"the word {letter} appears twice")
+        line.places[letter] = (number, kind)
+
+    def _select(self, n: int, line: Line) -> None:
+        self.selected = n
+        line.out.append(f"T{n}")
+
+    def _edge(self, n: int, line: Line) -> None:
+        if n > 1:
+            raise BlockError(f"D{n}: only the length of the first cutting edge (D1) is known")
+        self.edge = n
+        line.out.append(f"G43 H{self.tool}" if n else "G49")
+
+    def _m(self, n: int, line: Line) -> None:
+        if n not in _M:
+            raise BlockError(f"unknown word M{n}")
+        if n in _GEARS:
+            return
+        line.out.append(f"M{n}")
+        line.change |= n == 6
+
+    def _code(self, n: int, line: Line) -> None:
+        line.codes.append(n)
+        if n in (0, 1, 2, 3):
+            self.motion = n
+        if n in SAME:
+            line.out.append(f"G{n}")
+        elif n in (41, 42):
+            line.out.append(self._compensated(n))
+        elif n in (450, 451):
+            self.style = SIEMENS_STYLE if n == 450 else SHARP_STYLE
+        elif n == 70:
             raise BlockError("G70 counts coordinates in inches, and F in the basic unit of the machine",
                              "write G700, which counts F in inches too")
-        if n in _UNITS:
-            return [f"G{_UNITS[n]}"]
-        if 505 <= n <= 599:
-            return [zero_word(n - 500, f"G{n}")]
-        if n == 60:
+        elif n in UNITS:
+            line.out.append(f"G{UNITS[n]}")
+        elif 505 <= n <= 599:
+            line.out.append(zero_word(n - 500, f"G{n}"))
+        elif n == 60:
             self.bound(True)
-            return ["G61"]
-        if n == 4 or n == 641 or n in _UNBOUNDED:
-            return []
-        if n == 500:
-            raise BlockError("G500 switches the work offset off: program zero is then unknown")
-        raise BlockError(f"unknown word G{n}")
+            line.out.append("G61")
+        elif n == 153:
+            line.out.append("G53")
+        elif n == 500:
+            self.lost = "G500"
+        elif n in MOVES:
+            raise BlockError(f"G{n} ({MOVES[n]}) is not followed")
+        elif n not in IDLE_CODES and n not in UNBOUNDED and n not in (4, 25, 26, 63, 74, 75, 110, 111, 112, 331, 332,
+                                                                      641):
+            raise BlockError(f"unknown word G{n}")
 
-    def _value(self, name: str, text: str, values: dict[str, float], out: list[str]) -> None:
-        if name == "T":
-            digits = text.strip('"').removeprefix("T")
-            if not digits.isdigit():
-                raise BlockError(f"T={text}: name the tool by its number, such as T=\"1\"")
-            self.selected = int(digits)
-            out.append(f"T{self.selected}")
-            return
-        if not re.fullmatch(NUMBER, text):
-            raise BlockError(f"{name}={text} is not a plain number")
-        number = float(text)
-        if name in ("X", "Y", "Z", "A", "B", "C", "I", "J", "K", "F", "S"):
-            out.append(f"{name}{text}")
-        elif name == "CR":
-            out.append(f"R{text}")
-        elif name == "TURN":
-            out.append(f"P{int(number) + 1}")
-        elif name in ("ADIS", "ADISPOS"):
-            values[name] = number
+    def _compensated(self, n: int) -> str:
+        """Compensation by the radius of the tool in the spindle; D0 has none."""
+        if self.edge and self.tool not in self.machine.radii:
+            return f"G{n} D{self.tool}"
+        return f"G{n}.1 D{digits(2 * self.machine.radii[self.tool] / self.unit) if self.edge else 0}"
+
+    def _value(self, name: str, reader: ValueReader, line: Line) -> None:
+        """NAME = value: a word of the block, a parameter or a variable."""
+        if name in ("T", "T1") and not self.variables.known(name):
+            return self._tool(reader.value(), line)
+        if name.startswith("$"):
+            return self._system(name, reader, reader.at)
+        if re.fullmatch(r"R[0-9]+", name) or self.variables.known(name):
+            return self.variables.put(name, (), reader.value())
+        if name in REFUSED:
+            raise BlockError(f"{name}= ({REFUSED[name]}) is not followed")
+        if name == "DISC" or name in IDLE_VALUES or re.fullmatch(r"H[0-9]+", name):
+            value = reader.value()
+            if name == "DISC" and value:
+                raise BlockError("DISC= above 0 (other outside corners of cutter radius compensation) is not followed")
+            if name in ("SPOS", "SPOSA"):
+                line.out.append("M5")
+            return None
+        kind = ""
+        if m := _PLACED.match(reader.text, reader.at):
+            kind, reader.at = m[1], m.end()
+        number = reader.number()
+        if kind:
+            reader.need(")")
+        return self._named(name, number, kind, line)
+
+    def _tool(self, value: Value, line: Line) -> None:
+        """T = number or name: the name is an id of the setup, or a number."""
+        if isinstance(value, float):
+            if value != int(value) or value < 0:
+                raise BlockError(f"T={value:g} is not a tool")
+            return self._select(int(value), line)
+        names = {k.upper(): v for k, v in self.names.items()}
+        if value in self.names or value.upper() in names:
+            return self._select(self.names.get(value, names.get(value.upper(), 0)), line)
+        number = value.upper().removeprefix("T")
+        if not number.isdigit():
+            raise BlockError(f'T="{value}": no tool of the setup has this id',
+                             f"give a tool of the setup the id {value}" + (
+                                 f" (it has {', '.join(sorted(self.names)[:8])})" if self.names else ""))
+        return self._select(int(number), line)
+
+    def _named(self, name: str, number: float, kind: str, line: Line) -> None:
+        if name in ("X", "Y", "Z", "A", "B", "C"):
+            return self._place(name, number, kind, line)
+        if name in ("I", "J", "K"):
+            line.centre[name] = (number, kind)
+        elif name in ("F", "S"):
+            line.values[name] = number
+        elif name == "S1":
+            line.values["S"] = number
+        elif name in ("M", "M1") and number == int(number) and number >= 0:
+            self._m(int(number), line)
+        elif name == "G" and number == int(number) and number >= 0:
+            self._code(int(number), line)
+        elif name == "D" and number == int(number) and number >= 0:
+            self._edge(int(number), line)
+        elif name in ("RND", "RNDM", "CHF", "CHR", "CR", "TURN", "ADIS", "ADISPOS", "AP", "RP", "I1", "J1", "K1", "A3",
+                      "B3", "C3", "RPL", "CTOL",
+                      "X1",
+                      "Y1", "Z1", "A1", "B1", "C1", "FP", "OTOL", "ATOL"):
+            line.values[name], line.kinds[name] = number, kind
         else:
-            raise BlockError(f"unknown word {name}={text}")
+            raise BlockError(f"unknown word {name}={number:g}")
+        return None
 
-    def _name(self, word: str) -> list[str]:
-        if word in _IDLE:
-            return []
-        known = {"SUPA": "G53", "TRAORI": "M428", "TRAFOOF": "M429"}.get(word)
-        if known is None:
-            raise BlockError(f"unknown word {word[:40]}")
+    def _name(self, word: str, line: Line) -> None:
+        if word in _ORIENTS:
+            self._orients(word)
+        elif word in _FRAMES:
+            if line.frame or line.places or line.codes:
+                raise BlockError(f"{word} with other words: a frame needs its own block")
+            line.frame = word
+        elif word in COMPRESSORS:
+            line.values["COMPRESS"] = 1.0
+        elif word in CURVES:
+            self.motion = word
+        elif word in ("TRAORI", "TRAFOOF"):
+            self._transform(word, line)
+        elif word == "SUPA":
+            line.out.append("G53")
+        elif word in REFUSED:
+            raise BlockError(f"{word} ({REFUSED[word]}) is not followed")
+        elif word not in IDLE and word not in IDLE_CALLS:
+            raise BlockError(f"unknown word {word[:40]}" + (
+                ": it is no subprogram of this file" if len(word) > 2 and not line.out else ""))
+
+    def _orients(self, word: str) -> None:
+        """ORIMKS and ORIAXES turn the axes evenly, ORIWKS and ORIVECT the tool axis along a great circle."""
+        wanted = _ORIENTS[word]
+        if self.circle is not None and self.circle != wanted and {word} & {"ORIAXES", "ORIVECT", "ORIPLANE"}:
+            self.notes.append(f"{word} after {'ORIWKS' if self.circle else 'ORIMKS'}: machine data 21104 decide which "
+                              f"of both "
+                              "counts; the later one is read")
+        self.circle = wanted
+
+    def _transform(self, word: str, line: Line) -> None:
+        if self.programmed is not None:
+            raise BlockError(f"{word} while TRANS, ROT, MIRROR or SCALE is in force: end it before")
+        if self.swivel is not None and word == "TRAFOOF":
+            raise BlockError("M429 in a plane of CYCLE800" if not self.swung else "TRAFOOF in a plane of CYCLE800",
+                             "end the plane with CYCLE800() before")
+        if word == "TRAORI" and self.swung:
+            raise BlockError("TRAORI in a plane of CYCLE800", "end the plane with CYCLE800() before")
         if word == "TRAORI" and self.loose:
             self.notes.append(self.loose)
-        if known != "G53":
-            self.lost, self.tcp = word, word == "TRAORI"
-        return [known]
+        self.lost, self.tcp = word, word == "TRAORI"
+        self.forget()
+        line.out.append("M428" if self.tcp else "M429")
 
-    def _oriented(self, parts: list[str]) -> None:
+    def _call(self, name: str, parts: list[str], line: Line) -> None:
+        if name == "TRAORI" and parts in ([""], ["1"]):
+            return self._name("TRAORI", line)
+        if name == "CYCLE800":
+            line.after += self.swivelled(parts, self._number)
+        elif name in ENVELOPES:
+            self._drill(DrillingCall(name, tuple(self._number(p) if p else None for p in parts)), line)
+        elif name in ("HOLES1", "HOLES2"):
+            self._row(name, [self._number(p) if p else None for p in parts], line)
+        elif name == "CYCLE832":
+            line.out += self._tolerant(parts)
+        elif name in NOT_FOLLOWED:
+            raise BlockError(f"{name}( ) ({NOT_FOLLOWED[name]}) is not followed",
+                             "let the post write its moves (G1, G2, G3) instead of the cycle")
+        elif name in REFUSED:
+            raise BlockError(f"{name}( ) ({REFUSED[name]}) is not followed")
+        elif name in ("M1", "M"):
+            self._m(int(self._number(parts[0])), line)
+        elif name not in IDLE_CALLS:
+            raise BlockError(f"{name[:40]}( ): unknown cycle or function, and no subprogram of this file")
+        return None
+
+    def _number(self, text: str) -> float:
+        reader = ValueReader(text, self.variables)
+        number = reader.number()
+        if text[reader.at:].strip():
+            raise BlockError(f"cannot read the value '{text[:40]}'")
+        return number
+
+    def _drill(self, call: DrillingCall, line: Line) -> None:
+        self.uncompensated(call.name)
+        if line.modal:
+            self.cycle = call
+            return
+        if line.places:
+            raise BlockError(f"{call.name} and coordinates in one block")
+        line.after += self._restored(drilling_blocks(call, self.here(), self.machine))
+
+    def _row(self, name: str, values: Sequence[float | None], line: Line) -> None:
+        if self.cycle is None:
+            raise BlockError(f"{name} without a cycle of MCALL")
+        i, j, k = PLANE_AXES[self.machine.s.plane]
+        place = self.here()
+        for u, v in row_of_holes(name, values):
+            target = list(place)
+            target[i], target[j] = u * self.unit, v * self.unit
+            if self.relative:
+                raise BlockError(f"{name} in incremental coordinates")
+            line.after.append(f"G0 {'XYZ'[i]}{digits(u)} {'XYZ'[j]}{digits(v)}")
+            blocks = drilling_blocks(self.cycle, target, self.machine)
+            line.after += blocks
+            place = list(target)
+            place[k] = math.nan
+        line.after = self._restored(line.after)
+
+    def _tolerant(self, parts: list[str]) -> list[str]:
+        """CYCLE832: the tolerance of the path."""
+        if parts == [""] or parts[1:2] in (["0"], ["_OFF"]):
+            self.notes.append("CYCLE832 is off: machine data decide how far the control rounds corners; the error "
+                              "bound does not include it")
+            self.bound(False)
+            return []
+        if not is_number(parts[0]):
+            raise BlockError(f"CYCLE832({','.join(parts)}): its tolerance is not a plain number")
+        self._oriented_within(parts)
+        self.bound(True)
+        return [f"G64 P{float(parts[0]):.6f}"]
+
+    def _oriented_within(self, parts: list[str]) -> None:
         """Keep a note for the first turning tool axis where CYCLE832 allows it more than a small deviation."""
-        stated = len(parts) > 2 and re.fullmatch("1[0-9]", parts[1]) and re.fullmatch(NUMBER, parts[2])
+        stated = len(parts) > 2 and re.fullmatch("1[0-9]|_ORI_[A-Z]+", parts[1]) and re.fullmatch(NUMBER, parts[2])
         self.loose = ""
         if stated and float(parts[2]) <= SMALL:
             return
         amount = f"of {parts[2]} deg" if stated else "that setting data decide"
         self.loose = f"CYCLE832 allows the tool axis a deviation {amount}: the error bound does not include it"
 
-    def _call(self, name: str, arguments: str) -> list[str]:
-        parts = [p.strip() for p in arguments.split(",")]
-        if name == "TRAORI" and parts in ([""], ["1"]):
-            return self._name("TRAORI")
-        if name == "CYCLE800":
-            self._swivel(parts)
-            return []
-        if name == "MSG":  # a line on the screen
-            return []
-        if name == "CYCLE832":
-            if parts == [""] or parts[1:2] in (["0"], ["_OFF"]):
-                self.notes.append("CYCLE832 is off: machine data decide how far the control rounds corners; the error "
-                                  "bound does not include it")
-                self.bound(False)
-                return []
-            if not re.fullmatch(NUMBER, parts[0]):
-                raise BlockError(f"CYCLE832({arguments}): its tolerance is not a plain number")
-            self._oriented(parts)
-            self.bound(True)
-            return [f"G64 P{float(parts[0]):.6f}"]
-        raise BlockError(f"{name[:40]}( ): unknown cycle or function")
+    def _check_context(self, line: Line) -> None:
+        """Refuse names whose value nothing in the block uses."""
+        allowed = {"CR": self.motion in (2, 3), "TURN": self.motion in (2, 3), "RPL": False}
+        allowed |= dict.fromkeys(("I1", "J1", "K1"), self.motion == "CIP")
+        fixed = not {74, 75}.isdisjoint(line.codes)
+        allowed |= dict.fromkeys(("X1", "Y1", "Z1", "A1", "B1", "C1", "FP"), fixed)
+        for name in line.values:
+            if not allowed.get(name, True):
+                raise BlockError(f"{name}= is used by no word of its block")
+        if line.centre and self.motion not in (2, 3) and not {63, 331, 332} & set(line.codes):
+            raise BlockError(f"{next(iter(line.centre))} without an arc (G2, G3)")
+
+    def _framed(self, line: Line) -> list[str]:
+        """A block of TRANS, ROT, MIRROR or SCALE."""
+        self.unheld(line.frame)
+        if line.out or line.codes or line.centre or set(line.values) - {"RPL"} or any(
+                k not in "XYZ" or kind for k, (_, kind) in line.places.items()):
+            raise BlockError(f"{line.frame} with other words than X, Y, Z or RPL: it needs its own block")
+        self.program_frame(line.frame, {k: v for k, (v, _) in line.places.items()}, line.values)
+        return []
+
+    def _block(self, line: Line) -> list[str | tuple[int, str]]:
+        codes = line.codes
+        if any(54 <= n <= 57 or 505 <= n <= 599 for n in codes):
+            self.lost = ""
+        self.relative = self.relative if 90 not in codes and 91 not in codes else 91 in codes
+        self._check_context(line)
+        special = self._special(line)
+        if special is not None:
+            self.unheld("G4, a pole, a fixed point or tapping")
+            return list(special)
+        moves = bool(line.places) or bool(line.values.keys() & {"AP", "RP", "A3", "B3", "C3"}) or (
+            self.motion in (2, 3) and bool(line.centre))
+        if self.lost and "G53" not in line.out and moves:
+            raise BlockError(f"a move after {self.lost} without a work offset: it may be off (G500)",
+                             "state the work offset (G54 to G57, G505 and up) before the move")
+        line.out += self._path(line)
+        if not moves:
+            self.corner_of({k: v for k, v in line.values.items() if k == "RNDM"})
+            head = [*line.out, *self._rates(line)]
+            if line.after or any(w[0] in "TG" for w in line.out):
+                self.unheld("another word")
+            ends = self.flushed() if {"M2", "M30"} & set(line.out) else []
+            return [*line.before, *ends, *([" ".join(head)] if head else []), *line.after]
+        if "G53" in line.out:
+            self.forget()
+        self.note_place()
+        self.moved = not {"X", "Y", "Z"}.isdisjoint(line.places) or not {"AP", "RP"}.isdisjoint(line.values)
+        blocks: list[str | tuple[int, str]] = [*line.before, *self._move(line), *line.after]
+        if self.cycle is not None and self.moved and "G53" not in line.out:
+            blocks += self._cycle_there(line)
+        return blocks
+
+
+def _arguments(reader: ValueReader) -> list[str]:
+    """Text of the arguments up to the closing bracket; quotes and inner brackets are kept whole."""
+    text, depth, quoted, begun = reader.text, 0, False, reader.at
+    out: list[str] = []
+    for at in range(reader.at, len(text)):
+        c = text[at]
+        if c == '"':
+            quoted = not quoted
+        elif quoted:
+            continue
+        elif c in "([":
+            depth += 1
+        elif c == ")" and depth == 0:
+            reader.at = at + 1
+            return [*out, text[begun:at].strip()]
+        elif c in ")]":
+            depth -= 1
+        elif c == "," and depth == 0:
+            out.append(text[begun:at].strip())
+            begun = at + 1
+    raise BlockError(f"a bracket is not closed in '{text[:40]}'")
+
+
+__all__ = ["SMALL", "ZEROS", "SiemensReader", "is_siemens"]

@@ -163,7 +163,7 @@ def test_a_series_under_a_shifted_zero_keeps_its_number():
 
 def test_a_way_back_that_is_not_stated_is_told():
     assert read("G81 X1 Z-3 R1\nG80\n").notes == (
-        "neither G98 nor G99 is stated: drilling cycles are read with G98 (return to start height)",)
+        "neither G98 nor G99 is stated: drilling cycles are read with G99 (return to R)",)
     assert read("G98 G81 X1 Z-3 R1\nG80\n").notes == () == read("G81 X1 Z-3 R10\nG80\n").notes
 
 

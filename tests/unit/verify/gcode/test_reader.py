@@ -45,9 +45,10 @@ def test_comments_words_run_together_and_several_g_words():
 
 
 def test_relative_and_inch():
-    p = read("G1 F100\nG91 X1\nX1 Y1\nG90 G20 X1 F10\nG21 X2\n")
-    np.testing.assert_allclose(p.end[1:], [[1, 0, 10], [2, 1, 10], [25.4, 1, 10], [2, 1, 10]])
-    assert p.feed[3] == pytest.approx(254)
+    p = read("G1 F100\nG91 X1\nX1 Y1\nG90 G20 X1\nF10 X1 Y1.5\nG21 X2\n")
+    np.testing.assert_allclose(p.end[1:], [[1, 0, 10], [2, 1, 10], [25.4, 1, 10], [25.4, 38.1, 10], [2, 38.1, 10]])
+    assert p.feed[4] == pytest.approx(254)
+    assert read("G1 G20 X1 F10\n").feed[1] == pytest.approx(10)  # LinuxCNC reads F in the old unit
 
 
 @pytest.mark.parametrize("plane, i, j, k", [("G17", 0, 1, 2), ("G18", 2, 0, 1), ("G19", 1, 2, 0)])

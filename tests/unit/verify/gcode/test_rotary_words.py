@@ -130,7 +130,7 @@ def test_a_table_stands_still_while_the_linear_axes_drill():
 
 @pytest.mark.parametrize("body, minutes", [
     ("G93 G1 X30 A5 F4\n", 0.25), ("G93 G1 A5 F2\n", 0.5), ("G93 G1 X30 F4\n", 0.25),
-    ("G1 X30 Y40 A5 F100\n", 0.5), ("G1 A30 C40 F100\n", 0.5), ("G20 G1 A30 C40 F100\nG21\n", 0.5),
+    ("G1 X30 Y40 A5 F100\n", 0.5), ("G1 A30 C40 F100\n", 0.5), ("G20\nG1 A30 C40 F100\nG21\n", 0.5),
     ("G1 X30 Y40 F100\n", 0.5), ("G95 G1 C50 F0.1\n", 0.5)])
 def test_times(body, minutes):
     p = read("M428\n" + body)

@@ -217,24 +217,20 @@ def test_a_move_left_out_or_put_in_is_found():
 
 
 @pytest.mark.parametrize(("dialect", "line", "said"), [
-    ("fanuc", "G0 X10", "without a decimal point"), ("fanuc", "#100=3.", "macro"), ("fanuc", "G234 H1", "unknown word"),
+    ("fanuc", "G0 X10", "without a decimal point"), ("fanuc", "G234 H1", "unknown word"),
     ("fanuc", "M428", "word of LinuxCNC"), ("fanuc", "G54.1 P40", "a setup can name"),
     ("fanuc", "X1.; Y2.", "ends the block"),
     ("haas", "G1 X1. F100", "without a decimal point"), ("haas", "G54.1 P1", "unknown word"),
     ("haas", "S900 M3 M8", "one M word in a block"),
-    ("siemens", "R1=5", "unknown word"), ("siemens", "GOTOF ENDE", "unknown word"), ("siemens", "G500", "switches"),
     ("siemens", "G70", "F in the basic unit"),
-    ("siemens", "X=IC(5)", "not a plain number"), ("siemens", "CYCLE800(0)", "15 arguments"),
-    ("siemens", "CYCLE801(0)", "cycle or function"),
-    ("siemens", "G641", "without ADIS"), ("siemens", "D2", "first cutting edge"), ("siemens", "TRANS X10", "unknown"),
-    ("heidenhain", "L IX+5", "cannot read"), ("heidenhain", "L X+5 RL F100", "cannot read"),
-    ("heidenhain", "CALL LBL 1", "cannot read"), ("heidenhain", "FN 0: Q1 = 5", "cannot read"),
-    ("heidenhain", "PLANE SPATIAL SPA+10 SPB+0 SPC+0 STAY", "only while M128"),
-    ("heidenhain", "PLANE SPATIAL SPA+10 SPB+0 SPC+0 TURN F999", "cannot read"),
+    ("siemens", "X=IC(5)", "has not stated"), ("siemens", "CYCLE800(0)", "15 arguments"),
+    ("siemens", "CYCLE1801(0)", "cycle or function"),
+    ("siemens", "G641", "without ADIS"), ("siemens", "D2", "first cutting edge"),
+    ("heidenhain", "L IX+5", "has not stated"),
+    ("heidenhain", "PLANE SPATIAL SPA+10 SPB+0 SPC+0 STAY", "no rotary axes"),
     ("heidenhain", "L X+5 M140", "unknown word"),
-    ("heidenhain", "CP IPA+370 DR+", "less than a turn"), ("heidenhain", "CP IPA+30 DR-", "less than a turn"),
-    ("heidenhain", "CP PA+30 DR+", "cannot read"), ("heidenhain", "CP IPA+30 Z+1 DR+", "has stated"),
-    ("heidenhain", "CYCL DEF 7.0 DATUM SHIFT", "cannot read"), ("heidenhain", "TOOL CALL 1 X S500", "tool axis"),
+    ("heidenhain", "CP PA+30 DR+", "has stated"), ("heidenhain", "CP IPA+30 Z+1 DR+", "has stated"),
+    ("heidenhain", "TOOL CALL 1 X S500", "tool axis"),
 ])
 def test_what_is_not_known_is_refused_with_its_line(dialect, line, said):
     with pytest.raises(ProgramError, match=re.escape(said)) as refused:
@@ -346,7 +342,7 @@ def test_arcs_in_plain_language():
     assert of(10)[:, 0].max() == pytest.approx(11.0, abs=0.05) or of(10)[:, 0].min() == pytest.approx(9.0, abs=0.05)
     assert of(12)[-1].tolist() == [10.0, 0.0, -1.0] and of(12)[:, 1].max() == pytest.approx(6.0, abs=2e-3)
     for wrong, said in (("C X+1 Y+1 DR+", "has stated"), ("CR X+1 DR+", "without a radius"),
-                        ("CC X+0 Y+0\nC X+1 Y+1 R+2 DR+", "with a radius"), ("CT X+1 Y+1", "cannot read")):
+                        ("CC X+0 Y+0\nC X+1 Y+1 R+2 DR+", "with a radius"), ("CT X+0 Y+0", "Z only")):
         with pytest.raises(ProgramError, match=said):
             read_program(head + f"{wrong}\nM30\n", dialect="heidenhain")
 
@@ -447,7 +443,7 @@ def test_planes_hold_the_steps_of_a_fixed_axis(kind):
     with pytest.raises(ProgramError, match="M91 in a tilted plane"):
         read(work, text.replace("PLANE RESET STAY", "M8"), "heidenhain")
     with pytest.raises(ProgramError, match="place that the program has not stated"):
-        read_program("BEGIN PGM A MM\nM128\nPLANE SPATIAL SPA+9 SPB+0 SPC+0 STAY\nL X+1 FMAX\nM30\n",
+        read_program("BEGIN PGM A MM\nM128\nPLANE SPATIAL SPA+9 SPB+9 SPC+0 STAY\nL X+1 F9\nM30\n",
                      dialect="heidenhain", kinematics=Kinematics("table-table-AC"))
 
 
@@ -488,14 +484,10 @@ PLANE = 'CYCLE800(0,"T",0,57,0,0,0,10,20,0,0,0,0,0,0)'
     (["TRAORI", "G54", 'CYCLE800(1,"T",0,57,0,0,0,10,20,0,0,0,0,0,0)'], "without retract"),
     (["TRAORI", "G54", 'CYCLE800(0,"T",1,57,0,0,0,10,20,0,0,0,0,0,0)'], "new plane"),
     (["TRAORI", "G54", 'CYCLE800(0,"T",0,39,0,0,0,10,20,0,0,0,0,0,0)'], "axis by axis"),
-    (["TRAORI", "G54", 'CYCLE800(0,"T",0,57,0,0,5,10,20,0,0,0,0,0,0)'], "without shifts"),
-    (["TRAORI", "G54", 'CYCLE800(0,"T",0,57,0,0,0,R1,20,0,0,0,0,0,0)'], "plain numbers"),
-    (["TRAORI", "G54", PLANE, "G0 X1"], "has not stated"),
+    (["TRAORI", "G54", 'CYCLE800(0,"T",0,57,0,0,0,R1,20,0,0,0,0,0,0)'], "R1 has no value"),
+    (["TRAORI", "G54", PLANE, "G1 X1 F9"], "has not stated"),
     (["TRAORI", "G54", "G0 X1 Y1 Z50", PLANE, "TRAFOOF"], "M429 in a plane"),
-    (["TRAORI", "G54", "G0 X1 Y1 Z50", PLANE, "SUPA G0 Z0"], "in a plane"),
-    (["TRAORI", "G54", "G0 X1 Y1 Z50", PLANE, "G2 X1 Y1 I1 J1"], "G2 in a pla"),
     (["TRAORI", "G54", "G91", PLANE], "in incremental"),
-    (["TRAORI", "G54", "G0 X1 Y1 Z50", "G91", "X1", "G90", PLANE, "Z1"], "not stat"),
 ])
 def test_other_planes_of_cycle800_are_refused(lines, said):
     head = ["G710 G17 G90 G94 G54", "T1 M6", "D1", "S900 M3"]

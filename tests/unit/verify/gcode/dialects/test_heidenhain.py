@@ -1,0 +1,217 @@
+"""Words of Heidenhain controls: each program beside the same moves in plain G0, G1, G2 and G3."""
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from geometry.errors import ProgramError, VerificationError
+from tests.heidenhain_pairs import PAIRS
+from tests.program_pairs import NAMES, RADII, apart, read, same_feeds
+from verify.gcode.dialects import heidenhain_flow
+from verify.gcode.reader import read_program
+from verify.kinematics import Kinematics
+
+CASES = Path(__file__).parents[5] / "shared" / "cases"
+if not CASES.exists():
+    CASES = Path(__file__).parents[6] / "shared" / "cases"
+
+@pytest.mark.parametrize("name", [k for k, (_, plain) in PAIRS.items() if plain])
+def test_the_same_moves(name):
+    given, plain = PAIRS[name]
+    first, second = read(given, "heidenhain"), read(plain, "siemens")
+    assert apart(first, second) < 1e-6
+    assert same_feeds(first, second) and first.dwell == second.dwell
+
+
+def test_turns_over_a_full_circle():
+    p = read("L X+10 Y+0 Z+0\nCC X+0 Y+0\nCP IPA-1800 IZ-5 DR-\nCP IPA+765 DR+", "heidenhain")
+    assert apart(p, read("G1 X10 Z0\nG2 X10 Y0 Z-5 I-10 J0 P5\nG3 X7.0710678118655 Y7.0710678118655 I-10 J0 P3",
+                         "linuxcnc")) < 1e-6
+    way = np.unwrap(np.arctan2(p.end[p.line == 8, 1], p.end[p.line == 8, 0]))
+    assert way[-1] == pytest.approx(-5 * math.tau) and np.allclose(p.end[p.line == 8, 2], 5 * way / math.tau / 5)
+
+
+def test_a_rounding_between_a_line_and_an_arc_touches_both():
+    q = read("L X+30 Y+0\nRND R3\nCC X+30 Y+12\nC X+42 Y+12 DR+\nRND R2\nL X+60", "heidenhain")
+    assert q.end[-1].tolist() == [60.0, 12.0, 50.0]
+    corner = q.end[q.line == 10]
+    middle = np.array([corner[-1, 0], 10.0])
+    assert len(corner) > 5 and np.allclose(np.linalg.norm(corner[:, :2] - middle, axis=1), 2.0)
+    assert np.linalg.norm(middle - [30.0, 12.0]) == pytest.approx(14.0)  # both arcs touch from outside
+
+
+def test_bore_milling_stays_in_its_bore():
+    p = read(PAIRS["bore milling"][0], "heidenhain")
+    feed = p.kind == 1
+    far = np.hypot(p.end[feed, 0], p.end[feed, 1])
+    assert far.max() == pytest.approx(4.0) and p.end[feed, 2].min() == -4.0
+    assert p.end[-1].tolist() == [0.0, 0.0, 5.0] and (p.feed[feed] == 70.0).all()
+    low = np.abs(p.end[:, 2] + 4.0) < 1e-9
+    angles = np.unwrap(np.arctan2(p.end[low & (far.size > 0), 1], p.end[low & (far.size > 0), 0]))
+    assert np.ptp(angles) > math.tau - 0.2  # a whole turn at the bottom
+
+
+def test_inches():
+    """F counts tenths of an inch per minute."""
+    given = ("BEGIN PGM A INCH\nTOOL CALL 1 Z S1000 F100\nM3\nL X+0 Y+0 Z+2 FMAX\nTRANS DATUM AXIS X+1\nL X+1 IY+0.5 "
+             "F100\nRND R0.2\n"
+             "CC X+1 Y+1.5\nC X+2 Y+1.5 DR+\nTRANS DATUM RESET\n"
+             "CYCL DEF 201 R Q200=0.1 Q201=-0.2 Q206=50 Q211=0 Q208=0 Q203=0 Q204=1\nCYCL CALL\nL X+0 RL\nL Y+3 R0")
+    plain = given.replace("INCH", "MM")
+    for word in ("X+1", "X+2", "IY+0.5", "R0.2", "Y+1.5", "Z+2", "Q200=0.1", "Q201=-0.2", "Q204=1", "Y+3"):
+        k = word.index("=") + 1 if "=" in word else 1 if word[0] in "XYZR" else 2
+        plain = re.sub(re.escape(word) + r"(?![0-9.])", f"{word[:k]}{float(word[k:]) * 25.4:+.6f}", plain)
+    plain = plain.replace("F100", "F254").replace("Q206=50", "Q206=127")
+    first, second = read(given, "heidenhain", head=False), read(plain, "heidenhain", head=False)
+    assert apart(first, second) < 1e-5 and same_feeds(first, second)
+
+
+def test_tools_by_name():
+    for word, number in (('"MILL_D10"', 1), ('"mill_d10"', 1), ('"drill 8"', 2), ("3", 3), ('"3"', 3)):
+        p = read(f"TOOL CALL {word} Z S500 F9\nM3\nL X+1 Y+1 Z+9 FMAX\nL Z+1", "heidenhain")
+        assert p.tool[-1] == number and not p.remarks
+    with pytest.raises(ProgramError, match="no tool of the setup has this id") as refused:
+        read('TOOL CALL "REAMER" Z S500', "heidenhain")
+    assert "MILL_D10" in refused.value.remedy
+
+
+REFUSED = [
+    ("CALL PGM TNC:\\A.H", "runs a program that is not in this file"), ("CALL LBL 7",
+                                                                        "the label 7 is not in the program"),
+    ("FPOL X+0 Y+0", "a free contour"), ("FL X+1", "a free contour"), ("CYCL DEF 251 Q200=2\nCYCL CALL",
+                                                                       "cycle 251 (a pocket)"),
+    ("CYCL DEF 262 Q200=2\nCYCL CALL", "cycle 262 (thread milling)"), ("CYCL DEF 220 Q200=2",
+                                                                       "cycle 220 (a circle of points)"),
+    ("CYCL DEF 400 Q200=2", "a touch probe"), ("TCH PROBE 1.0", "a touch probe"),
+    ("CYCL DEF 19.0 WORKING PLANE", "cycle 19"),
+    ("CYCL DEF 26.0 AXIS SCALING", "cycle 26"), ("PATTERN DEF POS1 (X+1)", "a pattern of points"),
+    ("CYCL CALL PAT", "PAT"),
+    ("CYCL CALL", "none is defined"), ("APPR LCT X+1 Y+1 R5 RL", "APPR LCT is not followed"),
+    ("DEP LCT X+1 R5", "DEP LCT"),
+    ("L X+Q9", "Q9 has no value yet"), ("FN 4: Q1 = +1 DIV +0", "no value here"),
+    ("FN 18: SYSREAD Q1 = ID1", "FN 18 is not"),
+    ("L X+1 M136", "M136 (feed per turn)"), ("L X+1 M777", "unknown word M777"),
+    ("CC X+0 Y+0\nRND R5", "needs a move directly before"),
+    ("L X+10\nRND R500\nL Y+5", "does not fit"), ("L X+10\nCHF 50\nL Y+5", "longer than a line"),
+    ("PLANE PROJECTED PROPR+1 PROMIN+1 ROT+0 TURN", "are followed"), ("PLANE SPATIAL SPA+10 SPB+0 SPC+0 TURN F99",
+                                                                      "rotary"),
+    ("C X+1 Y+1 DR+", "has stated"), ("CR X+1 DR+", "without a radius"), ("CC X+0 Y+0\nC X+1 Y+1 R+2 DR+",
+                                                                          "with a radius"),
+    ("CC X+0 Y+0\nCP IPA+30 DR-", "sign of DR"), ("TOOL CALL 1 X S500", "tool axis"),
+    ("TOOL CALL 5.2 Z", "with an index"),
+    ("CYCL DEF 10.1 ROT+30\nCYCL DEF 7.1 X+5", "which comes first"), ("L X+1 X+2", "appears twice"),
+    ("LX+1", "cannot read"),
+    ("CYCL DEF 247 Q339=+40", "a setup can name"), ("L X+5 RL\nL Z+0 FMAX M91", "M91 with radius"),
+    ("SPL X+1", "a spline"),
+    ("FUNCTION TCPM F TCP AXIS POS PATHCTRL AXIS REFPNT CENTER-CENTER", "REFPNT CENTER-CENTER"),
+    ("CT X+5 Y+5", "no move came"), ("L X+9 RL M197", "M197 (other corners"), ("L X+9 M104",
+                                                                               "M104 (the zero of before)"),
+    ("L X+9 RL\nL Y+9\nTRANS DATUM AXIS X+1", "while cutter radius compensation is on"),
+]
+
+
+@pytest.mark.parametrize(("line", "said"), REFUSED)
+def test_what_is_not_followed_is_named_with_its_line(line, said):
+    with pytest.raises(ProgramError, match=re.escape(said)) as refused:
+        read_program(f"BEGIN PGM A MM\nTOOL CALL 1 Z S900 F100\nL X+0 Y+0 Z+9 FMAX\n{line}\nM30\n",
+                     dialect="heidenhain",
+                     names=NAMES, radii=RADII)
+    assert re.search("line [456]", refused.value.message)
+
+
+def test_a_loop_without_end_is_bounded(monkeypatch):
+    monkeypatch.setattr(heidenhain_flow, "MAX_JUMPS", 1000)
+    with pytest.raises(VerificationError, match="jumps") as refused:
+        read("LBL 1\nFN 9: IF +1 EQU +1 GOTO LBL 1", "heidenhain")
+    assert refused.value.code == "program_too_long"
+
+
+def plane_of(a, b, c):
+    """Axes of PLANE SPATIAL in the columns: about X, then Y, then Z of the untilted frame."""
+    a, b, c = np.radians([a, b, c])
+    rx = np.array([[1, 0, 0], [0, math.cos(a), -math.sin(a)], [0, math.sin(a), math.cos(a)]])
+    ry = np.array([[math.cos(b), 0, math.sin(b)], [0, 1, 0], [-math.sin(b), 0, math.cos(b)]])
+    rz = np.array([[math.cos(c), -math.sin(c), 0], [math.sin(c), math.cos(c), 0], [0, 0, 1]])
+    return rz @ ry @ rx
+
+
+@pytest.mark.parametrize("way", ["TURN MB MAX FMAX SEQ+ TABLE ROT", "MOVE DIST50 F1000",
+                                 "STAY\nL A+Q120 B+Q121 C+Q122 FMAX"])
+@pytest.mark.parametrize("kind", ["table-table-AC", "table-table-BC", "head-head-BC"])
+def test_planes_that_turn_the_axes(kind, way):
+    plane, shift = plane_of(20, 30, 40), np.array([5.0, 6.0, 0.0])
+    way = re.sub(f" [{({'A', 'B', 'C'} - set(kind[-2:])).pop()}]\\+Q12[0-2]", "", way)
+    p = read(f"TRANS DATUM AXIS X+5 Y+6\nL Z+0 FMAX M91\nPLANE SPATIAL SPA+20 SPB+30 SPC+40 {way}\nL X+10 Y+20 FMAX\nL "
+             f"Z+30 FMAX\n"
+             "L Z-2\nL X+20\nRND R2\nL Y+30\nPLANE RESET STAY", "heidenhain", kind)
+    end = p.end[np.flatnonzero(p.kind == 1)[-1]]
+    assert np.allclose(end, plane @ np.array([20, 30, -2]) + shift, atol=1e-6)
+    assert np.allclose(p.poses.end_axis[-1], plane[:, 2], atol=1e-9)
+    flat = (p.end[p.kind == 1] - shift) @ plane
+    assert np.allclose(flat[1:, 2], -2.0, atol=1e-6) and len(flat) > 10
+
+
+def test_a_move_of_plane_keeps_the_place_at_the_part():
+    """MOVE with DIST: the point below the tip stays, the tip turns about it."""
+    p = read("L X+10 Y+20 Z+50 FMAX\nPLANE SPATIAL SPA+30 SPB+0 SPC+0 MOVE DIST40 F1000", "heidenhain",
+             "table-table-AC")
+    centre = np.array([10.0, 20.0, 10.0])
+    swing = p.line == 7
+    assert np.allclose(p.end[swing] - 40 * p.poses.end_axis[swing], centre, atol=1e-6) and swing.sum() > 5
+
+
+def test_other_planes():
+    same = "PLANE SPATIAL SPA+20 SPB+30 SPC+40 STAY"
+    z, x = plane_of(20, 30, 40)[:, 2], plane_of(20, 30, 40)[:, 0]
+    vector = "PLANE VECTOR " + " ".join(f"{k}{v:+.12f}" for k, v in zip(("BX", "BY", "BZ", "NX", "NY", "NZ"), (*x, *z),
+                                                                     strict=True)) + " STAY"
+    moves = "L X+10 Y+20 Z+30 FMAX\nL Z-2\nL X+5"
+    first = read(f"M128\n{same}\n{moves}", "heidenhain", "table-table-AC")
+    for other in (vector, "PLANE SPATIAL SPA+20 SPB+30 SPC+0 STAY\nPLANE RESET STAY\n" + same):
+        assert apart(first, read(f"M128\n{other}\n{moves}", "heidenhain", "table-table-AC")) < 1e-6
+    euler = read(f"M128\nPLANE EULER EULPR+90 EULNU+20 EULROT-90 STAY\n{moves}", "heidenhain", "table-table-AC")
+    assert apart(euler, read(f"M128\nPLANE SPATIAL SPA+0 SPB+20 SPC+0 STAY\n{moves}", "heidenhain",
+                             "table-table-AC")) < 1e-6
+    relative = "PLANE SPATIAL SPA+0 SPB+20 SPC+0 STAY\nPLANE RELATIV SPB+15 STAY"
+    assert apart(read(f"M128\n{relative}\n{moves}", "heidenhain", "table-table-AC"),
+                 read(f"M128\nPLANE SPATIAL SPA+0 SPB+35 SPC+0 STAY\n{moves}", "heidenhain", "table-table-AC")) < 1e-6
+    axial = read(f"PLANE AXIAL B+35 TURN FMAX\n{moves}", "heidenhain", "table-table-BC")
+    assert np.allclose(axial.poses.end_axis[-1], [-math.sin(math.radians(35)), 0, math.cos(math.radians(35))],
+                       atol=1e-9)
+
+
+def test_a_move_before_the_axes_stand_in_the_plane_is_refused():
+    with pytest.raises(ProgramError, match="before the rotary axes stand in it"):
+        read("PLANE SPATIAL SPA+20 SPB+0 SPC+0 STAY\nL X+1 Y+1 Z+1", "heidenhain", "table-table-AC")
+
+
+@pytest.mark.parametrize("kind", ["table-table-AC", "head-head-BC"])
+def test_vectors_and_spatial_angles(kind):
+    axis = plane_of(20, 30, 40)[:, 2]
+    words = " ".join(f"T{k}{v:+.9f}" for k, v in zip("XYZ", axis, strict=True))
+    first = read(f"M128\nLN X+0 Y+0 Z+9 TX+0 TY+0 TZ+1 FMAX\nLN X+10 Y+5 Z+5 NX+0 NY+0 NZ+1 {words} F300", "heidenhain",
+                 kind)
+    assert np.allclose(first.poses.end_axis[-1], axis, atol=1e-8) and (first.feed[first.line == 8] == 300.0).all()
+    tcpm = "FUNCTION TCPM F TCP AXIS SPAT PATHCTRL VECTOR\nL X+0 Y+0 Z+9 FMAX\nL X+10 Y+5 Z+5 A+20 B+30 C+40 F300"
+    second = read(tcpm, "heidenhain", kind)
+    assert np.allclose(second.poses.end_axis[-1], axis, atol=1e-8)
+    normal = np.cross([0, 0, 1], axis)
+    assert np.abs(second.poses.end_axis[second.line == 8] @ normal).max() < 5e-5
+
+
+def test_case_files_are_read():
+    """FUNCTION TCPM and M128 with a feed: the same as M128 alone."""
+    path = CASES / "nc" / "h_tcpm.h"
+    if not path.exists():
+        pytest.skip("shared cases are not here")
+    for name, kind, letters in (("h_tcpm.h", "table-table-BC", "BC"), ("h_m128f.h", "table-table-AC", "AC")):
+        text = (CASES / "nc" / name).read_text()
+        p = read_program(text, dialect="heidenhain", kinematics=Kinematics(kind), tools={1})
+        plain = re.sub("FUNCTION TCPM.*|M128 F1000", "M128", text).replace("FUNCTION RESET TCPM", "M129")
+        assert apart(p, read_program(plain, dialect="heidenhain", kinematics=Kinematics(kind), tools={1})) == 0.0
+        turn = np.radians([5.0, 10.0])
+        assert np.allclose(p.poses.end_turn[-1], turn) and p.end[-1].tolist() == [20.0, 5.0, 40.0]
+        assert np.allclose(p.poses.end_axis[-1], Kinematics(kind).axis(turn[None])[0]), letters

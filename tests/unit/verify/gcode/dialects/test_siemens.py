@@ -1,0 +1,183 @@
+"""Words of Siemens controls: each program beside the same moves in plain G0, G1, G2 and G3."""
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from geometry.errors import ProgramError, VerificationError
+from tests.program_pairs import NAMES, RADII, apart, read, same_feeds
+from tests.siemens_pairs import PAIRS
+from verify.gcode.dialects import dialect_of, siemens_flow
+from verify.gcode.reader import read_program
+from verify.kinematics import Kinematics
+
+CASES = Path(__file__).parents[5] / "shared" / "cases"
+if not CASES.exists():
+    CASES = Path(__file__).parents[6] / "shared" / "cases"
+
+@pytest.mark.parametrize("name", [k for k, (_, plain) in PAIRS.items() if plain])
+def test_the_same_moves(name):
+    given, plain = PAIRS[name]
+    first, second = read(given, "siemens"), read(plain, "siemens")
+    assert apart(first, second) < 1e-6
+    assert same_feeds(first, second) and first.dwell == second.dwell
+
+
+def test_turns_over_a_full_circle():
+    p = read("G1 X10 Z0\nG3 X0 Y10 Z-9 I-10 J0 TURN=2", "siemens")
+    assert apart(p, read("G1 X10 Z0\nG3 X0 Y10 Z-9 I-10 J0 P3", "linuxcnc")) < 1e-6
+    way = np.unwrap(np.arctan2(p.end[p.line == 7, 1], p.end[p.line == 7, 0]))
+    assert way[-1] == pytest.approx(2.25 * math.tau) and np.allclose(p.end[p.line == 7, 2], -9 * way / way[-1])
+
+
+def test_inches():
+    given = ("G700 G90 G54\nT1 M6\nS1000 M3 F10\nG0 X0 Y0 Z2\nTRANS X1\nG1 X1 Y=IC(0.5) RND=0.2\nG3 X2 Y1.5 I=AC(1) "
+             "J=AC(1.5)\n"
+             "CYCLE81(1,0,0.1,-0.2)\nATRANS X=-1")
+    plain = ("G710 G90 G54\nT1 M6\nS1000 M3 F254\nG0 X0 Y0 Z50.8\nTRANS X25.4\nG1 X25.4 Y=IC(12.7) RND=5.08\n"
+             "G3 X50.8 Y38.1 I=AC(25.4) J=AC(38.1)\nCYCLE81(25.4,0,2.54,-5.08)")
+    first, second = read(given, "siemens", head=False), read(plain, "siemens", head=False)
+    assert apart(first, second) < 1e-6 and same_feeds(first, second)
+
+
+def test_tools_by_name():
+    for word, number in (('T="MILL_D10"', 1), ('T="mill_d10"', 1), ('T="drill 8"', 2), ("T=3", 3), ('T="3"', 3),
+                         ("T3", 3)):
+        p = read(f"{word} D1\nM6\nS500 M3\nG0 X1 Y1 Z9\nG1 Z1 F9", "siemens")
+        assert p.tool[-1] == number and not p.remarks
+    with pytest.raises(ProgramError, match="no tool of the setup has this id") as refused:
+        read('T="REAMER"\nM6', "siemens")
+    assert "MILL_D10" in refused.value.remedy
+
+
+def test_a_tool_behind_its_m6():
+    for words in ("M6 T2", "T2 M6 D1", "T2 D1 M6", "M6 D1 T2"):
+        p = read(f"{words}\nG0 X1 Y1 Z9", "siemens")
+        assert p.tool[-1] == 2 and not p.remarks, words
+
+
+def test_a_preselected_tool_is_loaded_by_m6():
+    p = read("T2\nG0 X1\nM6\nG1 X2 Y1 Z5", "siemens", radii=RADII)
+    assert p.tool[p.line == 7][0] == 1 and p.tool[-1] == 2
+
+
+REFUSED = [
+    ("EXTCALL \"PART\"", "EXTCALL"), ("POCKET4(5,0,1,-9,20,0,0,5)", "POCKET4( ) (a pocket)"),
+    ("SLOT1(1)", "slots on a circle"),
+    ("CYCLE90(1)", "thread milling"), ("CYCLE97(1)", "a thread"), ("L99", "subprogram L99 is not in this file"),
+    ("KONT", "KONT (another approach"), ("BSPLINE X1", "a spline"), ("G58 X1", "programmable work offset"),
+    ("G33 Z1 K1", "thread cutting"), ("G1 X9 F9 RND=20\nY9", "does not fit"),
+    ("G1 X9 F9 CHR=2\nTRANS X1", "TRANS between a corner"), ("G1 Z1 F9 RND=2", "leaves the plane"),
+    ("X=R5", "R5 has no value yet"),
+    ("G1 X=1/0", "has no value"), ("X=$AA_IM[X]", "$AA_IM[X] is a value of the control"),
+    ("$P_UIFR[1,X,TR]=5", "$P_UIFR is set"),
+    ("GOTOF ENDE", "no such label"), ("WAYTO", "no subprogram of this file"), ("M77", "unknown word M77"),
+    ("D2", "first cutting edge"),
+    ("ENDWHILE", "has no counterpart"), ("ROT X30", "tilts the coordinates"), ("G500\nX1",
+                                                                               "G500 without a work offset"),
+    ("A3=0 B3=0 C3=1 X1", "no rotary axes"), ("CYCLE81(5,0,1)", "without a depth"),
+    ("CYCLE81(-5,0,1,3)", "above the place"),
+    ("CYCLE801(1)", "a pattern of holes"), ("CALL BLOCK A TO B", "is not a variable"), ("G1 X=(1", "')' is missing"),
+    ("CT X5 Y5", "no move came before"), ("G1 X=\"A\"", "a text"),
+    ("/IF R1==1", "a / before IF"), ("DEF FRAME F", "cannot read")
+]
+
+
+@pytest.mark.parametrize(("line", "said"), REFUSED)
+def test_what_is_not_followed_is_named_with_its_line(line, said):
+    with pytest.raises(ProgramError, match=re.escape(said)) as refused:
+        read_program(f"G710 G17 G90 G54\nG0 X0 Y0 Z9\n{line}\nM30\n",
+                     dialect="siemens", names=NAMES, radii=RADII)
+    assert re.search("line [3456]", refused.value.message)
+
+
+def test_a_loop_without_end_is_bounded(monkeypatch):
+    monkeypatch.setattr(siemens_flow, "MAX_JUMPS", 1000)
+    with pytest.raises(VerificationError, match="jumps") as refused:
+        read("AA: R1=1\nGOTOB AA", "siemens")
+    assert refused.value.code == "program_too_long" and refused.value.limit == 1000
+
+
+def test_deep_calls_are_bounded():
+    with pytest.raises(ProgramError, match="nested calls"):
+        read("L1\nM30\nPROC L1\nL1\nRET", "siemens")
+
+
+def test_programs_of_one_file():
+    text = ("%_N_MAIN_MPF\n;$PATH=/_N_WKS_DIR\nG710 G17 G90 G94 G54\nT1 M6\nS900 M3 F100\nG0 X0 Y0 Z9\nL20 "
+            "P2\nHOLE\nM30\n"
+            "%_N_L20_SPF\nG1 X=IC(2)\nM17\n%_N_HOLE_SPF\n; a hole\nPROC HOLE\nG1 Z-1\nRET\n")
+    p = read_program(text, dialect="siemens")
+    assert p.end[-1].tolist() == [4.0, 0.0, -1.0] and dialect_of(text) == "siemens"
+    assert p.line.tolist()[-3:] == [11, 11, 16]
+
+
+AXIS = np.array([0.3, -0.4, 0.87])
+
+
+@pytest.mark.parametrize("kind", ["table-table-AC", "table-table-BC", "head-head-BC", "head-table-BC"])
+def test_vectors_turn_the_tool_along_a_great_circle(kind):
+    axis = AXIS / np.linalg.norm(AXIS)
+    words = " ".join(f"{k}3={v:.9f}" for k, v in zip("ABC", axis, strict=True))
+    p = read(f"TRAORI\nG54\nORIWKS\nG0 X0 Y0 Z9\nG1 X20 Y10 Z5 {words}\nX0 A3=0 B3=1 C3=1", "siemens", kind)
+    assert np.allclose(p.poses.end_axis[p.line == 10][-1], axis, atol=1e-8)
+    first = p.line == 10
+    normal = np.cross([0, 0, 1], axis)
+    assert np.abs(p.poses.end_axis[first] @ normal).max() < 1e-6  # in the plane of both ends
+    last = p.line == 11
+    b = np.array([0.0, 1.0, 1.0]) / math.sqrt(2)
+    normal = np.cross(axis, b)
+    assert np.abs(p.poses.end_axis[last] @ normal).max() < 5e-5 and last.sum() > 10
+    share = (p.end[last, 0] - 20.0) / -20.0
+    angle = np.arccos(np.clip(p.poses.end_axis[last] @ axis, -1, 1))
+    whole = np.arccos(axis @ b)
+    assert np.abs(angle - share * whole).max() < 5e-5  # evenly along the path
+
+
+def test_axes_that_turn_evenly():
+    """ORIMKS: the middle of the block has the middle of the angles."""
+    p = read("TRAORI\nG54\nORIMKS\nG0 X0 Y0 Z9 A0 C0\nG1 X20 A20 C40", "siemens", "table-table-AC")
+    k = np.argmin(np.abs(p.end[:, 0] - 10.0))
+    assert np.allclose(p.poses.end_turn[k], np.radians([10.0, 20.0]) * p.end[k, 0] / 10.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["table-table-AC", "table-table-BC", "head-head-BC"])
+def test_cycle800_turns_the_axes_and_keeps_the_tip(kind):
+    """The swivelled plane holds the same places as TRAORI with vectors."""
+    a, b = math.radians(20.0), math.radians(30.0)
+    rx = np.array([[1, 0, 0], [0, math.cos(a), -math.sin(a)], [0, math.sin(a), math.cos(a)]])
+    ry = np.array([[math.cos(b), 0, math.sin(b)], [0, 1, 0], [-math.sin(b), 0, math.cos(b)]])
+    plane = rx @ ry
+    shift = np.array([5.0, 6.0, 7.0])
+    p = read('CYCLE800(1,"TC1",200000,57,5,6,7,20,30,0,0,0,0,-1,0,1)\nG0 X10 Y20\nZ30\nG1 Z-2\nG2 X20 Y20 I5 J0\n'
+             "CYCLE81(30,0,2,-4)\nG0 G53 Z0\nCYCLE800()", "siemens", kind)
+    places = {9: (10, 20, -2), 10: (20, 20, -2)}
+    for line, q in places.items():
+        assert np.allclose(p.end[p.line == line][-1], plane @ np.array(q) + shift, atol=1e-6), line
+        assert np.allclose(p.poses.end_axis[p.line == line][-1], plane[:, 2], atol=1e-9)
+    arc = p.end[p.line == 10] - shift
+    assert np.allclose(np.linalg.norm(arc @ plane - np.array([15, 20, -2]), axis=1), 5.0, atol=1e-6)
+    assert np.allclose(p.end[p.line == 11][-1], plane @ np.array([20, 20, 30]) + shift, atol=1e-6)
+    unknown = p.unknown[p.line[p.unknown[:, 0]] == 8]
+    assert len(unknown) == 1  # the way down begins at home
+
+
+def test_case_files_are_read():
+    """The plate program of a shop, and a five-axis program with vectors."""
+    path = CASES / "nc" / "siemens_typical.mpf"
+    if not path.exists():
+        pytest.skip("shared cases are not here")
+    p = read_program(path.read_text(), dialect="siemens", names={"FRAESER_D10": 10}, radii={10: 5.0}, tools={10})
+    def of(line):
+        return p.end[p.line == line]
+
+    assert (p.tool == 10).all() and of(17)[-1].tolist() == [10.0, 10.0, -2.0]
+    assert np.allclose(np.linalg.norm(of(18)[:, :2] - [15.0, 10.0], axis=1), 5.0)
+    assert of(22)[-1].tolist() == [20.0, 0.0, 10.0] and of(25)[-1].tolist() == [20.0, 0.0, -3.0]
+    text = (CASES / "nc" / "s_traori_vec.mpf").read_text()
+    q = read_program(text, dialect="siemens", kinematics=Kinematics("table-table-AC"), tools={1})
+    axis = np.array([0.0152, -0.0858, 0.9962])
+    assert np.allclose(q.poses.end_axis[-1], axis / np.linalg.norm(axis)) and q.end[-1].tolist() == [20.0, 5.0, 40.0]

@@ -1,0 +1,223 @@
+"""Words of Fanuc and Haas as shops write them: places by hand, and what is refused by name."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from geometry.errors import ProgramError
+from verify.gcode.dialects.fanuc import REFUSED
+from verify.gcode.reader import FEED, read_program
+from verify.kinematics import Kinematics
+
+HEAD = "%\nO1000\nG21 G90 G17\nT1 M6\nS1000 M3\nG0 G54 X0 Y0\nG43 H1 Z10.\n"
+F = " F100."
+
+
+def read(body, dialect="fanuc", **options):
+    return read_program(HEAD + body + "M30\n%\n", dialect=dialect, **options)
+
+
+def ends(body, dialect="fanuc", feeds=True, **options):
+    p = read(body, dialect, **options)
+    keep = (p.line > 7) & ((p.kind == FEED) | (not feeds))
+    return p.end[keep].round(6).tolist()
+
+
+@pytest.mark.parametrize(("body", "expected"), [
+    # a quarter turn about a place: (20, 10) about (10, 10) becomes (10, 20)
+    ("G68 X10. Y10. R90.\nG1 X20. Y10. F100.\nX20. Y20.\nG69\nX0. Y0.\n", [[10, 20, 10], [0, 20, 10], [0, 0, 10]]),
+    ("G1 X5. Y0. F100.\nG68 R90.\nX6.\nG69\n", [[5, 0, 10], [5, 1, 10]]),
+    ("G51 X10. Y0. Z0. P2.\nG1 X15. Y5. Z1. F100.\nG50\nX0.\n", [[20, 10, 2], [0, 10, 2]]),
+    ("G51 X0. Y0. Z0. I2. J3. K1.\nG1 X1. Y1. F100.\nG50\n", [[2, 3, 10]]),
+    ("G51.1 X10.\nG1 X3. Y4. F100.\nG50.1 X0.\nX3.\n", [[17, 4, 10], [3, 4, 10]]),
+    ("G51.1 X0. Y0.\nG1 X3. Y4. F100.\nG50.1 X0.\nX3. Y4.\nG50.1\nX1. Y1.\n", [[-3, -4, 10], [3, -4, 10], [1, 1, 10]]),
+    # mirror before scale before rotation: (1, 2) -> (-1, 2) -> (-2, 4) -> (-4, -2)
+    ("G68 X0. Y0. R90.\nG51 X0. Y0. Z0. P2.\nG51.1 X0.\nG1 X1. Y2. Z5. F100.\nG69\nG50\nG50.1\n", [[-4, -2, 10]]),
+    ("G52 X100. Y0.\nG68 X10. Y10. R90.\nG1 X20. Y10. F100.\nG69\nG52 X0. Y0.\n", [[110, 20, 10]]),
+    ("G16\nG1 X10. Y90. F100.\nX10. Y0.\nG15\nX3. Y3.\n", [[0, 10, 10], [10, 0, 10], [3, 3, 10]])])
+def test_coordinates_turned_scaled_and_mirrored(body, expected):
+    np.testing.assert_allclose(ends(body), expected, atol=1e-6)
+
+
+def test_mirrors_of_haas():
+    np.testing.assert_allclose(ends("G101 X0.\nG1 X3. Y4. F100.\nG100 X0.\nX3.\n", "haas"), [[-3, 4, 10], [3, 4, 10]])
+
+
+def test_arcs_turn_the_other_way_in_a_mirror():
+    """A quarter counterclockwise about the zero from (5, 0) is, mirrored at X0, clockwise from (-5, 0)."""
+    p = read("G51.1 X0.\nG1 X5. Y0. F100.\nG3 X0. Y5. I-5.\nG50.1\n")
+    arc = p.end[p.line == 10]
+    np.testing.assert_allclose(np.hypot(arc[:, 0], arc[:, 1]), 5, atol=1e-9)
+    np.testing.assert_allclose(arc[-1], [0, 5, 10], atol=1e-9)
+    assert (arc[:, 0] < 1e-9).all() and len(arc) > 5
+
+
+def test_compensation_changes_its_side_in_a_mirror():
+    body = "G51.1 X0.\nG41 D1 G1 X5. Y0. F100.\nX20.\nG40 X30. Y10.\nG50.1\n"
+    np.testing.assert_allclose(ends(body, radii={1: 2.0}), [[-5, 2, 10], [-20, 2, 10], [-30, 10, 10]], atol=1e-9)
+    turned = "G68 X0. Y0. R90.\nG41 D1 G1 X5. Y0. F100.\nX20.\nG40 X30. Y10.\nG69\n"
+    np.testing.assert_allclose(ends(turned, radii={1: 2.0}), [[-2, 5, 10], [-2, 20, 10], [-10, 30, 10]], atol=1e-9)
+
+
+@pytest.mark.parametrize(("body", "expected"), [
+    # the first G54 written is the zero of the setup; G55 is 100 mm beside it
+    ("G10 L2 P1 X-300. Y-200. Z-400.\nG10 L2 P2 X-200. Y-200. Z-400.\nG0 X1. Y1. Z9.\nG1 X5. F100.\nG55 G1 X5.\n",
+     [[5, 1, 9], [105, 1, 9]]),
+    ("G10 L2 P2 X-200. Y-200. Z-400.\nG10 L2 P1 X-300. Y-200. Z-400.\nG0 X1. Y1. Z9.\nG55 G1 X5. F100.\n",
+     [[105, 1, 9]]),
+    ("G10 L2 P1 X-300. Y-200. Z-400.\nG0 X1. Y1. Z9.\nG1 X5. F100.\nG10 L2 P1 X-290. Y-200. Z-400.\nX5.\n",
+     [[5, 1, 9], [15, 1, 9]]),
+    ("G10 L2 P1 X-300. Y0 Z0\nG0 X1. Y1. Z9.\nG91 G10 L2 P1 X10.\nG90 G1 X5. F100.\n", [[15, 1, 9]]),
+    ("G52 X10. Z-1.\nG1 X5. Z0 F100.\nG52 X0 Z0\nX5. Z0\n", [[15, 0, -1], [5, 0, 0]]),
+    # lengths: wear moves the tip, the first geometry is the tool's own length
+    ("G10 L11 P1 R0.2\nG43 H1\nG1 Z1. F100.\n", [[0, 0, 1.2]]),
+    ("G10 L10 P1 R150.\nG43 H1\nG1 Z1. F100.\nG10 L10 P1 R150.5\nG43 H1\nZ1.\n", [[0, 0, 1], [0, 0, 1.5]]),
+])
+def test_tables_that_the_program_writes(body, expected):
+    head = HEAD.replace("G0 G54 X0 Y0\nG43 H1 Z10.\n", "G54\n" if "L2" in body else "G0 G54 X0 Y0\nG43 H1 Z10.\n")
+    p = read_program(head + ("G43 H1\n" if "L2" in body else "") + body + "M30\n%\n", dialect="fanuc")
+    np.testing.assert_allclose(p.end[p.kind == FEED], expected, atol=1e-9)
+    assert not [r for r in p.remarks if "work offset" in r.message], p.remarks
+
+
+def test_a_register_of_no_tool_is_the_length_of_the_one_in_the_spindle():
+    """H51 with T1 is a habit; H2 with T1 is the length of another tool of the setup."""
+    assert read("G43 H51\nG1 Z1. F100.\n", tools={1, 2}).remarks == ()
+    assert any("H51 counts as the length of T1" in n for n in read("G43 H51\n", tools={1, 2}).notes)
+    for h in (2, 5, 12):
+        other = read(f"G43 H{h}\nG1 Z1. F100.\n", tools={1, 2})
+        assert any(f"length offset H{h} with tool T1" in r.message for r in other.remarks)
+    written = read("G10 L10 P7 R120.\nG43 H7\nG1 Z1. F100.\n", tools={1, 2})
+    assert written.remarks == ()
+
+
+R, Z0 = 2.0, -5.0
+
+
+@pytest.mark.parametrize(("words", "dialect", "down", "up"), [
+    ("G81 R2. Z-5.", "fanuc", [-5], []), ("G82 R2. Z-5. P500", "fanuc", [-5], []),
+    ("G83 R2. Z-5. Q3000", "fanuc", [-1, -4, -5], []), ("G83 R2. Z-5. Q3.", "haas", [-1, -4, -5], []),
+    ("G83 R2. Z-5. I3. J0.5 K1.", "haas", [-1, -4, -5], []), ("G73 R2. Z-5. Q3.", "fanuc", [-1, -4, -5], []),
+    ("G84 R2. Z-5.", "fanuc", [-5], [2]), ("G74 R2. Z-5.", "fanuc", [-5], [2]), ("G85 R2. Z-5.", "fanuc", [-5], [2]),
+    ("G86 R2. Z-5.", "fanuc", [-5], []), ("G76 R2. Z-5. Q0.2 P100", "fanuc", [-5], []),
+    ("G89 R2. Z-5. P100", "fanuc", [-5], [10])])
+def test_canned_cycles_are_rapids_and_feeds(words, dialect, down, up):
+    """Rapid to R, feed down, feed or rapid up; G98 returns to the height before."""
+    p = read(f"G98 {words} X5. Y5. F100.\nG80\n", dialect)
+    assert p.end[p.kind == FEED][:, 2].tolist() == [*down, *up]
+    assert p.end[-1].tolist() == [5, 5, 10] and R in p.end[:, 2]
+
+
+def test_repeats_and_returns_of_cycles():
+    """K of Fanuc and L of Haas repeat in G91; 0 only keeps the words; G99 stays at R."""
+    assert [e[0] for e in ends("G99 G81 X0 Y0 Z-5. R2. F100. K0\nG91 X10. K3\nG90 G80\n")] == [10, 20, 30]
+    assert [e[0] for e in ends("G99 G81 Z-5. R2. F100. L0\nX7.\nX9.\nG80\n", "haas")] == [7, 9]
+    assert read("G99 G81 X1. Z-5. R2. F100.\nG80\n").end[-1].tolist() == [1, 0, 2]
+
+
+@pytest.mark.parametrize("body", [
+    "G5.1 Q1\nG1 X1. F100.\nG5.1 Q0\n", "G05 P10000\nG1 X1. F100.\nG05 P0\n", "G08 P1\nG1 X1. F100.\nG08 P0\n",
+    "G61\nG1 X1. F100.\nG64\n", "G62\nG63\nG9 G1 X1. F100.\n", "G67 G69 G50 G15 G40 G49 G80\nG43 H1 G1 X1. F100.\n",
+    "M88\nM29 S1000\nG1 X1. F100.\nM89\n", "G1 X1. A0. F100.\n", "(A (NESTED) COMMENT)\nG1 X1. F100. (END)\n",
+    "G1 X1. F100. ;\n", "/M8\n/2 M8\nN10/M9\nG1 X1. F100.\n", "G97 S1000\nG1 X1. F100.\n", "g1 x1. f100.\n",
+    "G1X1.F100.M8\n", "N0100 G01 X+1.000 F100.0\n", "<NAME>\nG1 X1. F100.\n", "G22\nG23\nG94.1\nG1 X1. F100.\n"])
+def test_modes_comments_and_devices_move_nothing(body):
+    p = read(body)
+    assert p.end[p.kind == FEED].tolist() == [[1, 0, 10]] and p.remarks == ()
+
+
+@pytest.mark.parametrize("change", [
+    lambda t: t.replace("\n", "\r\n"), lambda t: t.replace("\n", "\r"), lambda t: "\ufeff" + t, lambda t: t + "\x1a",
+    lambda t: "\x00\x00" + t + "\x00" * 9, lambda t: t.replace("%\n", "\n\n", 1).removesuffix("%\n"),
+    lambda t: t.replace("O1000", ":1000"), lambda t: t.replace("O1000", "O1000(Fr\xe4sen)"),
+    lambda t: t.replace("\n", "\r\r\n"), lambda t: t.removesuffix("%\n"), lambda t: t + "anything\n"])
+def test_line_ends_tape_codes_and_names_as_they_are(change):
+    text = HEAD + "G1 X1. F100.\nX2.\nM30\n%\n"
+    p = read_program(change(text), dialect="fanuc")
+    assert p.end[p.kind == FEED].tolist() == [[1, 0, 10], [2, 0, 10]] and p.remarks == ()
+
+
+def test_a_block_with_a_slash_is_a_remark_only_where_it_moves():
+    assert any("depends on a switch" in r.message for r in read("/G1 X1. F100.\n").remarks)
+    assert any("depends on a switch" in r.message for r in read("N5/2 G1 X1. F100.\n").remarks)
+
+
+def test_a_place_of_the_machine_needs_no_g0_on_these_controls():
+    p = read("G1 X1. F100.\nG53 Z0.\nG0 X5.\nZ5.\n")
+    assert p.remarks == () and p.end[-1].tolist() == [5, 0, 5]
+
+
+@pytest.mark.parametrize(("dialect", "body", "words"), [
+    ("fanuc", "G65 P1 X1.\n", "the program O1 is not in the file"), ("fanuc", "G66 P1\n", "G66 (a macro call)"),
+    ("fanuc", "G12.1\n", "G12.1 (polar interpolation)"), ("haas", "G13 D1 I5. F100.\n", "G13 (a circular pocket)"),
+    ("haas", "G150 P1\n", "G150 (a pocket)"), ("haas", "G70 I5. J0. L6\n", "G70 (a pattern of holes)"),
+    ("fanuc", "G87 Z-5. R1. F100.\n", "G87 (back boring)"), ("fanuc", "G31 Z-5. F100.\n", "G31 (probing)"),
+    ("fanuc", "G33 Z-5. F1.\n", "G33 (threading)"), ("fanuc", "G6.2 P4 K0 X1.\n", "G6.2 (a spline)"),
+    ("fanuc", "G7.1 C10.\n", "G7.1 (cylindrical interpolation)"), ("fanuc", "G60 X1.\n", "G60 (positioning"),
+    ("fanuc", "G1 A5. F100.\n", "A5."), ("fanuc", "G68 X0 Y0 I0 J0 K1. R10.\n", "a rotation in space"),
+    ("fanuc", "G68 R10.\nG68 R20.\n", "G68 while a rotation is in force"), ("fanuc", "G91 G68 R10.\n", "incremental"),
+    ("fanuc", "G51 X0 Y0 P2\n", "without a decimal point"), ("fanuc", "G51 X0 Y0\n", "G51 without a scale"),
+    ("fanuc", "G51 X0 Y0 Z0 I2. J1. K1.\nG2 X10. I5. F100.\n", "different scales"),
+    ("fanuc", "G68 R10.\nG92 X0\n", "rotated"), ("fanuc", "G16\nG91 G1 X1. Y1. F100.\n", "polar"),
+    ("fanuc", "G10 L2 P0 X5.\n", "a common shift"), ("fanuc", "G10 L20 P1 X5.\n", "G54.1"),
+    ("fanuc", "G10 L3\n", "G10"), ("fanuc", "G41.1\n", "normal direction control"),
+    ("fanuc", "G1 X1. F100.\nG10 L2 P1 X5.\n", "G10 L2 of G54 after feed moves")])
+def test_what_moves_and_is_not_followed_is_refused_by_name(dialect, body, words):
+    with pytest.raises(ProgramError) as caught:
+        read(body, dialect)
+    assert words in caught.value.message and f"line {7 + body.count(chr(10))}:" in caught.value.message
+
+
+AC = Kinematics("table-table-AC", ((0.0, 0.0, -50.0), (0.0, 0.0, -50.0)))
+UNKNOWN = Kinematics("table-table-AC")
+START = "%\nO1\nG21 G90 G17\nT1 M6\nS1000 M3\nG54 G0 X0. Y0.\nG43 H1 Z100.\nG53 Z0.\n"
+TILT = np.array([[1, 0, 0], [0, np.cos(np.pi / 6), -0.5], [0, 0.5, np.cos(np.pi / 6)]])  # 30 deg about X
+
+
+def spatial(body, machine=AC):
+    return read_program(START + body + "M30\n%\n", dialect="fanuc", kinematics=machine, gauge_length={1: 100.0})
+
+
+@pytest.mark.parametrize("machine", [AC, UNKNOWN], ids=["pivots", "no pivots"])
+def test_a_tilted_plane_turns_the_tool_and_the_coordinates(machine):
+    """Origin (10, 0, 5), turned 30 deg about X: the tool stands along the Z of the plane, arcs and holes lie in it."""
+    p = spatial("G68.2 X10. Y0. Z5. I0. J30. K0.\nG53.1\nG0 X1. Y2.\nZ20.\nG1 Z-1. F100.\nX5.\nG3 X5. Y8. R3.\n"
+                "G0 Z20.\nG98 G81 X7. Y1. Z-3. R2.\nG80\nG53 Z0.\nG69\n", machine)
+    cut = p.end[p.kind == FEED]
+    place = (cut - [10, 0, 5]) @ TILT
+    np.testing.assert_allclose(place[0], [1, 2, -1], atol=1e-9)
+    np.testing.assert_allclose(place[1], [5, 2, -1], atol=1e-9)
+    np.testing.assert_allclose(np.hypot(*(place[2:-1, :2] - [5, 5]).T), 3, atol=1e-9)
+    np.testing.assert_allclose(place[2:-1, 2], -1, atol=1e-9)
+    np.testing.assert_allclose(place[-1], [7, 1, -3], atol=1e-9)
+    np.testing.assert_allclose(p.poses.end_axis[p.kind == FEED] - TILT[:, 2], 0, atol=1e-9)
+
+
+def test_tool_vectors_turn_the_axes():
+    p = spatial("G43.5 H1\nG0 X0. Y0. Z50. I0. J0. K1.\nG1 X10. I0.5 J0. K0.8660254 F100.\nX20.\nG49\n")
+    axes = p.poses.end_axis[p.kind == FEED]
+    np.testing.assert_allclose(axes[-1], [0.5, 0, 0.8660254], atol=1e-6)
+    np.testing.assert_allclose(p.end[p.kind == FEED][-1], [20, 0, 50])
+
+
+@pytest.mark.parametrize(("body", "words"), [
+    ("G53.1\n", "G53.1 without G68.2"), ("G68.2 P2 Q1 X0. Y0. Z0.\n", "G68.2 in another form"),
+    ("G68.2 J30.\nG68.2 J40.\n", "G68.2 while a plane"), ("G91 G68.2 J30.\n", "incremental"),
+    ("G43.5 H1\nG0 Z50.\nG2 X5. I5. J0. F100.\n", "tool vectors"), ("G43.5 H1\nG0 Z50. I0. J0. K0.\n", "length 0")])
+def test_planes_and_vectors_that_cannot_be_read(body, words):
+    with pytest.raises(ProgramError) as caught:
+        spatial(body)
+    assert words in caught.value.message
+
+
+def test_a_plane_needs_rotary_axes():
+    with pytest.raises(ProgramError) as caught:
+        read("G68.2 J30.\nG53.1\n")
+    assert "G53.1 turns the tool axis" in caught.value.message
+
+
+def test_the_page_lists_every_word_that_is_refused():
+    page = (Path(__file__).resolve().parents[4] / "docs" / "verify.md").read_text().partition("## Words it refuses")[2]
+    listed = set(page.replace(",", " ").split())
+    assert not [f"G{code:g}" for code in REFUSED if f"G{code:g}" not in listed]

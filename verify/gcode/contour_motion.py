@@ -1,0 +1,328 @@
+"""Straight moves, and moves whose cutter radius is compensated, written to the log.
+
+Blocks count in programmed coordinates (mm, seen through the frames of ``verify.gcode.frames``); the state and the log
+keep the tip in the setup frame. While compensation is on, ``State.position`` is the programmed place and ``actual`` the
+place of the tool.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from verify.gcode.block_words import BlockError
+from verify.gcode.cutter_compensation import (
+    FANUC_STYLE,
+    LINUXCNC_STYLE,
+    CompensationError,
+    Contour,
+    Element,
+    Piece,
+    Style,
+)
+from verify.gcode.dialects.base import DialectReader
+from verify.gcode.frames import Frame, translation
+from verify.gcode.work_offsets import Origins
+from verify.program.arc_chords import CHORD, PLANE_AXES, swept_points
+from verify.program.move_kinds import FEED, RAPID
+from verify.program.move_log import MAX_MOVES_A_BLOCK
+from verify.program.program import NAN
+
+_UNSETTLED = "cutter radius compensation is on: end it with G40 first"
+
+
+@dataclass(frozen=True)
+class _Way:
+    """What else a move of a contour has: kind, mm/min, (3,) mm where it starts and ends, as programmed."""
+
+    kind: int
+    feed: float
+    start: list[float]
+    end: list[float]
+
+
+@dataclass(frozen=True)
+class _Event:
+    """Something to do between two moves, with its line."""
+
+    line: int
+    run: Callable[[], None]
+
+
+class ContourMotion(Origins):
+    """Straight moves and compensated contours.
+
+    control : reader of the control's words, None for LinuxCNC
+    radii   : mm by T number, radius of the tools of the setup (``OffsetTables`` keeps it)
+    names   : T numbers by the ids of the tools of the setup
+    actual  : (3,) mm, place of the tool where it is not the programmed one, None elsewhere
+    across  : whether the running block has a word of an axis of the plane
+    """
+
+    def __init__(self, *arguments: object, **named: object) -> None:
+        super().__init__(*arguments, **named)  # type: ignore[arg-type]
+        self.control: DialectReader | None = None
+        self._open_tables()
+        self.names: dict[str, int] = {}
+        self.contour: Contour | None = None
+        self.actual: list[float] | None = None
+        self.across = False
+        self._composed: tuple[tuple[object, ...], Frame | None] | None = None
+        self._stated: tuple[Frame, list[float]] | None = None  # coordinates of a place that is not known whole
+
+    @property
+    def _foreign(self) -> bool:
+        return self.control is not None
+
+    @property
+    def style(self) -> Style:
+        """How the control compensates a cutter radius."""
+        return self.control.style if self.control is not None else LINUXCNC_STYLE
+
+    def _frame(self) -> Frame | None:
+        """From coordinates as the blocks have them, mm, to the setup frame; None where both are the same."""
+        s, outer = self.s, None if self.control is None else self.control.frame
+        if outer is None and s.frame is None:
+            return None
+        key = (outer, s.frame, *s.origin)
+        if self._composed is None or self._composed[0] != key:
+            own = outer if s.frame is None else s.frame if outer is None else outer @ s.frame
+            zero = s.origin
+            whole = translation(zero) @ own @ translation([-v for v in zero]) if any(zero) and own is not None else own
+            self._composed = key, whole
+        return self._composed[1]
+
+    def _here(self) -> list[float]:
+        """(3,) mm, the programmed place in the coordinates of the blocks."""
+        frame = self._frame()
+        if frame is None:
+            return list(self.s.position)
+        place = frame.back(self.s.position)
+        if self._stated is not None and self._stated[0] is frame:
+            place = [q if math.isnan(p) else p for p, q in zip(place, self._stated[1], strict=True)]
+        return place
+
+    def _compensation(self, word: float, values: dict[str, float]) -> None:
+        """Run G40, G41, G42, G41.1 or G42.1."""
+        s = self.s
+        if word == 40:
+            return self._end_contour()
+        side = 1 if word in (41, 41.1) else -1
+        radius = self._cutter_radius(word, values)
+        if self.contour is not None:
+            if side == s.side and radius == self.contour.radius and self.style is not LINUXCNC_STYLE:
+                return None
+            raise BlockError(f"G{word:g} while {_UNSETTLED}")
+        if self.style is LINUXCNC_STYLE and s.plane == 19:
+            raise BlockError("cutter radius compensation in plane G19")
+        if s.tcp and s.tilted and not self._square():
+            raise BlockError("cutter radius compensation with a tilted tool")
+        if (frame := self._frame()) is not None:
+            radius /= frame.scale_in(s.plane)
+        s.side = side
+        if radius == 0:  # the programmed path is the path of the tool
+            return None
+        if self.style is FANUC_STYLE:
+            self.log.note("cutter radius compensation is read with an approach of type A and straight outside corners; "
+                          "parameters or settings of the machine decide")
+        where = self.actual or self._here()
+        i, j, _ = PLANE_AXES[s.plane]
+        self.contour = Contour(side * (1 if radius > 0 else -1), abs(radius), complex(where[i], where[j]))
+        self.actual = list(where)
+        return None
+
+    def _square(self) -> bool:
+        """Whether the tool stands square to the plane of the blocks."""
+        s, frame = self.s, self._frame()
+        if frame is None or self.machine is None:
+            return False
+        axis = self.machine.axis(np.radians([s.turn]))[0]
+        normal = frame.matrix[:, PLANE_AXES[s.plane][2]]
+        return bool(np.linalg.norm(axis - normal / np.linalg.norm(normal)) < 1e-6)
+
+    def _cutter_radius(self, word: float, values: dict[str, float]) -> float:
+        """mm, of the D word, which is the diameter itself in G41.1 and G42.1."""
+        s = self.s
+        if word in (41.1, 42.1):
+            if "D" not in values:
+                raise BlockError(f"G{word:g} needs D, the diameter of the tool")
+            return values["D"] * s.scale / 2
+        if "D" in values or s.d is None or self.style is LINUXCNC_STYLE:
+            s.d = int(values["D"]) if "D" in values else s.tool
+        written = self._written_radius(s.d, self.radii.get(s.tool))
+        if written is not None:
+            return written
+        if s.d == 0 and "D" in values and self.style is not LINUXCNC_STYLE:
+            return 0.0
+        number = s.d if s.d in self.radii else s.tool
+        if number not in self.radii:
+            raise BlockError(f"G{word:g} needs the radius of T{number}, and the setup has no such tool",
+                             "give the tool in the setup, or set the register with G10 L12")
+        radius = self.radii[number]
+        if number != s.tool or (s.d != s.tool and not self._own_register(s.d)):
+            self.log.remark("radius_offset", f"cutter radius D{s.d} with tool T{s.tool} in the spindle", (s.d, s.tool))
+        self.log.note(f"D{s.d} counts as the radius of T{number}, {radius:g} mm; a contour that is the path of the "
+                      "tool's centre needs 0 there instead")
+        return radius
+
+    def _end_contour(self) -> None:
+        """G40: the contour ends on its own normal; the next move leads to its programmed place."""
+        self.s.side = 0
+        if self.contour is None:
+            return
+        self._write_pieces(self.contour.close())
+        self.contour = None
+        if self.actual == self._here():
+            self.actual = None
+
+    def _settled(self, word: str) -> None:
+        """Refuse a block that compensation does not go with."""
+        if self.contour is not None:
+            raise BlockError(f"{word} while {_UNSETTLED}")
+
+    def _in_order(self, run: Callable[[], None]) -> None:
+        """Do something after the moves before it are written."""
+        if self.contour is None:
+            return run()
+        return self._write_pieces(self.contour.wait(_Event(self.log.line, run)))
+
+    def _go(self, target: list[float], kind: int, feed: float, turn: list[float] | None = None,
+            minutes: float = NAN) -> None:
+        """A straight move of a block, compensated where that is on; arguments as those of ``_line_to``."""
+        if self.contour is None:
+            return self._line_to(target, kind, feed, turn, minutes)
+        if turn is not None and turn != self.s.turn:
+            raise BlockError(f"a rotary axis turns while {_UNSETTLED}")
+        start = self._here()
+        if any(math.isnan(v) for v in [*start, *target]):
+            raise BlockError("cutter radius compensation at a place that the program has not stated")
+        i, j, _ = PLANE_AXES[self.s.plane]
+        a, b = complex(start[i], start[j]), complex(target[i], target[j])
+        way = _Way(kind, feed, start, target)
+        if a == b:
+            pieces: Iterable[Piece | object] = self.contour.wait(_Event(self.log.line, lambda: self._along(way)))
+        else:
+            pieces = self.contour.add(Element(a, b, line=self.log.line, rapid=kind == RAPID, tag=way), self.style)
+        self._write_pieces(pieces)
+        self._stand_at(target)
+
+    def _bow(self, target: list[float], centre: complex, sweep: float, feed: float) -> None:
+        """An arc of a block while compensation is on, in its plane: centre, mm, and signed sweep, rad."""
+        start, (i, j, _) = self._here(), PLANE_AXES[self.s.plane]
+        if self.contour is None or any(math.isnan(v) for v in [*start, *target]):
+            raise BlockError("cutter radius compensation at a place that the program has not stated")
+        self._write_pieces(self.contour.add(Element(
+            complex(start[i], start[j]), complex(target[i], target[j]), centre, sweep, self.log.line,
+            tag=_Way(FEED, feed, start, target)), self.style))
+        self._stand_at(target)
+
+    def _stand_at(self, target: list[float]) -> None:
+        frame = self._frame()
+        self.s.position = target if frame is None else frame.out(target)
+
+    def _along(self, way: _Way) -> None:
+        """A move along the third axis: the tool keeps its place in the plane."""
+        k = PLANE_AXES[self.s.plane][2]
+        there = list(self.actual or way.end)
+        there[k] = way.end[k]
+        self._line_to(there, way.kind, way.feed)
+
+    def _write_pieces(self, pieces: Iterable[Piece | object]) -> None:
+        """Write pieces of the contour as moves with the lines of their elements."""
+        programmed, line = self.s.position, self.log.line
+        try:
+            for piece in pieces:
+                if isinstance(piece, _Event):
+                    self.log.line = piece.line
+                    piece.run()
+                elif isinstance(piece, Piece):
+                    self.log.line = piece.element.line
+                    self._write_piece(piece)
+        except CompensationError:  # what follows would be named for the same reason
+            self.contour, self.actual = None, None
+            raise
+        finally:
+            self.s.position, self.log.line = programmed, line
+
+    def _write_piece(self, piece: Piece) -> None:
+        way = piece.element.tag
+        assert isinstance(way, _Way)
+        i, j, k = PLANE_AXES[self.s.plane]
+        start = list(self.actual or way.start)
+        end = list(way.end)
+        end[i], end[j] = piece.end.real, piece.end.imag
+        if piece.link:
+            end[k] = start[k]
+        if piece.centre is None:
+            return self._line_to(end, way.kind, way.feed)
+        points = swept_points(start, end, (piece.centre.real, piece.centre.imag), piece.sweep, (i, j, k), CHORD,
+                              MAX_MOVES_A_BLOCK).tolist()
+        self.log.room(len(points))
+        for p in points:
+            self._line_to(p, way.kind, way.feed)
+        return None
+
+    def _line_to(self, target: list[float], kind: int, feed: float, turn: list[float] | None = None,
+                 minutes: float = NAN) -> None:
+        """Write a straight move from the place of the tool to ``target`` and turn the axes to ``turn``.
+
+        target : (3,) mm, in the coordinates of the blocks
+        kind, feed : as in ``Program``; turn : (2,) deg, or None; minutes : min, nan where the feed gives them
+        """
+        s, frame = self.s, self._frame()
+        if self.actual is not None:
+            s.position = list(self.actual) if frame is None else frame.out(self.actual)
+            if self.contour is not None:
+                self.actual = target
+            elif self.style.holds and not self.across:
+                return self._hold(target, kind, feed, turn, minutes, frame)
+            else:
+                self.actual = None
+        unknown = frame is not None and any(map(math.isnan, target))
+        self._stated = (frame, list(target)) if unknown and frame is not None else None
+        return self._straight(target if frame is None else frame.out(target), kind, feed, turn, minutes)
+
+    def _hold(self, target: list[float], kind: int, feed: float, turn: list[float] | None, minutes: float,
+              frame: Frame | None) -> None:
+        """A move along the third axis after G40: the tool keeps its place in the plane until a word names one."""
+        there, k = list(self.actual or target), PLANE_AXES[self.s.plane][2]
+        there[k] = target[k]
+        self._straight(there if frame is None else frame.out(there), kind, feed, turn, minutes)
+        self.actual = there
+        self._stand_at(target)
+
+    def _straight(self, target: list[float], kind: int, feed: float, turn: list[float] | None,
+                  minutes: float) -> None:
+        """Move straight to ``target`` (3,) mm, setup frame, and turn the axes to ``turn`` (2,) deg, if given."""
+        s = self.s
+        start = [t if math.isnan(p) else p for p, t in zip(s.position, target, strict=True)]
+        was, s.position = s.position, target
+        level = target[2] == target[2] and was[2] != target[2]
+        if kind == RAPID and s.offset is None and s.tool > 0 and level:
+            self.log.remark("rapid_offset", f"Z moves with the length offset off (no G43 H{s.tool})", s.tool)
+        known = not any(math.isnan(v) for v in target)
+        if s.parked and level and not known:
+            self.log.remark("parked", "Z comes down at an X or Y of machine coordinates: program X and Y first",
+                            self.log.line)
+        s.parked &= math.isnan(target[0]) or math.isnan(target[1])
+        if known:
+            if not self.log.moved:
+                self._assume()
+            axes = sum(1 << k for k, p in enumerate(was) if math.isnan(p))
+            self._write(start, target, kind, feed, axes, turn, minutes)
+        elif turn is not None:
+            self._stand(turn)
+
+    def _leave(self, named: Sequence[bool]) -> None:
+        """As in ``Rotary``; the place of the tool is unknown along the same axes."""
+        super()._leave(named)
+        if self.actual is not None:
+            self.actual = [NAN if n else p for n, p in zip(named, self.actual, strict=True)]
+            if self.actual[0] != self.actual[0] and self.actual[1] != self.actual[1]:
+                self.actual = None
+
+
+__all__ = ["ContourMotion"]

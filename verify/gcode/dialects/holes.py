@@ -1,0 +1,112 @@
+"""Drilling cycles of a control as rapids and feeds along the tool axis: the envelope of what the tool does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from verify.gcode.dialects.base import BlockError, Machine
+from verify.gcode.dialects.stated_places import digits
+
+LEAD = 0.2
+"""mm above the last depth at which a peck begins to feed again."""
+
+
+@dataclass(frozen=True)
+class DrilledHole:
+    """One hole; heights are mm along the tool axis in the coordinates of the control.
+
+    clear, bottom, back : where the feed begins, the bottom, and where the tool goes afterwards
+    pecks   : depths of the pecks, mm, from ``clear`` or the surface downwards; empty for one stroke
+    surface : height from which the pecks count
+    lift    : mm that a peck retracts, inf for all the way to ``clear``
+    feed    : F word of the way down, '' to keep the one in force; out: of the way up to ``clear``, None for a rapid
+    dwell   : s at the bottom
+    """
+
+    clear: float
+    bottom: float
+    back: float
+    pecks: tuple[float, ...] = ()
+    surface: float = 0.0
+    lift: float = math.inf
+    feed: str = ""
+    out: str | None = None
+    dwell: float = 0.0
+
+
+def even_pecks(depth: float, first: float, step: float, least: float, machine: Machine) -> tuple[float, ...]:
+    """Depths of pecks, mm, that shrink from one to the next.
+
+    depth : of the hole; first : of the first peck; step : by which each is shorter; least : the shortest
+
+    Raises
+    ------
+    VerificationError
+        More pecks than a block may make.
+    """
+    if first <= 0 or first >= depth:
+        return ()
+    shrinks = math.ceil((first - least) / step) if step > 0 and first > least else 0
+    shortest = max(first - step * shrinks, least) if step > 0 else first
+    if shortest <= 0:
+        shortest = min(first, depth)
+    machine.log.room(4.0 * (shrinks + depth / shortest + 2))
+    out, at, peck = [], 0.0, first
+    while at + peck < depth - 1e-9:
+        at += peck
+        out.append(at)
+        peck = max(peck - step, least, 1e-9) if step > 0 else peck
+    return tuple(out)
+
+
+def hole_blocks(hole: DrilledHole, here: Sequence[float], axis: int, unit: float, relative: bool) -> list[str]:
+    """Blocks of a hole at the place where the tool stands.
+
+    here : (3,) mm, in the coordinates of the control; axis : 0, 1 or 2, the tool axis
+    unit : mm for one unit of the program; relative : whether coordinates are incremental
+
+    Raises
+    ------
+    BlockError
+        A plane below another; a place that is not stated.
+    """
+    across = [v for k, v in enumerate(here) if k != axis]
+    if any(math.isnan(v) for v in across):
+        raise BlockError("a drilling cycle at a place that the program has not stated")
+    if hole.bottom > hole.clear + 1e-9:
+        raise BlockError(f"a drilling cycle whose depth, {hole.bottom:g} mm, is above the place where its feed begins, "
+                         f"{hole.clear:g} mm")
+    if hole.back < hole.clear - 1e-9:
+        raise BlockError(f"a drilling cycle that retracts to {hole.back:g} mm, below the place where its feed begins, "
+                         f"{hole.clear:g} mm")
+    out: list[str] = []
+    at = here[axis]
+    if relative and math.isnan(at):
+        raise BlockError("a drilling cycle in incremental coordinates at a height that the program has not stated")
+
+    def go(word: str, height: float, feed: str = "") -> None:
+        nonlocal at
+        out.append(f"{word} {'XYZ'[axis]}{digits((height - at if relative else height) / unit)} {feed}".strip())
+        at = height
+
+    go("G0", hole.clear)
+    for depth in hole.pecks:
+        height = max(hole.surface - depth, hole.bottom)
+        if height >= hole.clear:
+            continue
+        go("G1", height, hole.feed)
+        go("G0", min(height + hole.lift, hole.clear))
+        if math.isinf(hole.lift):
+            go("G0", min(height + LEAD, hole.clear))
+    go("G1", hole.bottom, hole.feed)
+    if hole.dwell > 0:
+        out.append(f"G4 P{digits(hole.dwell)}")
+    if hole.out is not None:
+        go("G1", hole.clear, hole.out)
+    go("G0", hole.back)
+    return out
+
+
+__all__ = ["DrilledHole", "even_pecks", "hole_blocks"]

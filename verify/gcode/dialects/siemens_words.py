@@ -1,0 +1,96 @@
+"""Words of Siemens controls by what the reader does with them."""
+
+from __future__ import annotations
+
+from verify.gcode.cutter_compensation import Approach, Corner, Style
+
+SIEMENS_STYLE = Style(Corner.ARC, Approach.NEXT_NORMAL)
+"""NORM and G450."""
+SHARP_STYLE = Style(Corner.INTERSECTION, Approach.NEXT_NORMAL)
+"""NORM and G451."""
+
+SAME = frozenset({0, 1, 2, 3, 17, 18, 19, 40, 53, 54, 55, 56, 57, 90, 91, 93, 94, 95})
+"""G words that the reader takes as they are."""
+UNITS = {700: 20, 710: 21, 71: 21}
+UNBOUNDED = frozenset({64, 642, 643, 644, 645})
+IDLE_CODES = frozenset({9, 62, 290, 601, 602, 603, 621, 810, 820, 962, 971})
+"""G words without effect on a path: exact stops, feeds in corners, groups of the machine's maker."""
+
+
+def _named(meaning: str, words: str) -> dict[str, str]:
+    return dict.fromkeys(words.split(), meaning)
+
+
+_SOFT = "a soft approach or retract"
+MOVES = {5: "an oblique plunge", 7: "an oblique plunge", 33: "thread cutting", 34: "thread cutting",
+         35: "thread cutting",
+         58: "a programmable work offset", 59: "a programmable work offset", 96: "constant cutting speed",
+         **dict.fromkeys((147, 148, 247, 248, 340, 341, 347, 348), _SOFT),
+         **dict.fromkeys((460, 461, 462), "a longer approach of cutter radius compensation")}
+"""G words that are not followed, and what they do."""
+
+IDLE = frozenset("""
+    ACTBLOCNO BLSYNC BRISK CDOF CDOF2 CDON CFC CFIN CFTCP COMPOF CORROF CP CPRECOF CPRECON CUT2D CUT2DF
+    DELAYFSTOF DELAYFSTON DIAM90 DIAMOF DIAMON DISPLOF DISPLON DRIVE DYNFINISH DYNNORM DYNPOS DYNPREC DYNROUGH
+    DYNSEMIFIN FCUB FFWOF FFWON FIFOCTRL FLIN FNORM FTOCOF GWPSOF IPTRLOCK IPTRUNLOCK NORM ORIRESET OSC OSD OSOF
+    OSS OSSE OST PAROTOF RTLIOF RTLION SAVE SBLOF SBLON SOFT SPATH SPCOF SPCON STARTFIFO STOPFIFO STOPRE SUPD
+    TOROTOF TOWSTD UPATH WALIMOF WALIMON""".split())
+"""Words that change speed, smoothing, display or the flow of blocks only."""
+
+COMPRESSORS = frozenset({"COMPON", "COMPCURV", "COMPCAD", "COMPSURF"})
+"""Words after which the control may leave the path, by CTOL where it is stated."""
+
+IDLE_VALUES = frozenset("""
+    ACC ACCLIMA FGREF FL FRC FRCM H JERKLIM JERKLIMA LIMS OVR OVRA OVRRAP SPOS SPOSA STOLF SVC VELOLIM
+    VELOLIMA""".split())
+"""Names with a value that change speed, smoothing or outputs only."""
+
+IDLE_CALLS = frozenset("""
+    BRISKA CLRINT DELETE DISABLE DRIVEA ENABLE FGREF FGROUP GROUP_ADDEND GROUP_BEGIN GROUP_END MSG NEWCONF SETAL
+    SETMS SOFTA SPCOF SPCON SPI WORKPIECE WRITE""".split())
+"""Calls without a move: lines on the screen, the blank of the graphics, limits of speed."""
+
+ENVELOPES = ("CYCLE81", "CYCLE82", "CYCLE83", "CYCLE84", "CYCLE840", "CYCLE85", "CYCLE86", "CYCLE87", "CYCLE88",
+             "CYCLE89")
+"""Drilling cycles that are followed as rapids and feeds."""
+
+NOT_FOLLOWED = {
+    **_named("a pocket", "POCKET1 POCKET2 POCKET3 POCKET4 CYCLE73"), **_named("slots on a circle", "SLOT1 SLOT2"),
+    **_named("elongated holes", "LONGHOLE"), **_named("engraving", "CYCLE60"), **_named("face milling",
+                                                                                        "CYCLE61 CYCLE71"),
+    **_named("a contour", "CYCLE62 CYCLE63 CYCLE64 CYCLE72 CYCLE74 CYCLE75"),
+    **_named("thread milling", "CYCLE70 CYCLE78 CYCLE90"), **_named("a spigot", "CYCLE76 CYCLE77 CYCLE79"),
+    **_named("a pattern of holes", "CYCLE801 CYCLE802 HOLES3"), **_named("an open slot", "CYCLE899"),
+    **_named("turning", "CYCLE92 CYCLE93 CYCLE94 CYCLE95 CYCLE930 CYCLE940 CYCLE951 CYCLE952"),
+    **_named("a thread", "CYCLE97 CYCLE98 CYCLE99"),
+    **_named("a measurement", "CYCLE750 CYCLE971 CYCLE976 CYCLE977 CYCLE978 CYCLE979 CYCLE996 CYCLE998"),
+    **_named("another transformation", "TRANSMIT TRACYL TRAANG"), **_named("a tangential axis", "TANG TANGON TANGOF"),
+    **_named("a coupled axis", "TRAILON LEADON COUPON"), **_named("travel to a stop", "FXS"),
+    **_named("a preset axis", "PRESETON PRESETONS"), **_named("a contour table", "EXECTAB CONTPRON CONTDCON"),
+    **_named("a positioning axis", "POS POSA"), **_named("a tool offset", "TOFFON"),
+}
+"""Cycles and functions that move, turn or cut and are not followed, and what they do."""
+
+REFUSED = {
+    **_named("a spline", "ASPLINE BSPLINE CSPLINE"), **_named("a polynomial", "POLY PO"),
+    **_named("an involute", "INVCW INVCCW"),
+    **_named("another approach of cutter radius compensation", "KONT KONTT KONTC"), **_named("an allowance", "OFFN"),
+    **_named("a frame from the tool or the part", "TOFRAME TOROT PAROT"),
+    **_named("a rotation by solid angles", "ROTS AROTS CROTS"), **_named("a frame variable",
+                                                                         "CTRANS CROT CSCALE CMIRROR"),
+    **_named("a measurement", "MEAS MEAW MEASA"), **_named("compensation in space", "CUT3DC CUT3DF CUT3DFS CUT3DFF"),
+    **_named("a tool carrier", "TCARR TCOABS TCOFR TOWWCS"), **_named("suppressed compensation", "CUTCONON"),
+    **_named("travel to a stop", "FXS"), **_named("moves of the axes", "PTP PTPG0"),
+    **_named("orientation on a curve or cone", "ORICURVE ORICONCW ORICONCCW ORICONIO"),
+    **_named("other orientation angles", "ORIEULER ORIRPY ORIRPY2 ORIVIRT1 ORIVIRT2 A2 B2 C2"),
+    **_named("a move of the machine's maker", "OEMIPO1 OEMIPO2"),
+     **_named("an angle of a line", "ANG"), **_named("surface normals",
+                                                                                      "A4 B4 C4 A5 B5 C5"),
+    **_named("a lead or tilt angle", "LEAD TILT"), **_named("a turn of the tool about itself", "THETA"),
+    **_named("an opening angle of an arc", "AR"), **_named("a feed per tooth", "FZ"), **_named(_SOFT, "DISR DISCL"),
+    **_named("another transformation", "TRACON TRANSMIT TRACYL TRAANG"),
+}
+"""Words and names that move or cut and are not followed, and what they are."""
+
+__all__ = ["COMPRESSORS", "ENVELOPES", "IDLE", "IDLE_CALLS", "IDLE_CODES", "IDLE_VALUES", "MOVES", "NOT_FOLLOWED",
+           "REFUSED", "SAME", "SHARP_STYLE", "SIEMENS_STYLE", "UNBOUNDED", "UNITS"]

@@ -1,0 +1,156 @@
+"""Variables and arithmetic of the macros of Fanuc and Haas.
+
+#1 to #33 belong to one level of G65; #100 to #199 and #500 to #999 to the control. #0 and a local variable without a
+value are vacant, which EQ and NE tell from 0. A common variable keeps its value from the program before, so one that
+the program has not set is unknown, and reading it is an error that names it. A vacant number that would reach a word of
+a block is one too.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable
+
+from verify.gcode.block_words import BlockError
+from verify.gcode.expressions import Grammar, divided, modulo, rounded, small_enough, within
+from verify.gcode.parameters import Parameters
+
+LOCALS = 33
+POSITIONS = {5001: 5420, 5002: 5421, 5003: 5422, 5041: 5420, 5042: 5421, 5043: 5422}
+"""Places of the tip in programmed coordinates, and the numbers of LinuxCNC for them."""
+IDLE = frozenset({3003, 3004, 3005, 3006, 3007})
+"""Variables that stop, show messages or lock switches, but move nothing."""
+ALARM = 3000
+_COMMON = (range(100, 200), range(500, 1000))
+ARGUMENTS = dict(zip("ABCIJKDEFHMQRSTUVWXYZ",
+                     (1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 13, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26), strict=True))
+"""Numbers of the local variables that the letters of G65 fill."""
+
+
+class MacroVariables(Parameters):
+    """All variables at one time; the levels of G65 are its frames.
+
+    vacant : the latest number that was read without a value, for messages
+    """
+
+    vacant = 0
+
+    def numbered(self, number: float) -> float:
+        """Value of a variable, nan where it is vacant.
+
+        Raises
+        ------
+        BlockError
+            It is unknown; the message names it.
+        """
+        n = _whole(number)
+        if n <= LOCALS:
+            found = self.frame.numbers.get(n, math.nan)
+            if found != found:
+                self.vacant = n
+            return found
+        if n in POSITIONS:
+            self.changes += 1
+            return self._served(POSITIONS[n])
+        if n not in self._numbers:
+            if any(n in r for r in _COMMON):
+                raise BlockError(f"#{n} has no value: the program has not set it, and a control keeps it from the "
+                                 "program before", f"set #{n} in the program, such as #{n}=0")
+            raise BlockError(f"#{n} is a variable of the control that the proof cannot know",
+                             "write the number instead")
+        if self._numbers[n] != self._numbers[n]:
+            self.vacant = n
+        return self._numbers[n]
+
+    def put(self, number: float, value: float) -> None:
+        """Give a variable a value; nan makes it vacant.
+
+        Raises
+        ------
+        BlockError
+            It is one of the control, or the program stops with an alarm.
+        """
+        n = _whole(number)
+        if n == ALARM:
+            raise BlockError(f"#3000={value:g}: the program stops here with an alarm")
+        if n in IDLE:
+            return
+        if n == 0 or not (n <= LOCALS or any(n in r for r in _COMMON)):
+            raise BlockError(f"#{n} is a variable of the control; the proof does not know the effect of setting it",
+                             "use G10 or G52 to move program zero")
+        held = self.frame.numbers if n <= LOCALS else self._numbers
+        self.changes += held.get(n) != value
+        held[n] = value
+
+    def known(self, value: float, what: str) -> float:
+        """The value itself.
+
+        Raises
+        ------
+        BlockError
+            It is vacant; the message names the variable and ``what`` uses it.
+        """
+        if value != value:
+            raise BlockError(f"{what} uses #{self.vacant}, which has no value yet; set it first")
+        return value
+
+
+def _whole(number: float) -> int:
+    if number != number or abs(number - round(number)) > 1e-4 or not 0 <= number <= 99999:
+        raise BlockError(f"#{number:g} is not a variable")
+    return round(number)
+
+
+def _equal(a: float, b: float) -> float:
+    return float((a != a and b != b) or abs(a - b) < 1e-9)
+
+
+def _ordered(compare: Callable[[float, float], bool]) -> Callable[[float, float], float]:
+    def compared(a: float, b: float) -> float:
+        if a != a or b != b:
+            raise BlockError("a comparison with a variable that has no value yet; set it first")
+        return float(compare(a, b))
+    return compared
+
+
+def _bits(combine: Callable[[int, int], int]) -> Callable[[float, float], float]:
+    def combined(a: float, b: float) -> float:
+        if not (math.isfinite(a) and math.isfinite(b)):
+            raise BlockError("AND, OR or XOR of a variable that has no value yet; set it first")
+        return float(combine(round(a), round(b)))
+    return combined
+
+
+def _truncated(number: float) -> float:
+    return float(math.trunc(number)) if math.isfinite(number) else number
+
+
+def _away(number: float) -> float:
+    return math.copysign(math.ceil(abs(number)), number) if math.isfinite(number) else number
+
+
+def _rounded(number: float) -> float:
+    return rounded(number) if math.isfinite(number) else number
+
+
+_SQRT = within("SQRT", math.sqrt, 0, math.inf)
+_FUNCTIONS: dict[str, Callable[[float], float]] = {
+    "abs": abs, "fix": _truncated, "fup": _away, "round": _rounded, "rnd": _rounded,
+    "exp": lambda v: small_enough(f"EXP[{v:g}]", lambda: math.exp(v)),
+    "acos": within("ACOS", lambda v: math.degrees(math.acos(v)), -1, 1),
+    "asin": within("ASIN", lambda v: math.degrees(math.asin(v)), -1, 1),
+    "cos": lambda v: math.cos(math.radians(v)), "sin": lambda v: math.sin(math.radians(v)),
+    "tan": lambda v: math.tan(math.radians(v)),
+    "ln": within("LN", math.log, math.ulp(0.0), math.inf), "sqrt": _SQRT, "sqr": _SQRT,
+}
+_OPERATORS: dict[str, Callable[[float, float], float]] = {
+    "*": operator.mul, "/": divided, "+": operator.add, "-": operator.sub, "mod": modulo,
+    "and": _bits(operator.and_), "or": _bits(operator.or_), "xor": _bits(operator.xor),
+    "eq": _equal, "ne": lambda a, b: 1.0 - _equal(a, b), "gt": _ordered(operator.gt), "ge": _ordered(operator.ge),
+    "lt": _ordered(operator.lt), "le": _ordered(operator.le),
+}
+MACRO_GRAMMAR = Grammar(_FUNCTIONS, _OPERATORS, {
+    "*": 3, "/": 3, "mod": 3, "and": 3, "+": 2, "-": 2, "or": 2, "xor": 2,
+    "eq": 1, "ne": 1, "gt": 1, "ge": 1, "lt": 1, "le": 1})
+"""Expressions of macro B."""
