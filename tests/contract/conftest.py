@@ -119,7 +119,7 @@ def post(setup_json):
 def finish():
     """Wait for a job to end and return it."""
 
-    def wait(client, job, patience=20.0, until=("queued", "running"), headers=None):
+    def wait(client, job, patience=120.0, until=("queued", "running"), headers=None):
         deadline = time.monotonic() + patience
         while job["state"] in until and time.monotonic() < deadline:
             time.sleep(0.02)

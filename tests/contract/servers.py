@@ -24,7 +24,7 @@ def free_port() -> int:
 
 def until_open(port: int, process: subprocess.Popen[bytes]) -> None:
     """Wait until a process listens; fails the test when it does not."""
-    deadline = time.monotonic() + 40
+    deadline = time.monotonic() + 120
     while time.monotonic() < deadline and process.poll() is None:
         try:
             socket.create_connection(("127.0.0.1", port), 0.5).close()

@@ -66,7 +66,7 @@ def cluster(postgres, fake_path, tmp_path):
 
 
 def _until_ready(client):
-    deadline = time.monotonic() + 40
+    deadline = time.monotonic() + 120
     while client.get("/readyz").status_code != 200 and time.monotonic() < deadline:
         time.sleep(0.2)
 
@@ -110,7 +110,7 @@ def test_a_database_that_goes_and_comes_back_loses_no_job(fake_path, tmp_path, p
             database.start()
             _until_ready(client)
             for job in (running, waiting):
-                ended = finish(client, client.get(job["links"]["self"]).json(), patience=30)
+                ended = finish(client, client.get(job["links"]["self"]).json(), patience=120)
                 assert (ended["state"], ended["attempt"]) == ("proved", 1)
             assert client.get("/readyz").status_code == 200
 
@@ -130,7 +130,7 @@ def test_two_apis_and_two_workers_lose_nothing_when_one_of_each_is_killed(cluste
     time.sleep(1.0)
     first.send_signal(signal.SIGKILL)
     started = time.monotonic()
-    ended = [finish(there, job, patience=90) for job in jobs]
+    ended = [finish(there, job, patience=120) for job in jobs]
     assert [j["state"] for j in ended] == ["proved"] * 8, ended
     assert max(j["attempt"] for j in ended) <= 3 and in_time(time.monotonic() - started, 60)
     assert second.poll() is None and there.get("/readyz").json()["checks"]["database"] == "ok"
@@ -147,6 +147,6 @@ def test_a_worker_that_is_told_to_stop_costs_its_job_no_attempt(cluster, post, f
     other = cluster.worker()
     first.send_signal(signal.SIGTERM)
     assert first.wait(timeout=6) is not None  # not after the 20 s that the job takes
-    ended = finish(there, job, patience=60)
+    ended = finish(there, job, patience=120)
     assert (ended["state"], ended["attempt"]) == ("proved", 1), ended
     assert other.poll() is None

@@ -63,7 +63,7 @@ def test_healthy_jobs_are_proved_beside_poison_and_the_slots_come_back(service, 
     assert in_time(max(took(rows, deeds)), 6) and in_time(max(empty(rows)), 2)
     # both slots are free again: two more run at the same time
     pair = [post(service, "nap").json(), post(service, "nap", part=STEP + b"\n").json()]
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 120
     while time.monotonic() < deadline:
         states = [service.get(j["links"]["self"]).json()["state"] for j in pair]
         if states == ["running", "running"] or "proved" in states:

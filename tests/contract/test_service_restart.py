@@ -42,7 +42,7 @@ def serve(tmp_path):
 
 
 def _asleep(client, job):
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 120
     while client.get(job["links"]["self"]).json()["stage"] != "asleep" and time.monotonic() < deadline:
         time.sleep(0.05)
 
@@ -99,7 +99,7 @@ def test_two_services_cannot_share_a_data_folder(make_client, tmp_path):
 
 
 def _until_ready(client):
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + 120
     while time.monotonic() < deadline:
         try:
             if client.get("/readyz").status_code == 200:

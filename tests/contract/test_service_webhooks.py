@@ -50,7 +50,7 @@ class Receiver:
         self.port = self.server.server_address[1]
         threading.Thread(target=self.server.serve_forever, daemon=True).start()
 
-    def wait(self, count, patience=8.0):
+    def wait(self, count, patience=120.0):
         deadline = time.monotonic() + patience
         while len(self.got) < count and time.monotonic() < deadline:
             time.sleep(0.02)
@@ -83,7 +83,7 @@ def hooked(make_client):
     return start
 
 
-def settled(client, job, state, headers=None, patience=8.0):
+def settled(client, job, state, headers=None, patience=120.0):
     deadline = time.monotonic() + patience
     while time.monotonic() < deadline:
         found = client.get(job["links"]["self"], headers=headers).json()
@@ -220,7 +220,7 @@ def test_an_attempt_that_was_cut_off_by_a_crash_is_made_again(receiver, hooked, 
     client = hooked(there)
     jobs = client.app.state.engine.jobs
     job = post(client, "", webhook_url=f"http://127.0.0.1:{there.port}").json()
-    deadline = time.monotonic() + 5
+    deadline = time.monotonic() + 120
     while client.get(job["links"]["self"]).json()["webhook"]["attempts"] == 0 and time.monotonic() < deadline:
         time.sleep(0.05)
     monkeypatch.undo()
