@@ -6,7 +6,9 @@ from typing import Any
 
 REMEDIES = {"rs274": "apt-get install linuxcnc-uspace", "opencamlib": "make peers",
             "nc_gcode_interpreter": "make peers",
-            "chromium": "apt-get install chromium", "postgres": "apt-get install postgresql"}
+            "chromium": "apt-get install chromium", "postgres": "apt-get install postgresql",
+            "psycopg": "make setup", "make web": "make web", "curl": "apt-get install curl",
+            "compiler": "apt-get install gcc", "../shared": "put the folder shared beside the checkout"}
 """By a word of the reason: the command that brings what is missing."""
 
 

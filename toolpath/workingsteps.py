@@ -110,7 +110,7 @@ class Workingstep:
     """One operation with one tool: one zone finished, or the layers above zones taken off.
 
     id        : 'S07'
-    name      : for people and for STEP-NC, for example 'S07 Z3 zlevel T1 F12 F13'
+    name      : for people and for STEP-NC, for example 'S07 Z3 waterline T1 F12 F13'
     zone      : 'Z3', or None for a step that serves several zones
     faces     : face numbers of the feature
     operation : 'roughing', 'semi_finishing' or 'finishing'

@@ -1,4 +1,4 @@
-"""Iso-parametric passes against Z-level and plane-parallel ones, zone by zone of a whole plan, at equal true scallop.
+"""Iso-parametric passes against waterline and plane-parallel ones, zone by zone of a whole plan, at equal true scallop.
 
 Run from the root of the checkout: ``python benchmarks/passes/bench_strategies.py [--wheel FOLDER] [--parallel N]``;
 the demo part, or the compressor wheel from the folder of parts by others. Every zone with exact faces is walked by

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from tests.shards import pytest_collection_modifyitems, shard_of
+from tests.shards import pytest_collection_modifyitems, pytest_runtest_setup, shard_of, turned
 from tests.skips import remedies
 
 
@@ -27,6 +27,19 @@ def test_every_slow_module_is_in_one_share_and_everyday_tests_in_all(monkeypatch
         seen += [i.nodeid for i in items[:-1]]
     assert sorted(seen) == sorted(f"{n}::test_x" for n in names)
     assert {shard_of(n, 4) for n in names} == {0, 1, 2, 3}
+
+
+def test_the_order_of_a_share_goes_round() -> None:
+    assert [turned(["a", "b", "c"], k)[0] for k in range(4)] == ["a", "b", "c", "a"] and turned([], 5) == []
+
+
+def test_a_slow_test_that_would_begin_too_late_is_skipped_and_an_everyday_one_is_not(monkeypatch) -> None:
+    monkeypatch.setenv("ZONEMILL_SECONDS", "0")
+    with pytest.raises(pytest.skip.Exception, match="time of this share"):
+        pytest_runtest_setup(item("tests/e2e/test_a.py", True))  # type: ignore[arg-type]
+    pytest_runtest_setup(item("tests/e2e/test_a.py", False))  # type: ignore[arg-type]
+    monkeypatch.setenv("ZONEMILL_SECONDS", "1e9")
+    pytest_runtest_setup(item("tests/e2e/test_a.py", True))  # type: ignore[arg-type]
 
 
 def test_skips_for_want_of_programs_name_the_commands_once() -> None:
