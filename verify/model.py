@@ -233,8 +233,9 @@ class Finding:
     def as_dict(self) -> dict[str, Any]:
         out = {**asdict(self), "kind": str(self.kind), "point": list(self.point) if self.point else None,
                "tip": list(self.tip) if self.tip else None, "lines": list(self.lines)}
-        if self.kind is not FindingKind.STOCK_LEFT:
-            del out["lines"]
+        if self.kind is FindingKind.STOCK_LEFT:
+            return {**out, "height": self.depth}
+        del out["lines"]
         return out
 
 

@@ -9,7 +9,7 @@ from verify.gcode.reader import Program, read_program
 from verify.kinematics import Kinematics
 from verify.model import NcProgram
 from verify.progress import Report, silent
-from verify.stepnc.reader import is_stepnc, read_stepnc
+from verify.stepnc.part21 import is_exchange_file
 
 BLEND = 0.001  # mm, deviation that G64 may allow; the error bound includes it
 BLEND_SHARE = 0.1  # of the gouge tolerance: allowed instead where that is more
@@ -29,7 +29,9 @@ def read_one(nc: NcProgram, tools: Sequence[ToolBody], *, work_offset: str = "G5
     ProgramError, VerificationError
         As ``verify.gcode.reader.read_program`` and ``verify.stepnc.reader.read_stepnc``.
     """
-    if is_stepnc(nc.text):
+    if is_exchange_file(nc.text):
+        from verify.stepnc.reader import read_stepnc  # its tables take a tenth of a second to import
+
         return read_stepnc(nc.text, name=nc.name, tools=tools, kinematics=kinematics, report=report)
     return read_program(
         nc.text, name=nc.name, tools=frozenset(t.number for t in tools), work_offset=nc.work_offset or work_offset,

@@ -64,6 +64,7 @@ from verify.surface.guard_points import (
 from verify.surface.removal import residual_on_normals
 from verify.surface.sample_scores import RAY_ERROR, face_proofs, proved_samples, zone_proofs
 from verify.surface.wall_support import supported
+from verify.surface.ways_in import deep_findings
 from verify.surface.work_done import Measured, work_done
 
 MIN_REACH = 1.0
@@ -132,10 +133,10 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                 *_residuals(scored, cuts.residual, setup, zone_ids)]
     work: WorkDone | None = None
     if asked is not None:
+        cutting = Cutting(TriangleTree(part.mesh), setup, moves, tools, threads)
         work, left = work_done(asked, Measured(scored.samples, cuts.residual, cuts.mover, cuts.reach,
-                                               error_bound([p.program for p in framed])),
-                               Cutting(TriangleTree(part.mesh), setup, moves, tools, threads), run.cut, source)
-        findings.extend(left)
+                                               error_bound([p.program for p in framed])), cutting, run.cut, source)
+        findings += [*left, *deep_findings(scored.samples, cuts.residual, cuts.mover, cutting, source)]
     notes = [f"{run.lost} contacts are not listed: the tables are full"] if run.lost else []
     notes.extend(cuts.notes)
     notes.extend(f"T{t.number} is so thin that a plunge may stay unseen: the stock is sampled every "

@@ -1,13 +1,13 @@
 """Offsets planted into correct programs: is each found, as high or deep as it is, and is none proved?
 
-Run from the root of the checkout: ``python benchmarks/faults/planted_offsets.py [--sizes 0.3,5] [--programs A,B]
-[--rows FILE]``. The programs are plans of small parts in five dialects, whole and of one operation each, and, where the
+Run from the root of the checkout: ``python benchmarks/faults/planted_offsets.py [--sizes 0.3,5] [--ways +X,-Z]
+[--programs A,B] [--rows FILE]``. The programs are plans of small parts in five dialects, whole and of one operation each, and, where the
 collection of cases lies beside the checkout, one of its programs. Offsets go along X, Y and Z, both ways, into one tool
 length, and into the work offset. The smallest is twice the larger of scallop and gouge tolerance.
 
 Whether an offset changes anything is judged without the code under test: some sample that the right program leaves
-within tolerance must be out of it, by its residual alone. Found means a finding whose depth or height is within 10 % or
-5 µm.
+within tolerance must be out of it, by its residual alone. Depth and height are judged where such a sample faces along
+the offset, and where so much stock stands on it, or the offset goes into it. Right means within 10 % or 5 µm.
 """
 
 from __future__ import annotations
@@ -36,13 +36,14 @@ from service.program_first import read_first  # noqa: E402
 from service.stages.job_part import ReadPart, read_job_part  # noqa: E402
 from service.stages.program_proof import ProgramProof, proved_program  # noqa: E402
 from tests.step_files import write_step  # noqa: E402
+from verify.blank.blank import stock_on_normals  # noqa: E402
 from verify.surface.sample_scores import proved_samples  # noqa: E402
 
 CASES = Path(__file__).resolve().parents[3] / "shared" / "cases"
 SIZES = (0.1, 0.3, 1.0, 2.0, 5.0)  # mm, beside the smallest
 CHANGED = 5  # samples out of tolerance, from which on an offset has changed something
 FIXED = re.compile(r"G53|G28|G30|M91|SUPA|G10|CYCL DEF|TOOL CALL|^\s*[(;]")
-WORD = re.compile(r"(?<![A-Z_])([XYZ])=?([+-]?\d*\.?\d+)(?![\d=])")
+WORD = re.compile(r"(?<![A-Z_])([XYZ])=?([+-]?(?:\d+\.?\d*|\.\d+))")
 FLAT = {"id": "T1", "number": 1, "kind": "flat", "diameter_mm": 4, "flute_length_mm": 12, "stickout_mm": 25}
 BALL = {"id": "T2", "number": 2, "kind": "ball", "diameter_mm": 3, "flute_length_mm": 8, "stickout_mm": 25}
 
@@ -70,12 +71,14 @@ class Case:
 
 @dataclass(frozen=True)
 class Row:
-    """One planted offset: whether it changes what is cut, the state, and the finding that is nearest to it, mm."""
+    """One planted offset: whether it changes what is cut, whether a face stands square to it, the state, and the
+    finding that is nearest to it, mm."""
 
     program: str
     where: str
     size: float
     changes: bool
+    square: bool
     state: str
     nearest: float | None
     kind: str
@@ -153,37 +156,45 @@ def tool_lines(case: Case) -> dict[int, Callable[[int], bool]]:
     """Lines of each tool, by T number, of a program with several tools."""
     read = read_first(case.setup, case.text, ending=case.ending).read
     tools = np.unique(read.tool[read.tool > 0]).tolist()
-    if len(tools) < 2:
-        return {}
-    return {t: (lambda line, own=set(read.line[read.tool == t].tolist()): line in own) for t in tools}
+    return {} if len(tools) < 2 else {t: set(read.line[read.tool == t].tolist()).__contains__ for t in tools}
 
 
-def planted(case: Case, sizes: tuple[float, ...]) -> Iterator[tuple[str, float, str]]:
-    """Name, size and text of every offset."""
+def planted(case: Case, sizes: tuple[float, ...]) -> Iterator[tuple[str, np.ndarray, str]]:
+    """Name, offset (3,) mm and text of every offset."""
     for size in (case.smallest, *(s for s in sizes if s > case.smallest)):
         for axis, letter in enumerate("XYZ"):
             for way in (1.0, -1.0):
                 by = np.zeros(3)
                 by[axis] = way * size
-                yield f"{'+' if way > 0 else '-'}{letter}", size, shifted(case.text, by)
+                yield f"{'+' if way > 0 else '-'}{letter}", by, shifted(case.text, by)
         for tool, lines in tool_lines(case).items():
             for way in (1.0, -1.0):
-                yield f"length of T{tool} {'+' if way > 0 else '-'}", size, shifted(
-                    case.text, np.array([0.0, 0.0, way * size]), lines)
+                by = np.array([0.0, 0.0, way * size])
+                yield f"length of T{tool} {'+' if way > 0 else '-'}", by, shifted(case.text, by, lines)
     if "G54" in case.text:
-        yield "G55", 0.0, case.text.replace("G54", "G55")
+        yield "G55", np.zeros(3), case.text.replace("G54", "G55")
 
 
-def judge(case: Case, right: ProgramProof, where: str, size: float, text: str) -> Row:
+def is_square(right: ProgramProof, made: ProgramProof, out: np.ndarray, by: np.ndarray) -> bool:
+    """Whether some of the samples (n,) that went out of tolerance show the whole offset (3,) mm."""
+    gouged = made.proof.residual[out] < 0.0
+    s, size = right.samples.subset(out), float(np.linalg.norm(by))
+    along = s.normals @ by / max(size, 1e-9)
+    stock = stock_on_normals(s.points, s.normals, right.frame.part.mesh.bounds, right.conditions, 100.0)
+    return bool(((along > 0.999) & (stock >= size) & ~gouged).sum() + ((along < -0.999) & gouged).sum() > CHANGED)
+
+
+def judge(case: Case, right: ProgramProof, where: str, by: np.ndarray, text: str) -> Row:
     """Prove a text with an offset and look for the finding that is nearest to it."""
-    begin = time.monotonic()
+    begin, size = time.monotonic(), float(np.linalg.norm(by))
     made = case.proof(text)
     good = np.asarray(right.proof.proved, np.bool_)
     out = good & ~proved_samples(made.proof.residual, made.conditions)
     depths = [(abs(f.depth), str(f.kind)) for f in made.proof.findings if str(f.kind) in ("gouge", "stock_left")]
     nearest = min(depths, key=lambda d: abs(d[0] - size), default=(None, ""))
     fits = nearest[0] is not None and abs(nearest[0] - size) <= max(0.1 * size, 0.005)
-    return Row(case.name, where, size, int(out.sum()) > CHANGED or where == "G55", made.report["state"], nearest[0],
+    changes = int(out.sum()) > CHANGED or where == "G55"
+    return Row(case.name, where, size, changes, changes and is_square(right, made, out, by), made.report["state"], nearest[0],
                nearest[1], fits, round(time.monotonic() - begin, 2))
 
 
@@ -191,23 +202,27 @@ def main() -> None:
     """Run the table."""
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--sizes", default=",".join(map(str, SIZES)))
+    options.add_argument("--ways", default="", help="only these, as +X,-Z,G55")
     options.add_argument("--programs", default="")
     options.add_argument("--rows", default="")
     given = options.parse_args()
     sizes = tuple(float(s) for s in given.sizes.split(",") if s)
+    ways = set(filter(None, given.ways.split(",")))
     rows: list[Row] = []
     with tempfile.TemporaryDirectory() as folder:
         for case in cases(Path(folder), set(filter(None, given.programs.split(",")))):
             begin = time.monotonic()
             right = case.proof(case.text)
             report, seconds = right.report, time.monotonic() - begin
-            print(f"{case.name}: {report['state']}, coverage {report['coverage']:.3f}, asked {report['asked']['faces']}, "
-                  f"remainder {[(e['reason'], e['area_mm2']) for e in report['remainder']]}, {seconds:.1f} s",
+            print(f"{case.name}: {report['state']}, coverage {report['coverage']:.3f}, "
+                  f"asked {report['asked']['faces']}, remainder {[(e['reason'], e['area_mm2']) for e in report['remainder']]}, {seconds:.1f} s",
                   [f["message"] for f in report["findings"]][:4], flush=True)
-            for where, size, text in planted(case, sizes):
-                row = judge(case, right, where, size, text)
+            for where, by, text in planted(case, sizes):
+                if ways and where not in ways:
+                    continue
+                row = judge(case, right, where, by, text)
                 rows.append(row)
-                wrong = row.changes and (row.state == "proved" or not (row.right or where == "G55"))
+                wrong = row.changes and (row.state == "proved" or row.square and not row.right)
                 if wrong or not row.changes:
                     print("  ", "WRONG" if wrong else "nothing changes", row, flush=True)
     if given.rows:
@@ -217,13 +232,14 @@ def main() -> None:
 
 def table(rows: list[Row]) -> None:
     """Print one row for each program."""
-    print("| program | offsets | change something | proved of these | right height or depth |")
-    print("|---|---|---|---|---|")
+    print("| program | offsets | change something | proved of these | square to a face | of these right |")
+    print("|---|---|---|---|---|---|")
     for name in dict.fromkeys(r.program for r in rows):
         own = [r for r in rows if r.program == name]
         change = [r for r in own if r.changes]
-        right = [r for r in change if r.right or r.where == "G55"]
-        print(f"| {name} | {len(own)} | {len(change)} | {sum(r.state == 'proved' for r in change)} | {len(right)} |")
+        square = [r for r in change if r.square]
+        print(f"| {name} | {len(own)} | {len(change)} | {sum(r.state == 'proved' for r in change)} | {len(square)} | "
+              f"{sum(r.right for r in square)} |")
 
 
 if __name__ == "__main__":

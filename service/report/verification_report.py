@@ -37,7 +37,7 @@ def verification_report(job: JobPart, proof: Proof, dense: SurfaceSamples) -> tu
 
     Returns
     -------
-    dict, (n,) int64
+    dict, (n,) int64, index
         The report; the entry of its remainder for each sample, -1 for none.
     """
     total = float(dense.area.sum())

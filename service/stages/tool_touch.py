@@ -25,6 +25,7 @@ from zones.machinable_area import SEEN
 from zones.reach.approach_cones import approach
 from zones.reach.index_orientations import AxisCoverage
 from zones.remainder.obstructions import SKIN
+from zones.remainder.reasons import Reason
 
 MAX_REASONED = 3000  # samples whose reason is looked for one by one; the others share that of the nearest in order
 BOOL = NDArray[np.bool_]
@@ -79,19 +80,19 @@ class ToolTouch:
         n = len(samples)
         step = -(-n // MAX_REASONED) if n else 1
         few = samples.subset(np.arange(0, n, step))
-        why = np.full(len(few), "corner", dtype=object)
-        why[~self._seen(few, axes)] = "undercut"
-        tries = [("fixture", tools, self.bare)] if self.clamped else []
-        tries += [("holder", [replace(t, holder=()) for t in tools], self.obstacles),
-                  ("shank", [_cutter(t) for t in tools], self.obstacles)]
+        why = np.full(len(few), Reason.CORNER, dtype=object)
+        why[~self._seen(few, axes)] = Reason.UNDERCUT
+        tries = [(Reason.FIXTURE, tools, self.bare)] if self.clamped else []
+        tries += [(Reason.HOLDER, [replace(t, holder=()) for t in tools], self.obstacles),
+                  (Reason.SHANK, [_cutter(t) for t in tools], self.obstacles)]
         for word, bodies, tree in tries:
-            rows = np.flatnonzero(why == "corner")
+            rows = np.flatnonzero(why == Reason.CORNER)
             why[rows[self._coverage(bodies, tree).reached(few.subset(rows), axes).any(axis=1)]] = word
         for tool in (_cutter(t) for t in tools if t.corner_radius <= 0.0):
-            rows = np.flatnonzero(why == "corner")
+            rows = np.flatnonzero(why == Reason.CORNER)
             near = approach(self.obstacles, tool, self.inputs.clearances, few.points[rows], few.normals[rows], axes,
                             self._lift, self.inputs.quality.stock_allowance_mm)
-            why[rows[near.any(axis=1)]] = "sharp corner"
+            why[rows[near.any(axis=1)]] = Reason.SHARP_CORNER
         return np.repeat(why, step)[:n]
 
     @property

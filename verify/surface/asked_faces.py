@@ -76,6 +76,8 @@ class Cutting:
 def worked_faces(samples: SurfaceSamples, residual: F64, mover: I32, reach: float, cutting: Cutting) -> tuple[int, ...]:
     """Faces along whose normals feed moves remove stock on a fifth of the area or more, whatever they leave.
 
+    Where no face reaches a fifth, all faces that stock is removed from.
+
     samples  : SurfaceSamples, n of them
     residual : (n,) float64, mm of stock on their normals after all moves, not above ``reach``
     mover    : (n,) int32, index, the move that left it, -1 where none cut the first ``reach`` mm
@@ -101,6 +103,9 @@ def worked_faces(samples: SurfaceSamples, residual: F64, mover: I32, reach: floa
         ends = np.cumsum([len(r) for r in rows])
         for k, mine in zip(np.flatnonzero(open_), np.split(by >= 0, ends[:-1]), strict=True):
             worked[k] = sure[k] + more[k] * float(mine.mean()) >= WORKED_SHARE * total[k]
+            more[k] *= float(mine.mean())
+    if not worked.any():
+        worked = sure + np.where(open_, more, 0.0) > 0.0
     return tuple(int(n) for n in numbers[worked])
 
 

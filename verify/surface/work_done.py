@@ -20,7 +20,7 @@ from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.sampling import SurfaceSamples
 from geometry.tool_body import ToolBody
 from verify.findings import Source
-from verify.model import Asked, Finding, ProofSetup, WorkDone
+from verify.model import Asked, Finding, FindingKind, ProofSetup, WorkDone
 from verify.moves import Moves
 from verify.surface.asked_faces import OFF_FACETS, Cutting, thinned, worked_faces
 from verify.surface.sample_scores import proved_samples
@@ -114,6 +114,8 @@ def work_done(asked: Asked, measured: Measured, cutting: Cutting, cut: BOOL,
     on_asked = np.isin(s.face, faces)
     reason[stays & ~on_asked] = NOT_IN_PROGRAM
     rows = np.flatnonzero(stays & on_asked)
+    if asked.faces is None and not faces and cut.any():
+        return WorkDone(faces, reason), [_beside(cut, source)]
     if not len(rows):
         return WorkDone(faces, reason), []
     tried = _tried(rows, s.face)
@@ -127,6 +129,14 @@ def work_done(asked: Asked, measured: Measured, cutting: Cutting, cut: BOOL,
     near = KeyedPoints(few.face.astype(np.int64), few.points)
     reason[rows] = why[near.nearest(s.face[rows].astype(np.int64), s.points[rows])[:, 0]]
     return WorkDone(faces, reason), findings
+
+
+def _beside(cut: BOOL, source: Source) -> Finding:
+    """The finding of a program that removes stock, but none that stands on a judged face."""
+    m = int(np.flatnonzero(cut)[0])
+    return Finding(FindingKind.NOTHING_CUT, source.names[source.program[m]], int(source.line[m]), None, None, None, 0.0,
+                   0.0, "the program removes stock, but none that stands on a face of the part: check the program zero "
+                   "and the tool")
 
 
 def cutting_axes(moves: Moves, used: BOOL) -> F64:

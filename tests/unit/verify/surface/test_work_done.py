@@ -20,7 +20,7 @@ FLOOR, TOP, WALLS = 11, 6, (7, 8, 9, 10)
 
 
 class Everything:
-    """A touch that reaches all but the corners of the pocket, where no round tool goes, and the faces that are named."""
+    """A touch that reaches all but the corners of the pocket, where no round tool goes, and some faces."""
 
     def __init__(self, without=()):
         self.without, self.asked = without, []
