@@ -214,9 +214,10 @@ def main() -> None:
             begin = time.monotonic()
             right = case.proof(case.text)
             report, seconds = right.report, time.monotonic() - begin
-            print(f"{case.name}: {report['state']}, coverage {report['coverage']:.3f}, "
-                  f"asked {report['asked']['faces']}, remainder {[(e['reason'], e['area_mm2']) for e in report['remainder']]}, {seconds:.1f} s",
-                  [f["message"] for f in report["findings"]][:4], flush=True)
+            rest = [(e["reason"], e["area_mm2"]) for e in report["remainder"]]
+            print(f"{case.name}: {report['state']}, coverage {report['coverage']:.3f}, {seconds:.1f} s, asked "
+                  f"{report['asked']['faces']}, remainder {rest}", [f["message"] for f in report["findings"]][:4],
+                  flush=True)
             for where, by, text in planted(case, sizes):
                 if ways and where not in ways:
                     continue
