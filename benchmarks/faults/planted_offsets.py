@@ -1,9 +1,10 @@
 """Offsets planted into correct programs: is each found, as high or deep as it is, and is none proved?
 
 Run from the root of the checkout: ``python benchmarks/faults/planted_offsets.py [--sizes 0.3,5] [--ways +X,-Z]
-[--programs A,B] [--rows FILE]``. The programs are plans of small parts in five dialects, whole and of one operation each, and, where the
-collection of cases lies beside the checkout, one of its programs. Offsets go along X, Y and Z, both ways, into one tool
-length, and into the work offset. The smallest is twice the larger of scallop and gouge tolerance.
+[--programs A,B] [--rows FILE]``. The programs are plans of small parts in five dialects, whole and of one operation
+each, and, where the collection of cases lies beside the checkout, one of its programs. Offsets go along X, Y and Z,
+both ways, into one tool length, and into the work offset. The smallest is twice the larger of scallop and gouge
+tolerance.
 
 Whether an offset changes anything is judged without the code under test: some sample that the right program leaves
 within tolerance must be out of it, by its residual alone. Depth and height are judged where such a sample faces along
@@ -194,8 +195,9 @@ def judge(case: Case, right: ProgramProof, where: str, by: np.ndarray, text: str
     nearest = min(depths, key=lambda d: abs(d[0] - size), default=(None, ""))
     fits = nearest[0] is not None and abs(nearest[0] - size) <= max(0.1 * size, 0.005)
     changes = int(out.sum()) > CHANGED or where == "G55"
-    return Row(case.name, where, size, changes, changes and is_square(right, made, out, by), made.report["state"], nearest[0],
-               nearest[1], fits, round(time.monotonic() - begin, 2))
+    square = changes and is_square(right, made, out, by)
+    return Row(case.name, where, size, changes, square, made.report["state"], *nearest, fits,
+               round(time.monotonic() - begin, 2))
 
 
 def main() -> None:

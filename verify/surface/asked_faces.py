@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64, I32
 from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.mesh_queries.rays import first_hits
 from geometry.sampling import SurfaceSamples
 from geometry.tool_body import ToolBody
@@ -23,6 +24,8 @@ from verify.surface.removal import residual_on_normals
 
 WORKED_SHARE = 0.2  # of the area of a face, along whose normals feed moves remove stock
 MAX_ASKED = 400  # samples of a face that are followed to the end of the stock; their share is known to 2 %
+MAX_GOOD = 200_000  # good samples among which the nearest one is looked for
+ASIDE, ASIDE_ROOM = 2.0, 0.3  # shortest ways, and mm: a good place of the same face so near makes a sample a side
 OFF_FACETS = 0.02  # mm from a sample on: facets of its own surface are no obstacle of its ray
 BOOL = NDArray[np.bool_]
 INT = NDArray[np.int64]
@@ -107,6 +110,20 @@ def worked_faces(samples: SurfaceSamples, residual: F64, mover: I32, reach: floa
     if not worked.any():
         worked = sure + np.where(open_, more, 0.0) > 0.0
     return tuple(int(n) for n in numbers[worked])
+
+
+def distance_aside(samples: SurfaceSamples, good: INT, rows: INT) -> F64:
+    """Distance of some samples from the nearest good one of the same face, (r,) float64, mm; inf where there is none.
+
+    good, rows : (g,) and (r,) int64, index; of more than ``MAX_GOOD`` good samples an even share counts
+    """
+    good, out = thinned(good, MAX_GOOD), np.full(len(rows), np.inf)
+    if len(good) and len(rows):
+        near = KeyedPoints(samples.face[good].astype(np.int64), samples.points[good])
+        of = near.nearest(samples.face[rows].astype(np.int64), samples.points[rows])[:, 0]
+        there = of >= 0
+        out[there] = np.linalg.norm(samples.points[good[of[there]]] - samples.points[rows[there]], axis=1)
+    return out
 
 
 def thinned(rows: INT, most: int) -> INT:

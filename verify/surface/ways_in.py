@@ -16,7 +16,7 @@ from geometry.mesh_queries.rays import first_hits
 from geometry.sampling import SurfaceSamples
 from verify.findings import Source
 from verify.model import Finding, FindingKind
-from verify.surface.asked_faces import Cutting, thinned
+from verify.surface.asked_faces import ASIDE, ASIDE_ROOM, Cutting, distance_aside, thinned
 from verify.surface.removal import residual_on_normals
 from verify.tool_axes import square_to
 
@@ -29,12 +29,13 @@ MORE = 1.1  # times the depth below the surface, from which on the way is told a
 SHARE = 0.9  # of the samples of a face with a way: the way that so many do not exceed
 
 
-def ways_in(points: F64, normals: F64, cutting: Cutting) -> F64:
-    """Length of the shortest way from gouged samples through what was removed to what remains of the part.
+def ways_in(points: F64, normals: F64, cutting: Cutting) -> tuple[F64, F64]:
+    """Length of ways from gouged samples through what was removed to what remains of the part.
 
     points, normals : (n, 3) float64, mm and unit, on the surface of the part
 
-    Returns (n,) float64, mm; inf where all ways leave the part.
+    Returns (n,) float64, mm, along the inward normal, and (n,) float64, mm, the shortest; inf where ways leave the
+    part.
 
     Notes
     -----
@@ -60,12 +61,15 @@ def ways_in(points: F64, normals: F64, cutting: Cutting) -> F64:
         if not len(rows):
             break
     length = np.where(length < leaves, length + INSET, np.inf).reshape(-1, n)
-    return np.asarray(length.min(axis=0))
+    return np.asarray(length[0]), np.asarray(length.min(axis=0))
 
 
 def deep_findings(samples: SurfaceSamples, residual: F64, mover: I32, cutting: Cutting,
                   source: Source) -> list[Finding]:
     """A finding for each face into which the cut goes farther than the depth of its gouges below the surface.
+
+    The cut goes as far as the way along the normal; beside a place of the same face that stands, as far as the shortest
+    way, since a cut that passes along a face takes away whole rays below its edge.
 
     samples  : SurfaceSamples, n of them, frame of the proof
     residual : (n,) float64, mm, negative where gouged
@@ -78,7 +82,9 @@ def deep_findings(samples: SurfaceSamples, residual: F64, mover: I32, cutting: C
     most = max(min(MAX_OF_FACE, MAX_ALL // len(faces)), 5)
     chosen = [thinned(rows[samples.face[rows] == face], most) for face in faces]
     tried = np.concatenate(chosen)
-    way = ways_in(samples.points[tried], samples.normals[tried], cutting)
+    along, way = ways_in(samples.points[tried], samples.normals[tried], cutting)
+    aside = distance_aside(samples, np.flatnonzero(np.isin(samples.face, faces) & (residual >= -DEEP)), tried)
+    way = np.where((aside > ASIDE * way + ASIDE_ROOM) & np.isfinite(along), along, way)
     out = []
     for mine, own in zip(chosen, np.split(way, np.cumsum([len(c) for c in chosen])[:-1]), strict=True):
         known = np.flatnonzero(np.isfinite(own))
@@ -93,6 +99,6 @@ def deep_findings(samples: SurfaceSamples, residual: F64, mover: I32, cutting: C
             out.append(Finding(
                 FindingKind.GOUGE, source.names[source.program[m]], int(source.line[m]), None,
                 f"F{samples.face[mine[k]]}", (x, y, z), float(own[k]), cutting.setup.gouge_tolerance,
-                f"T{source.tool[m]} cuts the face {own[k]:.4f} mm back, through {deepest:.4f} mm below the surface at "
-                "the deepest", len(known)))
+                f"T{source.tool[m]} cuts {own[k]:.4f} mm off the face; the deepest place is {deepest:.4f} mm below the "
+                "surface", len(known)))
     return out

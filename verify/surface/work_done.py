@@ -22,7 +22,15 @@ from geometry.tool_body import ToolBody
 from verify.findings import Source
 from verify.model import Asked, Finding, FindingKind, ProofSetup, WorkDone
 from verify.moves import Moves
-from verify.surface.asked_faces import OFF_FACETS, Cutting, thinned, worked_faces
+from verify.surface.asked_faces import (
+    ASIDE,
+    ASIDE_ROOM,
+    OFF_FACETS,
+    Cutting,
+    distance_aside,
+    thinned,
+    worked_faces,
+)
 from verify.surface.sample_scores import proved_samples
 from verify.surface.stock_places import StandingStock, stock_findings
 from verify.surface.ways_out import ways_out
@@ -31,10 +39,8 @@ MAX_TRIED = 12_000  # samples with stock that tools are tried on; the others sha
 LEAST_TRIED = 50  # of them on each face
 MAX_WAYS = 1500  # samples whose shortest way out is looked for; the same for the others
 MAX_WAY = 12.0  # mm, longest such way
-MAX_GOOD = 200_000  # samples without stock among which the nearest one is looked for
 LIFT_SHARE = 0.1  # of h: distance at which a tool on an open face touches a sample
 CORNER_SHARE = 0.5  # of h: the same in a corner
-ASIDE, ASIDE_ROOM = 2.0, 0.3  # ways out, and mm: a place of the same face that is cut so near makes it a side
 MAX_AXES = 24
 SAME_AXIS = float(np.radians(0.01))
 NOT_IN_PROGRAM, LEFT = "not_in_program", "pass"  # words of the remainder
@@ -195,7 +201,7 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     corner = np.zeros(len(tried), np.bool_)
     corner[touched[height[touched] > limits.corner]] = True
     left |= corner
-    rows, aside = _sides(measured, few, height, np.flatnonzero(left), corner, cutting.setup)
+    rows, aside = _sides(measured, few, tried, height, np.flatnonzero(left), corner, cutting.setup)
     way, by = _ways(few, rows, cutting.setup.stock_allowance + limits.h, cutting)
     nearer = (way < height[rows]) & (aside <= ASIDE * way + ASIDE_ROOM)
     left[rows[(nearer & (way <= limits.face)) | (corner[rows] & (way <= limits.corner))]] = False
@@ -205,7 +211,7 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     return StandingStock(np.where(np.isfinite(height), height, MAX_WAY), mover), left, why
 
 
-def _sides(measured: Measured, few: SurfaceSamples, height: F64, rows: INT, corner: BOOL,
+def _sides(measured: Measured, few: SurfaceSamples, tried: INT, height: F64, rows: INT, corner: BOOL,
            setup: ProofSetup) -> tuple[INT, F64]:
     """Those of ``rows`` whose way out counts, (r,) index, and mm from each to a place of its face that is cut, (r,).
 
@@ -214,12 +220,7 @@ def _sides(measured: Measured, few: SurfaceSamples, height: F64, rows: INT, corn
     """
     s = measured.samples
     good = np.flatnonzero(proved_samples(measured.residual, setup) & np.isin(s.face, np.unique(few.face[rows])))
-    good, aside = thinned(good, MAX_GOOD), np.full(len(rows), np.inf)
-    if len(good) and len(rows):
-        near = KeyedPoints(s.face[good].astype(np.int64), s.points[good])
-        of = near.nearest(few.face[rows].astype(np.int64), few.points[rows])[:, 0]
-        there = of >= 0
-        aside[there] = np.linalg.norm(s.points[good[of[there]]] - few.points[rows[there]], axis=1)
+    aside = distance_aside(s, good, tried[rows])
     blocked = ~np.isfinite(height[rows])
     wanted = corner[rows] | blocked | (aside <= ASIDE * np.minimum(height[rows], MAX_WAY) + ASIDE_ROOM)
     return rows[wanted], np.where(blocked, 0.0, aside)[wanted]
