@@ -70,18 +70,23 @@ def test_a_right_program_of_some_faces_is_proved_and_the_other_faces_are_remaind
     assert report["asked"]["by"] == "program" and len(rest["not_in_program"]["faces"]) == 8
 
 
-def test_a_program_1_mm_too_high_is_clean_and_says_where_and_how_much(tmp_path):
-    got = CliRunner().invoke(app, ["verify", str(PLATE), "--setup", str(NC / "pocket_setup.json"), "--program",
-                                   str(NC / "pocket_1mm_high.ngc")])
-    report = json.loads(got.stdout)
+def test_a_program_1_mm_too_high_is_clean_and_says_where_and_how_much(verify):
+    report = verify((NC / "pocket_1mm_high.ngc").read_text())
     Verification.model_validate(report)
-    assert got.exit_code == 3 and report["state"] == "clean" and set(report["finding_counts"]) == {"stock_left"}
+    assert report["state"] == "clean" and set(report["finding_counts"]) == {"stock_left"}
     found = left(report)
     for face in (top_of(report), floor_of(report)):
         height, area, lines = found[face]
         assert height == pytest.approx(1.0, abs=0.005) and area > 100 and lines == sorted(lines) and lines
     assert max(height for height, _, _ in found.values()) == pytest.approx(1.0, abs=0.005)
-    assert "clean: " in got.stderr and "stock_left" in got.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "code", "state"), [("pocket_ok", 0, "proved"), ("pocket_1mm_high", 3, "clean")])
+def test_the_command_line_tells_them_apart(name, code, state):
+    got = CliRunner().invoke(app, ["verify", str(PLATE), "--setup", str(NC / "pocket_setup.json"), "--program",
+                                   str(NC / f"{name}.ngc")])
+    assert got.exit_code == code and json.loads(got.stdout)["state"] == state and f"{state}: " in got.stderr
 
 
 def top_of(report):
@@ -124,6 +129,7 @@ def test_faces_of_the_setup_are_asked_whether_the_program_works_on_them_or_not(v
     assert report["state"] == "proved" and top not in report["asked"]["faces"]
 
 
+@pytest.mark.slow
 def test_without_finishing_no_face_is_asked(verify):
     report = verify(higher(right(), 1.0), operations={"finishing": False})
     assert report["state"] == "proved" and report["asked"] == {"by": "nothing", "faces": []}

@@ -59,7 +59,7 @@ def test_a_right_program_has_no_finding_and_works_on_the_pocket_alone():
     assert {"", "not_in_program", "corner"} <= kept <= {"", "not_in_program", "corner", "pass"}
 
 
-@pytest.mark.parametrize("by", [0.02, 0.25, 2.0])
+@pytest.mark.parametrize("by", [0.02, pytest.param(0.25, marks=pytest.mark.slow), 2.0])
 def test_an_offset_upwards_is_as_high_as_it_is_on_the_floor(by):
     proof = run(raised(program(), by))
     found = of(proof)
@@ -77,6 +77,7 @@ def test_an_offset_aside_is_as_high_as_it_is_on_the_wall_that_it_leaves():
     assert max(f.depth for f in of(proof, FindingKind.GOUGE)) == pytest.approx(1.5, rel=0.1)
 
 
+@pytest.mark.slow
 def test_what_no_tool_touches_is_remainder():
     proof = run(raised(program(), 1.0), touch=Everything(without=(FLOOR,)))
     assert {f.face for f in of(proof)}.isdisjoint({f"F{FLOOR}"})
