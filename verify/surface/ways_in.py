@@ -60,8 +60,8 @@ def ways_in(points: F64, normals: F64, cutting: Cutting) -> tuple[F64, F64]:
         rows = rows[(left < -INSET) & (length[rows] < leaves[rows])]
         if not len(rows):
             break
-    length = np.where(length < leaves, length + INSET, np.inf).reshape(-1, n)
-    return np.asarray(length[0]), np.asarray(length.min(axis=0))
+    reached = np.where(length < leaves, length + INSET, np.inf).reshape(-1, n)
+    return np.asarray(reached[0]), np.asarray(reached.min(axis=0))
 
 
 def deep_findings(samples: SurfaceSamples, residual: F64, mover: I32, cutting: Cutting,
