@@ -14,8 +14,8 @@ from schemas.problem import Problem
 from schemas.tools import Tool
 
 JobKind = Literal["plan", "zones", "verify"]
-JobState = Literal["queued", "running", "proved", "unproved", "done", "failed", "cancelled"]
-FINAL_STATES = ("proved", "unproved", "done", "failed", "cancelled")
+JobState = Literal["queued", "running", "proved", "clean", "unproved", "done", "failed", "cancelled"]
+FINAL_STATES = ("proved", "clean", "unproved", "done", "failed", "cancelled")
 
 
 class JobLinks(ReportModel):
@@ -77,7 +77,8 @@ class Job(ReportModel):
     kind: Annotated[JobKind, Field(description="plan: plan and proof; zones: quick check without tool paths; verify: "
                                                "proof of a given program.")]
     state: Annotated[JobState, Field(description="queued and running come first; all other states are final. done ends "
-                                                 "a zones job, which has no proof.")]
+                                                 "a zones job, which has no proof. clean ends a verification "
+                                                 "only: the program does no harm, but work is left undone.")]
     stage: Annotated[str, Field(description="Current stage, in words.", examples=["finishing"])]
     progress: Annotated[float, Field(
         ge=0, le=1, description="Share done, 0 to 1. It never decreases during an attempt. A new attempt starts "
@@ -101,7 +102,7 @@ class Job(ReportModel):
     expired_at: Annotated[str | None, Field(description="Time when its files were deleted, UTC, ISO 8601; null while "
                                                         "they are kept.")] = None
     summary: Annotated[JobSummary | None, Field(description="For plans and verifications in state "
-                                                            "proved or unproved.")] = None
+                                                            "proved, clean or unproved.")] = None
     library: Annotated[list[JobLibraryEntry], Field(
         description="Library entries that its setup used, as they were when it was posted.")] = []
     webhook: Annotated[JobWebhook | None, Field(description="null where the submission had no webhook_url.")] = None

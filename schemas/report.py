@@ -7,12 +7,14 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from schemas.base import ReportModel
-from schemas.zones import Share, ZoneFacts, Zones
+from schemas.zones import Remainder, Share, ZoneFacts, Zones
 
 Findings = Annotated[list[Any], Field(
     description="Findings of the proof, then those of the whole job; empty in state proved. kind: collision, gouge, "
-                "rapid, plunge, rubbing, engagement, support, limit, program or residual; of the whole job: "
-                "nothing_cut or coverage. message: the finding in one sentence. program, line: place in the programs; "
+                "rapid, plunge, rubbing, engagement, support, limit, program, residual or stock_left; of the whole "
+                "job: nothing_cut or coverage. stock_left: only in a verification; it has height (mm, the same as "
+                "depth) and lines (those that left the stock) as well. message: the finding in one sentence. program, "
+                "line: place in the programs; "
                 "line 0: no line causes it. zone, face: ids, or null. point: worst place, mm, setup frame, or null. "
                 "tip: the tool tip there, or null. depth, limit: measured and allowed value, in the unit of message. "
                 "near: true where nothing touches; depth is then the distance. count, area: number and area, mm2, of "
@@ -182,11 +184,27 @@ class Report(Zones):
     version: str
 
 
+class AskedFaces(ReportModel):
+    """The faces that have to be within tolerance wherever the tools of the program can touch them."""
+
+    by: Annotated[Literal["setup", "program", "nothing"], Field(
+        description="setup: operations.faces names them. program: the program works on them; it removes stock along "
+                    "their normals on a fifth of their area or more. nothing: operations.finishing is false.")]
+    faces: Annotated[list[str], Field(examples=[["F3", "F12"]])]
+
+
 class Verification(ReportModel):
     """Proof of a program, which may come from another CAM system."""
 
-    state: Literal["proved", "unproved"]
+    state: Annotated[Literal["proved", "clean", "unproved"], Field(
+        description="proved: no finding. clean: the program does no harm, but work is left undone; all findings are "
+                    "stock_left or nothing_cut. unproved: any other finding.")]
     findings: Findings
+    asked: AskedFaces | None = None
+    remainder: Annotated[list[Remainder], Field(
+        description="Area that is neither within tolerance nor a finding, one entry for each reason: what the tools of "
+                    "the program cannot touch (undercut, fixture, shank, holder, corner, sharp corner), faces that the "
+                    "program does not work on (not_in_program), and places within the error of the proof (pass).")] = []
     deviation: Annotated[list[FaceDeviation], Field(description="Figures by face number.")] = []
     machined: Annotated[MachinedPart | None, Field(description="The machined part, where the request wants it.")] = None
     files: list[ReportFile] = []

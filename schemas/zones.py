@@ -162,7 +162,8 @@ class Remainder(ReportModel):
         description="undercut: material of the part covers the area from every access. undercut behind connection C2: "
                     "that connection covers it. fixture: a fixture covers it or blocks the tools. pass: a tool reaches "
                     "it, but no pass cuts it. shank, holder: a cutter of the setup fits, but this body would collide. "
-                    "gap, corner: only a thinner or sharper cutter fits. sharp corner: no rotating tool fits.")]
+                    "gap, corner: only a thinner or sharper cutter fits. sharp corner: no rotating tool fits. "
+                    "not_in_program: only in a verification; the program does not work on the face.")]
     would_need: Annotated[dict[str, Any], Field(
         description="The tool that would reach it, in available sizes: kind, diameter_mm, corner_radius_mm, "
                     "neck_length_mm, shank_diameter_mm, stickout_mm, like (the tool of the setup with the same holder) "

@@ -1,7 +1,7 @@
 """``zonemill``: plan, zones, verify, serve, view, keys, demo, family, warm, openapi.
 
-Exit codes: 0 proved (verify: no finding; zones: done), 2 bad input, 3 not proved, 1 a bug. Only the result goes to
-stdout; logs and progress go to stderr. Heavy imports are inside the commands, so that ``--help`` is quick.
+Exit codes: 0 proved (zones: done), 2 bad input, 3 not proved (verify: clean or unproved), 1 a bug. Only the result goes
+to stdout; logs and progress go to stderr. Heavy imports are inside the commands, so that ``--help`` is quick.
 """
 
 from __future__ import annotations
@@ -109,19 +109,28 @@ def verify(part: Part, setup: SetupPath,
            mesh_step: Annotated[float, typer.Option(help="Distance of the nodes of machined.stl, mm; "
                                                          "0: no such file.")] = 0.2,
            mesh_box: MeshBox = None, as_json: AsJson = False) -> None:
-    """Prove any program or STEP-NC, also from other CAM systems; print the report to stdout, a summary to stderr."""
+    """Prove any program or STEP-NC, also from other CAM systems; print the report to stdout, a summary to stderr.
+
+    Exit code 0: proved. 3: clean (no harm, but work is left undone) or unproved.
+    """
 
     def run(given: Setup, progress: Progress, blank: Path | None) -> tuple[Any, int]:
+        from service.program_first import read_first
+
+        started, text = time.monotonic(), read_program(program)
+        first = read_first(given, text, access=access, spindle_tool=spindle_tool, dialect=known_dialect(dialect),
+                           ending=program.suffix)
+        # only now what takes seconds to import: a program that cannot be read is refused at once
         from service.console import say, verification_summary
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
         from service.pipeline import verify_program
 
-        started, wish = time.monotonic(), requested_mesh(mesh_step or None, mesh_box) if out is not None else None
-        result = verify_program(part, given, read_program(program), progress, access, out, wish, spindle_tool, blank,
-                                known_dialect(dialect), program.suffix)
+        wish = requested_mesh(mesh_step or None, mesh_box) if out is not None else None
+        result = verify_program(part, given, text, progress, access, out, wish, spindle_tool, blank,
+                                known_dialect(dialect), program.suffix, first)
         progress.close()
         say(verification_summary(result, time.monotonic() - started))
-        return result, EXIT_UNPROVED if result["findings"] else EXIT_PROVED
+        return result, EXIT_PROVED if result["state"] == "proved" else EXIT_UNPROVED
 
     if out is not None:
         with error_reporting(as_json):

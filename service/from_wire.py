@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -311,6 +311,12 @@ def tool_body(tool: Tool) -> ToolBody:
 def tool_bodies(setup: Setup) -> tuple[ToolBody, ...]:
     """The shapes of all tools, in the order of the setup."""
     return tuple(tool_body(t) for t in setup.tools)
+
+
+def gauge_lengths(tools: Sequence[Tool], bodies: Sequence[ToolBody]) -> dict[int, float]:
+    """Distance from the spindle face to the tip, mm, by T number: stickout and holder where it is not given."""
+    return {body.number: t.gauge_length_mm if t.gauge_length_mm is not None else
+            body.stickout + sum(h.length for h in body.holder) for t, body in zip(tools, bodies, strict=True)}
 
 
 def face_numbers(ids: list[str]) -> tuple[int, ...]:

@@ -1,7 +1,7 @@
 """The life of one STEP file: read, zones, tool paths, programs, proof, report.
 
 ``plan`` runs the whole chain and writes its files, ``zones_only`` stops before the first pass, and ``verify_program``
-proves a program of any origin. No program is written before the proof has read it and found nothing.
+proves a program of any origin, without zones. No program is written before the proof has read it and found nothing.
 """
 
 from __future__ import annotations
@@ -11,22 +11,22 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from geometry.errors import CamError, SetupError
+from geometry.errors import CamError
 from schemas.setup import Setup
 from service.checkpoint_store import Kept
 from service.delivery.job_delivery import cautions_before_planning, deliver_job, deviation_map, warned
 from service.delivery.machined_mesh import MESH_NAME, MeshWish, machined_part
 from service.delivery.result_files import Files, clear_results, deliver
-from service.from_wire import check_plannable, check_spindle_tool
+from service.from_wire import check_plannable
 from service.pictures.proof_picture import MAP_NAME
+from service.program_first import ProgramFirst, read_first
 from service.report import report as reporting
-from service.stages.access_plan import ProofFrame, in_setup_frame
 from service.stages.access_settings import proof_setup
 from service.stages.cautions import sentences
+from service.stages.job_part import read_job_part
 from service.stages.plan_prove_loop import Planner, Progress, ProvedPlan, plan_and_prove
 from service.stages.preparation import Prepared, prepare
+from service.stages.program_proof import proved_program
 from service.stages.programs import proof_frame
 from service.stages.proof_samples import Score, score
 from service.stages.resume import Resumed
@@ -34,9 +34,7 @@ from service.stages.trimmed_faces import trimmed_faces
 from service.viewer.view_data import verification_view
 from toolpath.passes.trimmed_faces import Faces
 from toolpath.planning.job_plan import plan_job
-from verify.gcode.dialects import dialect_of
-from verify.model import NcProgram, Proof, ScoredSamples
-from verify.prove import prove
+from verify.model import Proof
 
 
 def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: MeshWish | None = None,
@@ -127,10 +125,12 @@ def zones_only(part_path: Path, setup: Setup, progress: Progress, blank_path: Pa
 def verify_program(part_path: Path, setup: Setup, program_text: str, progress: Progress,
                    access: str | None = None, out: Path | None = None, mesh: MeshWish | None = None,
                    spindle_tool: int = 0, blank_path: Path | None = None, dialect: str | None = None,
-                   ending: str = "") -> dict[str, Any]:
-    """Prove any program, NC code or STEP-NC, against the part: gouges, contacts, rapids, limits and uncut area.
+                   ending: str = "", program: ProgramFirst | None = None) -> dict[str, Any]:
+    """Prove any program, NC code or STEP-NC, against the part: harm that it does, and work that it leaves undone.
 
-    No zone answers for a sample here, so uncut area is a figure (coverage), not a finding.
+    The program is read before the part. The part is not decomposed: no zone answers for a sample here. Stock that is
+    left is a finding where the tools of the program can touch the part, on the faces that the setup names or that the
+    program works on (``verify.surface.work_done``).
 
     access       : in whose frame the program is read; None: the first access, or the setup frame on a machine with
                    rotary axes
@@ -140,6 +140,12 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
     blank_path   : as in ``plan``
     dialect      : of the program; None: found by marks in its text, by ``ending`` of its file name, or by the dialects
                    of the machine (``verify.gcode.dialects.dialect_of``)
+    program      : the same program, already read by ``service.program_first.read_first``
+
+    Returns
+    -------
+    dict
+        The report; ``report["state"]`` is 'proved', 'clean' or 'unproved'.
 
     Raises
     ------
@@ -147,32 +153,22 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
         As ``plan``; ``ProgramError`` where the program cannot be read, ``SetupError`` (``no_such_access``,
         ``no_such_tool``).
     """
-    known = [a.id for a in setup.access]
-    if access is not None and access not in known:
-        raise SetupError(f"the setup has no access {access}; it has {', '.join(known)}", code="no_such_access",
-                         subjects=(access,), remedy="name one of them, or leave it out for the first")
-    check_spindle_tool(setup, spindle_tool)
-    ready = prepare(part_path, setup, progress, search=False, blank_path=blank_path)
-    view = ready.view(access or known[0])
-    frame = proof_frame(ready) if access is None else ProofFrame.of(view)
-    samples = frame.into(score(ready).samples, ready.views[0])
-    used_dialect = dialect or dialect_of(program_text, ending, setup.machine.dialects)
-    programs = [NcProgram("program", program_text, dialect=used_dialect)]
-    tools, conditions = ready.inputs.bodies, proof_setup(ready, frame, foreign=True)
-    no_zone = ScoredSamples(samples, np.zeros(len(samples), np.int32))
-    proof = prove(programs, frame.part, tools, conditions, no_zone, [], lambda f: progress("prove", 0.3 + 0.5 * f),
-                  spindle_tool=spindle_tool)
-    report = reporting.verification_report(ready, in_setup_frame(frame, proof), samples)
+    first = program or read_first(setup, program_text, access=access, spindle_tool=spindle_tool, dialect=dialect,
+                                  ending=ending)
+    job = read_job_part(part_path, setup, progress, blank_path)
+    made = proved_program(job, first, lambda f: progress("prove", 0.2 + 0.6 * f))
+    frame, report, conditions, tools = made.frame, made.report, made.conditions, job.inputs.bodies
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
-        files: Files = {MAP_NAME: ("deviation", "", view.id, deviation_map(ready, frame, samples, proof, conditions,
-                                                                           report, out / MAP_NAME))}
+        files: Files = {MAP_NAME: ("deviation", "", frame.id, deviation_map(job, frame, made.samples, made.proof,
+                                                                            conditions, report, out / MAP_NAME))}
         if mesh is not None:
-            figures, data = machined_part(mesh, programs, frame.part, tools, conditions,
-                                          lambda f: progress("mesh", 0.8 + 0.2 * f), spindle_tool=spindle_tool)
-            report["machined"] = {"file": MESH_NAME, "access": view.id, **figures}
-            files[MESH_NAME] = ("machined", "", view.id, data)
-        files.update(verification_view(ready, frame, samples, proof, programs, conditions, report, spindle_tool))
+            figures, data = machined_part(mesh, [first.nc], frame.part, tools, conditions,
+                                          lambda f: progress("mesh", 0.8 + 0.2 * f), spindle_tool=first.spindle_tool)
+            report["machined"] = {"file": MESH_NAME, "access": frame.id, **figures}
+            files[MESH_NAME] = ("machined", "", frame.id, data)
+        files.update(verification_view(job, frame, made.samples, made.proof, [first.nc], conditions, report, made.entry,
+                                       first.read))
         deliver(out, report, files)
     progress("done", 1.0)
     return report

@@ -279,7 +279,7 @@ def plan_part(mesh: TriangleMesh, tools: list[ToolBody], *, scallop: float = 0.0
     nothing = Decomposition((), (), ())
     everything = samples_of(mesh, density, None)
     samples = everything.subset(np.isin(everything.face, sorted(
-        machinable_faces(everything, nothing, faces, {1}))))
+        machinable_faces(everything, nothing.seat, faces, {1}))))
     fields = {t.id: TipField(obstacles, t, Clearances(), mesh.bounds, t.radius + max(4.0, spare + t.radius),
                              lattice_step(t), allowance, scallop) for t in tools}
     view = view_of(part, samples, fields, obstacles=obstacles)

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from geometry.mesh import F64, I32, TriangleMesh
-from geometry.sampling import SurfaceSamples
+from geometry.tool_body import ToolBody
 from verify.kinematics import Kinematics
+
+if TYPE_CHECKING:  # sampling is compiled, and the readers of programs need these classes without it
+    from geometry.sampling import SurfaceSamples
 
 
 class StockKind(StrEnum):
@@ -34,6 +40,12 @@ class FindingKind(StrEnum):
     LIMIT = "limit"
     PROGRAM = "program"
     RESIDUAL = "residual"
+    STOCK_LEFT = "stock_left"
+    NOTHING_CUT = "nothing_cut"
+
+
+HARMLESS = frozenset({FindingKind.STOCK_LEFT, FindingKind.NOTHING_CUT})
+"""Kinds that say what a program has not done. All others say what harm it does."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +147,60 @@ class ScoredSamples:
     zone: I32
 
 
+class Touch(Protocol):
+    """What tools can touch without entering part or fixtures. The proof knows no such limits and is given them."""
+
+    def reaches(self, samples: SurfaceSamples, tools: Sequence[ToolBody], axes: F64, lift: float,
+                room: float) -> NDArray[np.bool_]:
+        """Samples that some tool touches along some axis and can finish there.
+
+        samples : SurfaceSamples, frame of the proof
+        axes    : (k, 3) float64, unit, tip to spindle, frame of the proof
+        lift    : mm, distance from the sample along its normal within which a touch counts, over the allowance
+        room    : mm, distance that the whole tool keeps from part and fixtures, over allowance and clearances
+
+        Returns (n,) bool.
+        """
+        ...
+
+    def reasons(self, samples: SurfaceSamples, tools: Sequence[ToolBody], axes: F64) -> NDArray[np.object_]:
+        """Why no tool touches samples: words of the remainder.
+
+        samples : SurfaceSamples, frame of the proof
+        axes    : (k, 3) float64, unit, tip to spindle, frame of the proof
+
+        Returns (n,) object array of str.
+        """
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """The work that a program has to do.
+
+    faces : numbers of the faces that must be within tolerance; None: the faces that the program works on
+    touch : Touch, what the tools of the program can touch
+    facet : mm, largest distance of the facets of the part from its exact surface
+    """
+
+    faces: frozenset[int] | None
+    touch: Touch
+    facet: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class WorkDone:
+    """What became of the work that a program has to do.
+
+    faces  : numbers of the faces that must be within tolerance, ascending
+    reason : (n,) object array of str, why a scored sample stays that is neither within tolerance nor a finding; ''
+             elsewhere
+    """
+
+    faces: tuple[int, ...]
+    reason: NDArray[np.object_]
+
+
 @dataclass(frozen=True)
 class Finding:
     """One finding; neighbours of the same kind are merged into it.
@@ -146,6 +212,7 @@ class Finding:
     near  : True where nothing touches; the depth is then the distance
     count : number of places merged; area : mm² of the samples merged, 0 where there are none
     tip   : mm, tip of the tool at that place, or None where no move causes it or the tip is the point itself
+    lines : lines of the program that left the stock, of a finding ``stock_left`` only
     """
 
     kind: FindingKind
@@ -161,10 +228,15 @@ class Finding:
     area: float = 0.0
     near: bool = False
     tip: tuple[float, float, float] | None = None
+    lines: tuple[int, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        return {**asdict(self), "kind": str(self.kind), "point": list(self.point) if self.point else None,
-                "tip": list(self.tip) if self.tip else None}
+        out = {**asdict(self), "kind": str(self.kind), "point": list(self.point) if self.point else None,
+               "tip": list(self.tip) if self.tip else None, "lines": list(self.lines)}
+        if self.kind is FindingKind.STOCK_LEFT:
+            return {**out, "height": self.depth}
+        del out["lines"]
+        return out
 
 
 @dataclass(frozen=True)
@@ -248,7 +320,7 @@ class FaceProof:
 class Proof:
     """The result of a proof.
 
-    findings : the gravest first, at most 200, the 20 gravest of each kind among them; counts : all of each kind
+    findings : the gravest first, at most 200, the 16 gravest of each kind among them; counts : all of each kind
     residual : (n,) float64, mm left on the normal of each scored sample, negative = gouged; not above ``reach``
     line     : (n,) int32, index, line of the move that left it, 0 where none
     program  : (n,) int32, index, its program, -1 where none
@@ -258,6 +330,7 @@ class Proof:
     minutes  : minutes in cut by T number; engaged : engaged angles by T number
     error_bound : mm, largest error of a residual against the mesh the samples lie on
     support  : free height of thin walls where they were cut
+    work     : what became of the work that was asked; None where none was
     """
 
     findings: tuple[Finding, ...]
@@ -278,9 +351,10 @@ class Proof:
     line_spacing: float
     notes: tuple[str, ...] = field(default=())
     support: Support = Support(0, 0, 0.0, 0.0, 0)
+    work: WorkDone | None = None
 
     @property
-    def clean(self) -> bool:
+    def no_findings(self) -> bool:
         """Whether the proof has no finding."""
         return not self.counts
 

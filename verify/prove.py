@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,13 +27,13 @@ from verify.findings import (
     ordered,
     residual_findings,
 )
-from verify.gcode.reader import Program
 from verify.material.collision import DIP
 from verify.material.dogleg_rapids import box_findings
 from verify.material.engagement import engaged_angles, engagement_findings, engagements, in_parts
 from verify.material.material import contacts, dogleg_limits, unseen
 from verify.material.stock_pass import StockPass
 from verify.model import (
+    Asked,
     Engagement,
     FaceProof,
     Finding,
@@ -41,12 +42,15 @@ from verify.model import (
     ProofSetup,
     ScoredSamples,
     Support,
+    WorkDone,
     ZoneProof,
 )
 from verify.moves import BOW, Moves
 from verify.program.arc_chords import CHORD
 from verify.program.move_times import minutes_of, spent
+from verify.program.program import Program
 from verify.progress import Report, StageProgress
+from verify.surface.asked_faces import Cutting
 from verify.surface.guard_points import (
     CLOSER_SHARE,
     SURE,
@@ -60,6 +64,8 @@ from verify.surface.guard_points import (
 from verify.surface.removal import residual_on_normals
 from verify.surface.sample_scores import RAY_ERROR, face_proofs, proved_samples, zone_proofs
 from verify.surface.wall_support import supported
+from verify.surface.ways_in import deep_findings
+from verify.surface.work_done import Measured, work_done
 
 MIN_REACH = 1.0
 READ, CUT, HELD, MET = 0.12, 0.48, 0.52, 0.97  # shares of the work done: read, residuals, support, contacts known
@@ -67,7 +73,8 @@ READ, CUT, HELD, MET = 0.12, 0.48, 0.52, 0.97  # shares of the work done: read, 
 
 def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
           scored: ScoredSamples, zone_ids: Sequence[str], progress: Report | None = None, *,
-          threads: int | None = None, spindle_tool: int = 0) -> Proof:
+          threads: int | None = None, spindle_tool: int = 0, read: Sequence[Program] | None = None,
+          asked: Asked | None = None) -> Proof:
     """Prove finished NC programs against the part.
 
     programs : NcProgram, or (name, text), in the order they run; each starts on the stock the one before leaves
@@ -79,6 +86,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                the proof at once
     threads  : 2 where None, at most the cores; the result has the same bytes for any number
     spindle_tool : T number in the spindle, its length offset on, before the first line of each program; 0 for none
+    read     : the same programs, already read by ``verify.program_reading.read_one``; None: they are read here
+    asked    : the work that the programs have to do; None: zones answer for their samples, or no work is judged
 
     Returns
     -------
@@ -101,12 +110,12 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     _check(tools, setup, scored, zone_ids)
     threads = threads or min(2, os.cpu_count() or 1)
     stages = StageProgress(progress)
-    read = read_all(programs, part, tools, setup, spindle_tool, stages.span(0.0, READ))
-    moves, source = moves_of(read, tools)
+    framed = read_all(programs, part, tools, setup, spindle_tool, stages.span(0.0, READ), read)
+    moves, source = moves_of(framed, tools)
     cuts = _cuts(part, tools, setup, scored, moves, source, threads, stages.span(READ, CUT))
     support, unheld = supported(TriangleTree(part.mesh), scored, setup, moves, tools, source, zone_ids, threads,
                                 stages.span(CUT, HELD))
-    slides = slides_of(read, tools, setup)
+    slides = slides_of(framed, tools, setup)
     met = contacts(part.mesh, np.concatenate([cuts.guard, cuts.edge]), moves, tools, setup, slides, threads,
                    stages.span(HELD, MET))
     run = met.run
@@ -115,13 +124,19 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     stretches, of = in_parts(moves, tools)
     angle = engaged_angles(run.engaged, stretches, tools)
     findings = [*contact_findings(run.events, moves, source, setup.clearance_rapid, skins),
-                *cuts.gouges, *_program_findings(read), *(f for p in read for f in p.findings(tools)),
-                *table_findings([p.program for p in read], tools, setup),
-                *_idle_findings(read, run, moves, source, fine), *repeat_findings(moves, run.cut, source),
+                *cuts.gouges, *_program_findings(framed), *(f for p in framed for f in p.findings(tools)),
+                *table_findings([p.program for p in framed], tools, setup),
+                *_idle_findings(framed, run, moves, source, fine, asked), *repeat_findings(moves, run.cut, source),
                 *(box_findings(moves, slides, *dogleg_limits(part.mesh, moves, tools, setup), source)
                   if setup.dogleg else ()),
                 *engagement_findings(angle, stretches, of, source, setup.max_engaged), *unheld,
                 *_residuals(scored, cuts.residual, setup, zone_ids)]
+    work: WorkDone | None = None
+    if asked is not None:
+        cutting = Cutting(TriangleTree(part.mesh), setup, moves, tools, threads)
+        work, left = work_done(asked, Measured(scored.samples, cuts.residual, cuts.mover, cuts.reach,
+                                               error_bound([p.program for p in framed])), cutting, run.cut, source)
+        findings += [*left, *deep_findings(scored.samples, cuts.residual, cuts.mover, cutting, source)]
     notes = [f"{run.lost} contacts are not listed: the tables are full"] if run.lost else []
     notes.extend(cuts.notes)
     notes.extend(f"T{t.number} is so thin that a plunge may stay unseen: the stock is sampled every "
@@ -129,10 +144,11 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     if met.dip > DIP + 1e-9:
         notes.append(f"a ball may enter a fixture by {met.dip:.3f} mm unseen: the fixtures are too large to be sampled "
                      "more closely; give smaller boxes where tools go")
-    notes.extend(note for p in read for note in p.notes())
+    notes.extend(note for p in framed for note in p.notes())
     stages.tell(1.0)
-    return _proof(findings, cuts, run, read, moves, source, setup, scored, zone_ids,
-                  engagements(angle, stretches, tools), met.spacing, tuple(notes), support)
+    proof = _proof(findings, cuts, run, framed, moves, source, setup, scored, zone_ids,
+                   engagements(angle, stretches, tools), met.spacing, tuple(notes), support)
+    return proof if work is None else replace(proof, work=work)
 
 
 def _check(tools: Sequence[ToolBody], setup: ProofSetup, scored: ScoredSamples, zone_ids: Sequence[str]) -> None:
@@ -210,17 +226,19 @@ def _program_findings(read: Sequence[FramedProgram]) -> list[Finding]:
 
 
 def _idle_findings(read: Sequence[FramedProgram], run: StockPass, moves: Moves, source: Source,
-                   fine: Sequence[ToolBody]) -> list[Finding]:
+                   fine: Sequence[ToolBody], asked: Asked | None) -> list[Finding]:
     """Programs whose feed moves never meet the stock: wrong zero, or inch for mm.
 
-    fine : tools so thin that the stock model may not show their cuts
+    fine  : tools so thin that the stock model may not show their cuts
+    asked : the work to do; where no program does any, that is a kind of its own
     """
+    kind = FindingKind.PROGRAM if asked is None or run.cut.any() else FindingKind.NOTHING_CUT
     out, traceless = [], np.isin(source.tool, [t.number for t in fine])
     for number, p in enumerate(read):
         own = (source.program == number) & moves.feed
         if own.any() and not run.cut[own].any() and not traceless[own].all():
             m = int(np.flatnonzero(own)[0])
-            out.append(Finding(FindingKind.PROGRAM, p.program.name, int(source.line[m]), None, None, None, 0.0, 0.0,
+            out.append(Finding(kind, p.program.name, int(source.line[m]), None, None, None, 0.0, 0.0,
                                "no feed move meets the stock: check the unit, the program zero and the tool"))
     return out
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from enum import StrEnum
 
 import numpy as np
@@ -9,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry.mesh import F64
 from geometry.sampling import SurfaceSamples
-from zones.model import Decomposition
 
 STEEP = 0.70710678  # n_z below: steeper than 45 degrees, cut by waterlines
 LEVEL = 1.0 - 1e-6  # n_z above: a level plane, on which a flat end leaves no cusp
@@ -26,8 +26,8 @@ class AreaForm(StrEnum):
     STEEP = "steep"
 
 
-def machinable_faces(samples: SurfaceSamples, decomposition: Decomposition, wanted: set[int] | None,
-                     excluded: set[int], directions: ArrayLike = UP) -> set[int]:
+def machinable_faces(samples: SurfaceSamples, seat: Collection[int], wanted: set[int] | None, excluded: set[int],
+                     directions: ArrayLike = UP) -> set[int]:
     """Numbers of the faces of the machinable area Ma [Arivazhagan2020].
 
     Without ``wanted`` these are all faces of which some access direction sees at least ``SEEN_SHARE``. The seat counts
@@ -35,10 +35,11 @@ def machinable_faces(samples: SurfaceSamples, decomposition: Decomposition, want
     wanted faces. The share avoids that one facet of rounding at the rim of an underside decides.
 
     samples    : SurfaceSamples of all faces, in the frame of the directions
+    seat       : numbers of the faces that the part stands on
     directions : (d, 3) float64, dimensionless, from the tool tip to the spindle
     """
     total = np.bincount(samples.face, weights=samples.area)
-    least = np.where(np.isin(samples.face, list(decomposition.seat)), STEEP, SEEN)
+    least = np.where(np.isin(samples.face, list(seat)), STEEP, SEEN)
     chosen: set[int] = set()
     for direction in np.asarray(directions, dtype=np.float64):
         seen = samples.area * (samples.normals @ direction > least)

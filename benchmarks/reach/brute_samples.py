@@ -397,7 +397,7 @@ def examine(path: Path, setup_path: Path, count: int = SAMPLES) -> dict[str, Any
     from geometry.mesh_queries.bvh import TriangleTree
     from service.from_wire import read_setup, tool_bodies
     from service.stages.job_inputs import JobInputs
-    from service.stages.preparation import load
+    from service.stages.job_part import load
 
     setup = read_setup(setup_path)
     part = load(path, setup)

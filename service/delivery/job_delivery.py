@@ -34,6 +34,7 @@ from service.stages.cautions import (
     unheld,
     upright,
 )
+from service.stages.job_part import JobPart
 from service.stages.plan_prove_loop import PROVED, Progress, ProvedPlan
 from service.stages.preparation import Prepared
 from service.stages.programs import with_figures
@@ -159,13 +160,13 @@ def _preview(ready: Prepared, view: bytes | Path, report: dict[str, Any], path: 
     return path.read_bytes()
 
 
-def deviation_map(ready: Prepared, frame: ProofFrame, samples: SurfaceSamples, proof: Proof, conditions: ProofSetup,
+def deviation_map(job: JobPart, frame: ProofFrame, samples: SurfaceSamples, proof: Proof, conditions: ProofSetup,
                   report: dict[str, Any], path: Path) -> bytes:
     """Draw the deviation map; returns the picture.
 
     samples, proof, conditions : of the proof, in ``frame``
     """
-    order = ready.inputs.labels.get("order")
+    order = job.inputs.labels.get("order")
     draw_proof(frame.part, samples, proof, conditions, report["state"], report["coverage"] or 0.0, path,
                f"Deviation from the part{f': {order}' if order else ''}")
     return path.read_bytes()

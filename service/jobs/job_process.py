@@ -72,7 +72,7 @@ def compute(request, progress, resumed):
         result = chain.verify_program(part, setup, text, progress, out=out, spindle_tool=request["spindle_tool"],
                                       **blank)
         name = "report.json"
-        state = "unproved" if result["findings"] else "proved"
+        state = result["state"]
     if not (out / name).exists():
         (out / name).write_text(json.dumps(result, indent=1, sort_keys=True, allow_nan=False) + "\n")
     return state

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from geometry.sampling import SurfaceSamples
 from service.report import approach_cones, tool_offers
 from service.stages.cautions import JobCaution
+from service.stages.job_part import JobPart
 from service.stages.preparation import Prepared
 from service.version import VERSION
 from toolpath.planning.job_plan import Plan
@@ -46,12 +47,9 @@ def zones_document(report: dict[str, Any]) -> dict[str, Any]:
 
 
 def _shape(ready: Prepared) -> dict[str, Any]:
-    d, part = ready.decomposition, ready.part
+    d = ready.decomposition
     return {
-        "part": {"faces": len(part.faces), "volume_mm3": r(part.volume, 3),
-                 "bbox_mm": [[r(v) for v in row] for row in part.bounds.tolist()],
-                 "unit": part.unit, "mesh_chord_mm": part.chord, "mesh_deviation_mm": r(part.deviation, 6),
-                 "triangles": len(part.mesh.faces), "warnings": list(ready.warnings)},
+        "part": part_of(ready),
         "walls": [{"id": w.id, "faces": faces(w.faces), "sides": faces(w.sides), "thickness_mm": r(w.thickness, 3),
                    "z_mm": [r(w.z_bottom), r(w.z_top)]} for w in d.walls],
         "connections": [{"id": c.id, "walls": list(c.walls), "faces": faces(c.faces),
@@ -64,6 +62,15 @@ def _shape(ready: Prepared) -> dict[str, Any]:
         "cutting_planes": [{"access": p.access, "z_mm": r(p.height), "region": p.region, "tool": p.tool,
                             "reason": p.reason} for p in ready.zoning.planes],
     }
+
+
+def part_of(job: JobPart) -> dict[str, Any]:
+    """Facts about the part, with the warnings of the job."""
+    part = job.part
+    return {"faces": len(part.faces), "volume_mm3": r(part.volume, 3),
+            "bbox_mm": [[r(v) for v in row] for row in part.bounds.tolist()],
+            "unit": part.unit, "mesh_chord_mm": part.chord, "mesh_deviation_mm": r(part.deviation, 6),
+            "triangles": len(part.mesh.faces), "warnings": list(job.warnings)}
 
 
 def accesses_of(ready: Prepared) -> list[dict[str, Any]]:
@@ -194,16 +201,16 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
     report = {
         **_shape(ready), **_areas(ready), "state": "unproved" if findings else "proved", "complete": not remainder,
         "labels": dict(ready.inputs.labels),
-        "inputs": _inputs(ready),
+        "inputs": inputs_of(ready),
         "zones": [_planned(ready, z, plans.get(z.id), steps, proof) for z in ready.zones],
         "steps": [_step(s) for s in made.steps], "remainder": remainder,
         "proposal": _proposal(ready), "findings": findings,
-        "finding_counts": _counted(proof, unmet), "coverage": r(coverage, 6),
+        "finding_counts": counted(proof, unmet), "coverage": r(coverage, 6),
         "reach_coverage": r(done / reach, 6) if reach > 0 else 0.0,
-        "machining_time_s": r(proof.spent.seconds, 1), "time": _time(proof),
+        "machining_time_s": r(proof.spent.seconds, 1), "time": time_of(proof),
         "gouge_max_mm": r(proof.gouge_max, 5), "proof": {
             "samples": len(dense), "error_bound_mm": proof.error_bound, "stock_line_spacing_mm": proof.line_spacing,
-            "cutting_length_mm": r(proof.cutting_length, 1), "notes": list(proof.notes), "support": _support(proof)},
+            "cutting_length_mm": r(proof.cutting_length, 1), "notes": list(proof.notes), "support": support_of(proof)},
         "warnings": [c.as_dict() for c in cautions],
         "tools": _tools(ready, proof, made.steps), "deviation": deviation(proof), "machined": None, "files": [],
         "version": VERSION,
@@ -215,23 +222,24 @@ def _unmet(ready: Prepared, made: Plan, coverage: float, remainder: list[dict[st
     """Findings about the job as a whole: nothing can be cut, or less than the setup demands."""
     if not made.steps:
         would: dict[str, Any] = next((x["would_need"] for x in remainder if x["would_need"].get("diameter_mm")), {})
-        return [_of_job("nothing_cut", "no tool of the setup can cut any of the requested area", would_need=would)]
-    return _too_little(coverage, ready.inputs.quality.coverage_min)
+        return [of_job("nothing_cut", "no tool of the setup can cut any of the requested area", would_need=would)]
+    return too_little(coverage, ready.inputs.quality.coverage_min)
 
 
-def _too_little(coverage: float, coverage_min: float) -> list[dict[str, Any]]:
+def too_little(coverage: float, coverage_min: float) -> list[dict[str, Any]]:
+    """A finding where the coverage is below the least one of the setup."""
     if coverage >= coverage_min:
         return []
-    return [_of_job("coverage", f"coverage {coverage:.4f} is below coverage_min {coverage_min:g}",
+    return [of_job("coverage", f"coverage {coverage:.4f} is below coverage_min {coverage_min:g}",
                     round(coverage, 6), coverage_min)]
 
 
-def _counted(proof: Proof, unmet: list[dict[str, Any]]) -> dict[str, int]:
+def counted(proof: Proof, unmet: list[dict[str, Any]]) -> dict[str, int]:
     """Number of findings of each kind, including those beyond the list."""
     return dict(sorted((Counter(proof.counts) + Counter(f["kind"] for f in unmet)).items()))
 
 
-def _of_job(kind: str, message: str, depth: float = 0.0, limit: float = 0.0, **more: Any) -> dict[str, Any]:
+def of_job(kind: str, message: str, depth: float = 0.0, limit: float = 0.0, **more: Any) -> dict[str, Any]:
     """A finding about the job as a whole: it has no place and no line."""
     return {"kind": kind, "message": message, "depth": depth, "limit": limit, "program": "", "line": 0, "zone": None,
             "face": None, "point": None, "count": 1, "area": 0.0, **more}
@@ -301,14 +309,15 @@ def _tools(ready: Prepared, proof: Proof, steps: Sequence[Workingstep]) -> list[
     return out
 
 
-def _support(proof: Proof) -> dict[str, Any]:
+def support_of(proof: Proof) -> dict[str, Any]:
     """Free height of thin walls where they are finished, over their thickness."""
     s = proof.support
     return {"walls": s.walls, "places": s.places, "most_ratio": r(s.most, 2), "limit_ratio": r(s.limit, 2),
             "places_over": s.over, "at_mm": None if s.at is None else [r(v) for v in s.at]}
 
 
-def _time(proof: Proof) -> dict[str, Any]:
+def time_of(proof: Proof) -> dict[str, Any]:
+    """Shares of the machining time."""
     t = proof.spent
     return {"in_cut_s": r(t.in_cut, 1), "in_air_s": r(t.seconds - t.in_cut, 1), "rapid_s": r(t.rapid, 1),
             "retracts": t.retracts, "tool_changes": t.tool_changes}
@@ -322,29 +331,7 @@ def deviation(proof: Proof) -> list[dict[str, Any]]:
             for n, f in sorted(proof.faces.items())]
 
 
-def _inputs(ready: Prepared) -> dict[str, str]:
+def inputs_of(job: JobPart) -> dict[str, str]:
     """Hashes of part, setup and, where it is a file, blank."""
-    out = {"part_sha256": ready.part.sha256, "setup_sha256": ready.inputs.sha256}
-    return out if ready.blank.solid is None else {**out, "stock_sha256": ready.blank.solid.sha256}
-
-
-def verification_report(ready: Prepared, proof: Proof, dense: SurfaceSamples) -> dict[str, Any]:
-    """The answer to ``zonemill verify``."""
-    total = float(dense.area.sum())
-    done = float(dense.area[np.asarray(proof.proved, dtype=np.bool_)].sum())
-    coverage = done / total if total else 0.0
-    unmet = _too_little(coverage, ready.inputs.quality.coverage_min)
-    if proof.cutting_length <= 0.0:
-        unmet.append(_of_job("nothing_cut", "the program removes no stock"))
-    findings = [*(f.as_dict() for f in proof.findings), *unmet]
-    return {"state": "unproved" if findings else "proved", "findings": findings,
-            "finding_counts": _counted(proof, unmet),
-            "inputs": _inputs(ready),
-            "coverage": r(coverage, 6), "gouge_max_mm": r(proof.gouge_max, 5),
-            "machining_time_s": r(proof.spent.seconds, 1), "time": _time(proof),
-            "cutting_length_mm": r(proof.cutting_length, 1),
-            "proof": {"samples": len(dense), "error_bound_mm": proof.error_bound,
-                      "stock_line_spacing_mm": proof.line_spacing, "notes": list(proof.notes),
-                      "support": _support(proof)},
-            "deviation": deviation(proof), "machined": None, "files": [],
-            "part": _shape(ready)["part"], "version": VERSION}
+    out = {"part_sha256": job.part.sha256, "setup_sha256": job.inputs.sha256}
+    return out if job.blank.solid is None else {**out, "stock_sha256": job.blank.solid.sha256}

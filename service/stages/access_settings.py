@@ -12,6 +12,7 @@ import numpy as np
 from output.arc_fitting import SHARE as ARCS
 from schemas.setup import Lean
 from service.stages.access_plan import ProofFrame
+from service.stages.job_part import JobPart
 from service.stages.preparation import Prepared, table_height
 from service.stages.programs import access_of, fixture_boxes, turning_of
 from service.stages.wall_support import FREE_RATIO, in_turn
@@ -57,34 +58,34 @@ def leaned(lean: Lean) -> ToolLean | None:
                   None if walls is None else math.radians(walls))
 
 
-def proof_setup(ready: Prepared, view: View | ProofFrame, *, foreign: bool = False) -> ProofSetup:
+def proof_setup(job: JobPart, view: View | ProofFrame, *, foreign: bool = False) -> ProofSetup:
     """The conditions of a proof in the frame of a view.
 
     foreign : the programs were not planned here; then a table of unknown height is no obstacle
     """
-    inputs = ready.inputs
+    inputs = job.inputs
     c, q, machine = inputs.clearances, inputs.quality, inputs.machine
     # the height of the table is known in the setup frame only, so a proof in an oblique frame leaves the table out
     tabled = (inputs.turns and np.array_equal(view.rotation, np.eye(3))
               and not (foreign and machine.table_z_mm is None))
-    cylinder, upwards = ready.blank.proof_cylinder(view.rotation)
+    cylinder, upwards = job.blank.proof_cylinder(view.rotation)
     return ProofSetup(
-        stock_kind=inputs.stock.kind, margin=inputs.stock.margin_mm, uncertainty=ready.blank.beyond,
-        stock_box=ready.blank.proof_box(view.rotation), stock_cylinder=cylinder, stock_axis=upwards,
-        stock_mesh=ready.blank.proof_mesh(view.rotation),
-        fixtures=fixture_boxes(ready, view), clearance_neck=c.neck,
+        stock_kind=inputs.stock.kind, margin=inputs.stock.margin_mm, uncertainty=job.blank.beyond,
+        stock_box=job.blank.proof_box(view.rotation), stock_cylinder=cylinder, stock_axis=upwards,
+        stock_mesh=job.blank.proof_mesh(view.rotation),
+        fixtures=fixture_boxes(job, view), clearance_neck=c.neck,
         clearance_shank=c.shank, clearance_holder=c.holder, clearance_rapid=c.rapid,
         scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,
         stock_allowance=q.stock_allowance_mm, ramp_angle=float(RAMP_ANGLE),
         rapid_feed=inputs.rates.rapid, acceleration=inputs.rates.acceleration,
-        work_offset=access_of(ready, view).work_offset,
+        work_offset=access_of(job, view).work_offset,
         travel=None if machine.travel_mm is None else np.array(machine.travel_mm, dtype=np.float64),
         gauge_length=inputs.gauge_lengths,
         line_spacing=min(ProofSetup.line_spacing, inputs.engagement_spacing),
         dogleg=machine.rapid_motion == "dogleg", max_feed=machine.max_feed_mm_min,
         max_engaged=inputs.max_engaged, max_rpm=inputs.max_rpm,
-        table=table_height(inputs, ready.blank) if tabled else None,
-        table_known=machine.table_z_mm is not None, free_ratio=FREE_RATIO, walls_in_turn=in_turn(ready),
+        table=table_height(inputs, job.blank) if tabled else None,
+        table_known=machine.table_z_mm is not None, free_ratio=FREE_RATIO, walls_in_turn=in_turn(job),
         kinematics=inputs.kinematics, rotary_limits=inputs.rotary_limits,
         rotary_rate=None if machine.rotary_rate_deg_min is None else float(np.radians(machine.rotary_rate_deg_min)))
 

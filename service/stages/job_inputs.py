@@ -24,7 +24,14 @@ from schemas.materials import Material
 from schemas.setup import Access, Operations, Quality, Setup, Stock, setup_sha256
 from schemas.tools import Tool
 from service.cutting_data import STEP_DOWN, bending, cutting_data, rates_of
-from service.from_wire import machine_kinematics, material_name, rotary_limits, rotary_machine, tool_bodies
+from service.from_wire import (
+    gauge_lengths,
+    machine_kinematics,
+    material_name,
+    rotary_limits,
+    rotary_machine,
+    tool_bodies,
+)
 from toolpath.plan_settings import CutData
 from toolpath.tool_deflection import effective_diameter
 from verify.kinematics import Kinematics
@@ -77,7 +84,7 @@ class JobInputs:
         """The inputs of a job from its setup."""
         c, bodies = setup.clearance_mm, tool_bodies(setup)
         return cls(setup_sha256(setup), setup.labels, setup.part.solid, placement_of(setup), tuple(setup.access),
-                   tuple(setup.tools), bodies, _cut_table(setup, bodies), _gauge_lengths(setup.tools, bodies),
+                   tuple(setup.tools), bodies, _cut_table(setup, bodies), gauge_lengths(setup.tools, bodies),
                    setup.machine, setup.stock, tuple(np.array(f.box_mm, dtype=np.float64) for f in setup.fixtures),
                    Clearances(c.neck, c.shank, c.holder, c.rapid), setup.quality, setup.operations, setup.material,
                    material_name(setup), rates_of(setup))
@@ -163,12 +170,6 @@ def _cut_table(setup: Setup, bodies: Sequence[ToolBody]) -> dict[str, CutData]:
         slot = effective_diameter(body.diameter, body.corner_radius, depth)
         out[tool.id] = layers.under(depth, 0.5 * slot * (1.0 - math.cos(engaged)))
     return out
-
-
-def _gauge_lengths(tools: Sequence[Tool], bodies: Sequence[ToolBody]) -> dict[int, float]:
-    """Distance from the spindle face to the tip, mm, by T number: stickout and holder where it is not given."""
-    return {body.number: t.gauge_length_mm if t.gauge_length_mm is not None else
-            body.stickout + sum(h.length for h in body.holder) for t, body in zip(tools, bodies, strict=True)}
 
 
 __all__ = ["JobInputs", "mesh_chord", "placement_of"]

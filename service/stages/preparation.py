@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import count
@@ -10,19 +10,18 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry.errors import CamError, SetupError
+from geometry.errors import SetupError
 from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples, joined, sample_borders, sample_surface, with_surface_normals
-from geometry.step_import.reader import read_part
 from geometry.tool_body import ToolBody
 from geometry.trimming.trim import FacePatch
 from schemas.setup import Access, Setup
-from service.from_wire import blank_error, face_numbers, no_stock_file
-from service.stages.blank_checks import check_against_part
-from service.stages.blank_model import Blank, blank_of
-from service.stages.job_inputs import JobInputs, mesh_chord, placement_of
+from service.from_wire import face_numbers
+from service.stages.blank_model import Blank
+from service.stages.job_inputs import JobInputs
+from service.stages.job_part import Progress, read_job_part
 from toolpath.scallop_budget import ScallopBudget
 from zones.features.decomposition import decompose
 from zones.lattice import lattice_step
@@ -50,9 +49,6 @@ MIN_ACCESS_GAIN_MM2, MIN_ACCESS_GAIN_SHARE = 10.0, 0.002  # area, and share of M
 TABLE, TABLE_SPARE = 1000.0, 0.01  # mm: half width of the table, and clearance that planning adds above it
 UPRIGHT = 1.0 - 1e-12  # Z of a unit tool axis, from which on it counts as upright
 MAX_ROOM = 60.0  # mm beyond the cutter's radius that the planning lattice covers beside a large block
-
-Progress = Callable[[str, float], None]
-
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
@@ -100,25 +96,6 @@ class Prepared:
     def view(self, access: str) -> View:
         """The view of an access id."""
         return next(v for v in self.views if v.id == access)
-
-
-def load(path: Path, setup: Setup) -> Part:
-    """The part of a STEP file in the setup frame."""
-    return read_part(path, placement=placement_of(setup), solid=setup.part.solid, chord=mesh_chord(setup.quality))
-
-
-def load_blank(path: Path, setup: Setup) -> Part:
-    """The solid of a blank's STEP file in the setup frame, which is that of the part.
-
-    Raises
-    ------
-    CamError
-        As ``geometry.step_import.reader.read_part``, of the same class and code; the message names the blank.
-    """
-    try:
-        return read_part(path, placement=placement_of(setup), chord=mesh_chord(setup.quality))
-    except CamError as error:
-        raise blank_error(error) from None
 
 
 def table_height(inputs: JobInputs, blank: Blank) -> float:
@@ -180,14 +157,9 @@ def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True
     CamError
         The part or the setup is wrong, or the reader exceeds its limits.
     """
-    progress("read", 0.0)
-    if setup.stock.kind == "step" and blank_path is None:
-        raise no_stock_file()
-    part = load(path, setup)
-    blank = blank_of(setup, part, None if blank_path is None else load_blank(blank_path, setup))
-    check_against_part(setup, part, blank)
+    read = read_job_part(path, setup, progress, blank_path)
+    inputs, part, blank = read.inputs, read.part, read.blank
     progress("zones", 0.12)
-    inputs = JobInputs.of(setup)
     accesses = list(inputs.accesses)
     rotations = [access_rotation(a.direction) for a in accesses]
     first = turned(part, rotations[0])
@@ -218,8 +190,7 @@ def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True
     if len(views) > len(zoning.reach):
         zoning = zoned([*zoning.reach, *({} for _ in range(len(views) - len(zoning.reach)))])
     progress("zones", 0.27)
-    solid_warnings = () if blank.solid is None else (f"the blank: {w}" for w in blank.solid.warnings)
-    warnings = (*part.warnings, *solid_warnings, *decomposition.warnings, *_stood_askew(inputs, part, decomposition))
+    warnings = (*read.warnings, *decomposition.warnings, *_stood_askew(inputs, part, decomposition))
     return Prepared(inputs, part, blank, tuple(accesses), tuple(views), decomposition, zoning, seen_from, lift,
                     warnings)
 
@@ -314,7 +285,7 @@ def planning_samples(part: Part, decomposition: Decomposition, inputs: JobInputs
 
     directions : (d, 3) float64, dimensionless, frame of the part: unit vectors the area is seen from
     """
-    triangles = machinable_triangles(part, decomposition, inputs, directions)
+    triangles = machinable_triangles(part, decomposition.seat, inputs, directions)
     ids, areas = part.mesh.face_ids[triangles], part.mesh.areas[triangles]
     thin = min(1.0, MAX_SAMPLES / max(PLANNING_DENSITY * float(areas.sum()), 1e-9))
     sets = []
@@ -327,9 +298,10 @@ def planning_samples(part: Part, decomposition: Decomposition, inputs: JobInputs
     return with_surface_normals(joined(sets), part.mesh)
 
 
-def machinable_triangles(part: Part, decomposition: Decomposition, inputs: JobInputs, directions: F64) -> np.ndarray:
+def machinable_triangles(part: Part, seat: Collection[int], inputs: JobInputs, directions: F64) -> np.ndarray:
     """The mesh triangles of the machinable area Ma, (n,) int64, index.
 
+    seat       : numbers of the faces that the part stands on
     directions : (d, 3) float64, dimensionless, frame of the part: unit vectors the area is seen from
 
     Raises
@@ -347,5 +319,5 @@ def machinable_triangles(part: Part, decomposition: Decomposition, inputs: JobIn
     mesh = part.mesh
     facets = SurfaceSamples(mesh.triangles.mean(axis=1), mesh.normals, mesh.areas, mesh.face_ids,
                             np.arange(len(mesh.faces), dtype=np.int32))
-    faces = machinable_faces(facets, decomposition, wanted, excluded, directions)
+    faces = machinable_faces(facets, seat, wanted, excluded, directions)
     return np.flatnonzero(np.isin(part.mesh.face_ids, sorted(faces)))

@@ -24,13 +24,14 @@ from output.workplan import FIRST_NUMBER, AccessFrame, Ap238, Assembly, Clamping
 from schemas.setup import Access
 from service.stages.access_plan import AccessPlan, ProofFrame, WrittenProgram
 from service.stages.blank_model import turned_box
+from service.stages.job_part import JobPart
 from service.stages.preparation import TABLE_SPARE, Prepared, table_height
 from service.stages.trimmed_faces import exact_faces
 from service.version import VERSION
 from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_settings import RotaryAxes
 from toolpath.workingsteps import Workingstep
-from zones.reach.access_view import View
+from zones.reach.access_view import View, access_rotation, turned
 
 BOW, SPARE = 1.0 / 800.0, 0.01  # chord error of a swing over the distance from the tip; mm, for rounding
 RATE_SPARE = 1.05  # of the time the axes take at their fastest: words are rounded
@@ -38,14 +39,14 @@ PARTS, LAST_NUMBER = 100, 7000  # from 8000 on numbers may be locked
 NO_HOLDER = 200.0  # mm of shank above the stickout that are assumed where the setup names no holder
 
 
-def fixture_boxes(ready: Prepared, view: View | ProofFrame) -> tuple[np.ndarray, ...]:
+def fixture_boxes(job: JobPart, view: View | ProofFrame) -> tuple[np.ndarray, ...]:
     """Boxes around the fixtures, each (2, 3) float64, mm, in the frame of a view."""
-    return tuple(turned_box(box, view.rotation) for box in ready.inputs.fixtures)
+    return tuple(turned_box(box, view.rotation) for box in job.inputs.fixtures)
 
 
-def access_of(ready: Prepared, view: View | ProofFrame) -> Access:
+def access_of(job: JobPart, view: View | ProofFrame) -> Access:
     """The access that a view or a frame of a proof belongs to."""
-    return next(a for a in ready.accesses if a.id == view.id)
+    return next(a for a in job.accesses if a.id == view.id)
 
 
 def proof_frame(ready: Prepared) -> ProofFrame:
@@ -55,6 +56,16 @@ def proof_frame(ready: Prepared) -> ProofFrame:
         return first
     turn = np.eye(3)
     return first if np.array_equal(first.rotation, turn) else ProofFrame(first.id, turn, ready.part)
+
+
+def program_frame(job: JobPart, access: str | None) -> ProofFrame:
+    """The frame a program of any origin is read in.
+
+    access : id of the access; None: as ``proof_frame``
+    """
+    named = next((a for a in job.accesses if a.id == access), job.accesses[0])
+    rotation = np.eye(3) if access is None and job.inputs.turns else access_rotation(named.direction)
+    return ProofFrame(named.id, rotation, turned(job.part, rotation))
 
 
 def programs_of(ready: Prepared, access_plans: Sequence[AccessPlan],

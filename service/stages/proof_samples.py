@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.sampling import SurfaceSamples, sample_surface, with_surface_normals
 from service.stages.preparation import Prepared, machinable_triangles
@@ -81,9 +82,10 @@ class Score:
 def score(ready: Prepared) -> Score:
     """Sample the machinable area for the proof and hand every sample to the zone whose tool can touch it."""
     first = ready.views[0]
-    triangles = machinable_triangles(first.part, ready.decomposition, ready.inputs, ready.seen_from @ first.rotation.T)
+    triangles = machinable_triangles(first.part, ready.decomposition.seat, ready.inputs,
+                                     ready.seen_from @ first.rotation.T)
     mesh = first.part.mesh
-    dense = with_surface_normals(sample_surface(mesh, PROOF_DENSITY, seed=PROOF_SEED, triangles=triangles), mesh)
+    dense = proof_samples(mesh, triangles)
     zone, tips = np.zeros(len(dense), np.int32), np.zeros((len(dense), 3))
     own = first.label(dense)
     for view in ready.views:
@@ -103,6 +105,16 @@ def score(ready: Prepared) -> Score:
             good = whole & ~z.below_plane(names[rows], here.points[rows, 2])
             zone[rows[good]], tips[rows[good]] = k, tip[good]
     return Score(dense, own, zone, tips)
+
+
+def proof_samples(mesh: TriangleMesh, triangles: NDArray[np.int64]) -> SurfaceSamples:
+    """The samples of a proof on some triangles of a mesh.
+
+    triangles : (n,) int64, index
+
+    Returns SurfaceSamples in the frame of the mesh, with the normals of the exact surface.
+    """
+    return with_surface_normals(sample_surface(mesh, PROOF_DENSITY, seed=PROOF_SEED, triangles=triangles), mesh)
 
 
 def _neighbours(view: View, owner: NDArray[np.int32], dense: SurfaceSamples, labels: Labels) -> NDArray[np.int32]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from service.stages.cautions import MAX_HEIGHT_RATIO, walls_to_cut
+from service.stages.job_part import JobPart
 from service.stages.preparation import Prepared
 from toolpath.counterexamples import HighWall
 from toolpath.planning.depth_bands import largest_corner, planes
@@ -21,13 +22,13 @@ PLANNED_RATIO = 8.0
 """The same in a plan. The difference covers the layer under a band and the error of the measured wall."""
 
 
-def in_turn(ready: Prepared) -> bool:
+def in_turn(job: JobPart) -> bool:
     """Whether a wall that is finished without support is a finding, so that the plan goes down in bands.
 
     Only where everything is cut along one axis: with several accesses no plan knows what the others leave.
     """
-    one_way = len(ready.views) == 1 and ready.inputs.rotary is None
-    return ready.inputs.operations.walls_in_turn and one_way
+    one_way = len(job.accesses) == 1 and job.inputs.rotary is None
+    return job.inputs.operations.walls_in_turn and one_way
 
 
 def band_planes(ready: Prepared, view: View, unheld: Sequence[HighWall] = ()) -> tuple[float, ...]:

@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from geometry.errors import CamError
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
+from geometry.part import Part
 from geometry.sampling import SurfaceSamples
 from geometry.tool_body import ToolBody
 from service.delivery.result_files import Files
 from service.report.report import REMAINDER_FLOOR_MM2
 from service.stages.access_plan import ProofFrame
+from service.stages.job_part import JobPart
 from service.stages.preparation import Prepared
 from service.stages.proof_samples import Score
 from service.version import VERSION
@@ -26,6 +28,8 @@ from service.viewer.view_paths import GRID as PATH_GRID
 from service.viewer.view_stock import stock_chunk
 from verify.checks.program_sequence import FramedProgram, read_all
 from verify.model import NcProgram, Proof, ProofSetup
+from verify.program.program import Program
+from zones.model import Decomposition
 from zones.reach.access_view import turned_samples
 from zones.remainder.remainder import RemainderEntry
 
@@ -64,23 +68,28 @@ def _plan_view(ready: Prepared, frame: ProofFrame, scored: Score, zone: NDArray[
     names = [{"zone": z["id"]} for z in zones] + [{"remainder": k} for k in range(len(entries))] + [{"other": True}]
     read = read_all(programs, frame.part, ready.inputs.bodies, setup, 0, lambda _share: None)
     track = track_of(read, programs, frame.rotation, report["steps"])
-    return _file(ready, frame.into(scored.samples, ready.views[0]), frame, label, names, proof, setup, track, read,
-                 report, open_=report["state"] == "proved")
+    return _file(ready, ready.decomposition, frame.into(scored.samples, ready.views[0]), frame, label, names, proof,
+                 setup, track, read, report, open_=report["state"] == "proved")
 
 
-def verification_view(ready: Prepared, frame: ProofFrame, samples: SurfaceSamples, proof: Proof,
-                      programs: Sequence[NcProgram], setup: ProofSetup, report: Mapping[str, Any],
-                      spindle_tool: int = 0) -> Files:
+def verification_view(job: JobPart, frame: ProofFrame, samples: SurfaceSamples, proof: Proof,
+                      programs: Sequence[NcProgram], setup: ProofSetup, report: Mapping[str, Any], entry: I64,
+                      program: Program) -> Files:
     """The view file of a verification. The program is the user's own, so the view shows all of its track.
 
     samples : of the proof, in ``frame``
     report  : of the verification, places in the setup frame
+    entry   : (n,) int64, index: entry of the remainder of each sample, -1 for none
+    program : the only one of ``programs``, as it was read
     """
     def made() -> Files:
-        read = read_all(programs, frame.part, ready.inputs.bodies, setup, spindle_tool, lambda _share: None)
+        read = read_all(programs, frame.part, job.inputs.bodies, setup, 0, lambda _share: None, [program])
         track = track_of(read, programs, frame.rotation)
-        label = np.zeros(len(samples), np.int64)
-        return _file(ready, samples, frame, label, [{"other": True}], proof, setup, track, read, report, open_=True)
+        count = len(report["remainder"])
+        names: list[dict[str, Any]] = [*({"remainder": k} for k in range(count)), {"other": True}]
+        label = np.where(entry >= 0, entry, count)
+        return _file(job, Decomposition((), (), ()), samples, frame, label, names, proof, setup, track, read, report,
+                     open_=True)
 
     return _or_none(report, VIEW_NAME, made)
 
@@ -110,11 +119,10 @@ def _entries(s: SurfaceSamples, remainder: Sequence[RemainderEntry], count: int)
     return np.where(row >= 0, of[row], count)
 
 
-def _file(ready: Prepared, samples: SurfaceSamples, frame: ProofFrame, label: I64, names: Sequence[Mapping[str, Any]],
-          proof: Proof, setup: ProofSetup, track: ToolTrack, read: Sequence[FramedProgram],
-          report: Mapping[str, Any], *,
-          open_: bool) -> Files:
-    part, d = ready.part, ready.decomposition
+def _file(job: JobPart, d: Decomposition, samples: SurfaceSamples, frame: ProofFrame, label: I64,
+          names: Sequence[Mapping[str, Any]], proof: Proof, setup: ProofSetup, track: ToolTrack,
+          read: Sequence[FramedProgram], report: Mapping[str, Any], *, open_: bool) -> Files:
+    part = job.part
     here = turned_samples(samples, frame.rotation.T)
     judged = Judged(here, label, proof.residual - setup.stock_allowance, np.asarray(proof.program >= 0),
                     setup.scallop_height, setup.gouge_tolerance)
@@ -126,7 +134,7 @@ def _file(ready: Prepared, samples: SurfaceSamples, frame: ProofFrame, label: I6
     path, longer, steps, grid = path_chunks(track, low, open_=open_)
     chunks: list[Chunk] = [*mesh, edge_chunk(part, low, EDGE_SPACING), *path]
     if len(track.end):
-        chunks.append(stock_chunk(read, frame.part, ready.inputs.bodies, setup, frame, open_=open_))
+        chunks.append(stock_chunk(read, frame.part, job.inputs.bodies, setup, frame, open_=open_))
     chunks += [*finer, *longer]
     head = {
         "version": VIEW_VERSION, "made_by": VERSION, "kind": "plan" if "zones" in report else "verify",
@@ -136,11 +144,11 @@ def _file(ready: Prepared, samples: SurfaceSamples, frame: ProofFrame, label: I6
         "budget_mm": {"scallop": setup.scallop_height, "gouge": setup.gouge_tolerance,
                       "allowance": setup.stock_allowance},
         "labelled": list(names), "zones": [_zone(z) for z in report.get("zones", ())],
-        "walls": [_named(ready, w.id, w.faces) for w in d.walls],
-        "connections": [_named(ready, c.id, c.faces) | {"walls": list(c.walls)} for c in d.connections],
+        "walls": [_named(part, w.id, w.faces) for w in d.walls],
+        "connections": [_named(part, c.id, c.faces) | {"walls": list(c.walls)} for c in d.connections],
         "remainder": [{k: e[k] for k in ("reason", "area_mm2", "faces", "would_need", "tool_at_hand", "why_left",
                                          "at_mm")} for e in report.get("remainder", ())],
-        "tools": [tool_shape(t) for t in ready.inputs.bodies], "steps": steps,
+        "tools": [tool_shape(t) for t in job.inputs.bodies], "steps": steps,
         "programs": list(track.names), "seconds": seconds,
         "findings": [_finding(f, track, open_) for f in report["findings"]], "found": report["finding_counts"],
         **_minded(report),
@@ -166,8 +174,8 @@ def _zone(z: Mapping[str, Any]) -> dict[str, Any]:
             "scallop_mm": z.get("scallop_mm"), "machining_time_s": z.get("machining_time_s")}
 
 
-def _named(ready: Prepared, name: str, faces: Sequence[int]) -> dict[str, Any]:
-    return {"id": name, "faces": [int(f) for f in faces], "at_mm": top_of(ready.part, faces)}
+def _named(part: Part, name: str, faces: Sequence[int]) -> dict[str, Any]:
+    return {"id": name, "faces": [int(f) for f in faces], "at_mm": top_of(part, faces)}
 
 
 def _finding(f: Mapping[str, Any], track: ToolTrack, open_: bool) -> dict[str, Any]:

@@ -33,6 +33,7 @@ def run(fake_path, tmp_path_factory):
     (folder / "busy.json").write_text(json.dumps({"tools": [tool], "labels": {"do": "sleep"}}))
     (folder / "good.ngc").write_text("M2\n")
     (folder / "bad.ngc").write_text("(GOUGE)\nM2\n")
+    (folder / "high.ngc").write_text("(HIGH)\nM2\n")
     with background(settings, "fake_chain") as url:
         def call(script, *words, code=0, **variables):
             environment = {**os.environ, "ZONEMILL_BASE": url, "ZONEMILL_KEY": key, **variables}
@@ -81,6 +82,7 @@ def test_a_dry_check_and_a_verification(run):
     assert set(json.loads(run(8, "part.step", "setup.json"))) >= {"zones", "remainder"}
     assert json.loads(run(9, "part.step", "setup.json", "good.ngc"))["state"] == "proved"
     assert json.loads(run(9, "part.step", "setup.json", "bad.ngc", code=3))["findings"]
+    assert json.loads(run(9, "part.step", "setup.json", "high.ngc", code=3))["state"] == "clean"
 
 
 def test_a_tool_of_the_library(run):

@@ -119,7 +119,13 @@ def test_zones_and_verifications_are_jobs_too(client, post, finish):
     assert client.get(f"{zones['links']['self']}/report").json()["code"] == "no_such_document"
     good = finish(client, post(client, path="/v1/verifications", program=b"G21\nM2\n").json())
     bad = finish(client, post(client, path="/v1/verifications", program=b"(GOUGE)\nM2\n").json())
-    assert (good["state"], bad["state"]) == ("proved", "unproved")
+    high = finish(client, post(client, path="/v1/verifications", program=b"(HIGH)\nM2\n").json())
+    assert (good["state"], high["state"], bad["state"]) == ("proved", "clean", "unproved")
+    assert high["summary"]["findings"] == 1 and high["finished_at"] and high["error"] is None
+    assert [j["id"] for j in client.get("/v1/jobs?state=clean").json()["items"]] == [high["id"]]
+    assert 'zonemill_jobs{state="clean"} 1.0' in client.get("/metrics").text
+    events = client.get(high["links"]["events"]).text
+    assert events.count("event: end") == 1 and '"state":"clean"' in events.replace(" ", "")
     assert client.get(bad["links"]["report"]).json()["findings"] == [{"kind": "gouge"}]
     held = [post(client, path="/v1/verifications", program=b"(SPINDLE)\nM2\n", key="t", spindle_tool=n)
             for n in ("1", "1", "0")]

@@ -157,18 +157,20 @@ def test_the_receiver_of_the_documentation_believes_what_is_genuine_and_nothing_
     assert not words["is_genuine"](headers, body, secret_of(MASTER, "ada"), seen)  # a second time is a replay
 
 
-@pytest.mark.parametrize("do", ["gouge", "open", "cancelled"])
+@pytest.mark.parametrize("do", ["gouge", "open", "cancelled", "high"])
 def test_however_a_job_ends_it_is_told(receiver, hooked, post, do):
     there = receiver(200)
     client = hooked(there)
-    job = post(client, "sleep" if do == "cancelled" else do, webhook_url=f"http://127.0.0.1:{there.port}").json()
+    verification = {"path": "/v1/verifications", "program": b"(HIGH)\nM2\n"} if do == "high" else {}
+    job = post(client, "sleep" if do == "cancelled" else do, webhook_url=f"http://127.0.0.1:{there.port}",
+               **verification).json()
     if do == "cancelled":
         client.delete(job["links"]["self"])
     ((_, _, body, _),) = there.wait(1)
-    state = {"gouge": "unproved", "open": "failed", "cancelled": "cancelled"}[do]
+    state = {"gouge": "unproved", "open": "failed", "cancelled": "cancelled", "high": "clean"}[do]
     data = json.loads(body)["data"]
     assert data["state"] == state and (data["error"] is None) == (do != "open")
-    assert (data["summary"] or {}).get("findings") == (1 if do == "gouge" else None)
+    assert (data["summary"] or {}).get("findings") == (1 if do in ("gouge", "high") else None)
 
 
 def test_it_is_tried_again_with_the_same_id_and_body_until_it_is_taken(receiver, hooked, post):

@@ -70,10 +70,11 @@ def test_each_access_has_its_zones_and_half_of_the_walls(job: tuple[Path, Setup,
 
 
 @pytest.mark.slow
-def test_a_program_is_proved_along_its_own_access(frame: Path, job: tuple[Path, Setup, dict[str, Any]]) -> None:
+def test_a_program_does_no_harm_along_its_own_access(frame: Path, job: tuple[Path, Setup, dict[str, Any]]) -> None:
+    """Alone it leaves the half of the walls that the other program cuts."""
     out, setup, _ = job
     text = (out / "program.A2.linuxcnc.ngc").read_text()
-    assert pipeline.verify_program(frame, setup, text, quiet, "A2")["findings"] == []
+    assert set(pipeline.verify_program(frame, setup, text, quiet, "A2")["finding_counts"]) <= {"stock_left"}
     assert pipeline.verify_program(frame, setup, text, quiet, "A1")["findings"] != []
 
 

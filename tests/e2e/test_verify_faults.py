@@ -26,14 +26,14 @@ def first(proof, kind):
 
 def test_a_right_program_has_no_finding():
     proof = run(program())
-    assert proof.clean and proof.gouge_max < 1e-9
+    assert proof.no_findings and proof.gouge_max < 1e-9
     assert proof.zones["Z1"].coverage == proof.zones["Z2"].coverage == 1.0
     assert proof.spent.seconds == pytest.approx(360.4, abs=5) and proof.minutes.keys() == {1}
 
 
 @pytest.mark.parametrize("kind", [StockKind.PART_OFFSET, StockKind.CYLINDER])
 def test_other_blanks_are_cut_as_well(kind):
-    assert run(program(), setup=replace(SETUP, stock_kind=kind, margin=0.5)).clean
+    assert run(program(), setup=replace(SETUP, stock_kind=kind, margin=0.5)).no_findings
 
 
 def test_gouge_of_a_fiftieth():
@@ -58,7 +58,7 @@ def test_gouge_within_the_tolerance_is_none():
     lines = program()
     at = line_of(lines, "X8 Y4", -1)
     lines[at - 1] = "X8.008 Y4"
-    assert run(lines).clean
+    assert run(lines).no_findings
 
 
 def test_missing_retract():
@@ -94,7 +94,7 @@ def test_holder_hit():
 
 def test_shank_near_the_wall_is_rubbing():
     tool = replace(TOOL, flute_length=4.0, neck_diameter=4.0, neck_length=4.4, shank_diameter=4.0)
-    assert run(program(), tools=(tool,)).clean
+    assert run(program(), tools=(tool,)).no_findings
     part_way = replace(TOOL, flute_length=4.0, neck_length=4.5, shank_diameter=4.0002)
     assert first(run(program(), tools=(part_way,)), FindingKind.RUBBING).depth < SETUP.clearance_shank
 
@@ -104,7 +104,7 @@ def test_clamp_hit():
     found = first(run(program(), setup=replace(SETUP, fixtures=(clamp,))), FindingKind.COLLISION)
     assert "fixture" in found.message
     held = np.array([[-40.0, -15, -10], [-32, 15, 4]])
-    assert run(program(), setup=replace(SETUP, fixtures=(held,))).clean
+    assert run(program(), setup=replace(SETUP, fixtures=(held,))).no_findings
 
 
 def test_feed_plunge():
@@ -119,7 +119,7 @@ def test_descent_in_air_is_no_plunge():
     lines = program()
     at = line_of(lines, "G0 Z20", -1)
     lines[at - 1:at - 1] = ["G1 Z3", "G1 Z-5"]
-    assert run(lines).clean
+    assert run(lines).no_findings
 
 
 def test_neck_in_stock_that_the_flutes_do_not_reach():
@@ -241,20 +241,20 @@ def test_a_way_from_an_unstated_place_into_the_work_is_named(way):
     found = first(run([*lines[:4], *way, "G0 Z1.5", *lines[7:]]), FindingKind.PROGRAM)
     assert found.line == 4 + len(way) and "cannot be simulated" in found.message
     above = [w.replace("Z0.4", "Z1.5").replace("Z0.5", "Z1.5") for w in way]
-    assert run([*lines[:4], *above, *lines[7:]]).clean
+    assert run([*lines[:4], *above, *lines[7:]]).no_findings
 
 
 def test_a_dogleg_takes_the_whole_box_of_its_move():
     """From beside the block steeply up over it: the straight way is clear, the way across first and then up is not."""
     lines = program()
     lines = [*lines[:-4], "G0 Z20", "X-30", "Z-2", "X-12 Z25", *lines[-3:]]
-    assert run(lines).clean
+    assert run(lines).no_findings
     proof = run(lines, setup=replace(SETUP, dogleg=True))
     assert {f.line for f in proof.findings} == {line_of(lines, "X-12 Z25")}
     found = first(proof, FindingKind.RAPID)
     # 2.5 mm under the top, and no deeper than half the tool is wide
     assert "cutting part into stock" in found.message and found.depth == pytest.approx(TOOL.radius, abs=0.08)
-    assert found.point[0] <= -12 + TOOL.radius and run(program(), setup=replace(SETUP, dogleg=True)).clean
+    assert found.point[0] <= -12 + TOOL.radius and run(program(), setup=replace(SETUP, dogleg=True)).no_findings
 
 
 def test_a_pass_pasted_twice_is_named():
@@ -283,7 +283,7 @@ def test_tool_lengths_count_in_the_travel_of_z():
     end = line_of(lines, "M5")
     two = [*lines[:end - 1], "T2 M6", "S8000 M3", "G0 G43 H2 Z20", *lines[end - 1:]]
     setup = replace(SETUP, travel=np.array([500.0, 500.0, 100.0]), gauge_length={1: 60.0, 2: 100.0})
-    assert run(two, tools=(TOOL, OTHER), setup=setup).clean
+    assert run(two, tools=(TOOL, OTHER), setup=setup).no_findings
     found = first(run(two, tools=(TOOL, OTHER), setup=replace(setup, gauge_length={1: 60.0, 2: 160.0})),
                   FindingKind.LIMIT)
     assert found.depth == pytest.approx(25.0) and "tool lengths from 60 to 160" in found.message
@@ -293,15 +293,15 @@ def test_what_is_taken_for_granted_is_told():
     lines = program()
     lines[1] = "G90"
     proof = run(lines)
-    assert proof.clean and proof.notes == ("pocket.ngc does not state G21, G17, G94, G54 before its first move; the "
-                                           "proof assumes it",)
+    assert proof.no_findings
+    assert proof.notes == ("pocket.ngc does not state G21, G17, G94, G54 before its first move; the proof assumes it",)
 
 
 def test_blending_is_in_the_error_bound():
     lines = program()
     assert run(lines).error_bound == pytest.approx(0.001001)
     lines[1] += " G64 P0.001 Q0"
-    assert run(lines).error_bound == pytest.approx(0.002001) and run(lines).clean
+    assert run(lines).error_bound == pytest.approx(0.002001) and run(lines).no_findings
 
 
 def test_what_goes_below_the_part_is_told():

@@ -59,7 +59,7 @@ def test_one_side_to_the_foot_before_the_other_is_found_with_its_place():
 @pytest.mark.parametrize("depth", [1.0, 2.0, 4.0, 5.0])
 def test_both_sides_in_turn_are_right_and_told_as_far_as_they_are_free(depth):
     proof = run(program(in_turn(depth)))
-    assert proof.clean and not proof.support.found and proof.support.over == 0
+    assert proof.no_findings and not proof.support.found and proof.support.over == 0
     assert proof.support.walls == 1 and proof.support.limit == 10.0
     assert proof.support.most * THICK == pytest.approx(depth, abs=0.3)
 
@@ -82,7 +82,7 @@ def test_roughed_and_finished_band_by_band_it_has():
         bottom = max(top - 4.0, FOOT)
         for left in (0.3, 0.0):
             cuts += [*whole("left", left, top=top, bottom=bottom), *whole("right", left, top=top, bottom=bottom)]
-    assert run(program(cuts)).clean
+    assert run(program(cuts)).no_findings
 
 
 def test_stock_as_thick_as_the_wall_holds_it_and_less_does_not():
@@ -98,20 +98,20 @@ def test_a_side_in_a_program_of_its_own_is_found_there():
 
 def test_a_wall_somebody_holds_is_told_of_and_no_finding():
     proof = run(program([*whole("left"), *whole("right")]), setup=replace(SETUP, walls_in_turn=False))
-    assert proof.clean and proof.support.over > 1000 and not proof.support.found
+    assert proof.no_findings and proof.support.over > 1000 and not proof.support.found
     assert proof.support.at[2] == pytest.approx(TOP, abs=0.3)
 
 
 def test_a_part_without_high_thin_walls_is_not_asked():
     proof = run(program([*whole("left"), *whole("right")]), setup=replace(SETUP, free_ratio=21.0))
-    assert proof.clean and proof.support.walls == proof.support.places == 0
+    assert proof.no_findings and proof.support.walls == proof.support.places == 0
 
 
 @pytest.mark.parametrize("margin", [0.1, 0.4])
 def test_where_the_blank_is_thinner_than_the_wall_half_of_it_counts(margin):
     """A casting nearer to the part than the wall is thick: the order is what a program can do for it."""
     near_net = replace(SETUP, stock_kind="part_offset", margin=margin, uncertainty=0.0)
-    assert run(program(in_turn(4.0)), setup=near_net).clean
+    assert run(program(in_turn(4.0)), setup=near_net).no_findings
     assert run(program([*whole("left"), *whole("right")]), setup=near_net).counts == {"support": 1}
 
 

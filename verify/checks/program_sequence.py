@@ -19,15 +19,14 @@ from verify.blank.blank import stock_bounds
 from verify.checks.clear_height import from_above, top_of_all
 from verify.checks.machine_limits import limit_findings, notes_on, way_findings
 from verify.findings import Source
-from verify.gcode.reader import FEED, Program, read_program
 from verify.model import Finding, NcProgram, ProofSetup, StockKind
 from verify.moves import Moves
+from verify.program.move_kinds import FEED
+from verify.program.program import Program
+from verify.program_reading import read_one
 from verify.progress import Report, StageProgress
-from verify.stepnc.reader import is_stepnc, read_stepnc
 from verify.tool_axes import ToolAxes
 
-BLEND = 0.001  # mm, deviation that G64 may allow; the error bound includes it
-BLEND_SHARE = 0.1  # of the gouge tolerance: allowed instead where that is more
 Given = NcProgram | tuple[str, str]
 
 
@@ -85,27 +84,23 @@ def check_numbers(tools: Sequence[ToolBody]) -> None:
 
 
 def read_all(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
-             spindle_tool: int, report: Report) -> list[FramedProgram]:
+             spindle_tool: int, report: Report, known: Sequence[Program] | None = None) -> list[FramedProgram]:
     """Read programs in the order they run; a descent of unknown start height comes from above everything.
 
     programs, spindle_tool : as ``verify.prove.prove`` takes them; it also names the errors
     report   : called with the share read, 0 to 1
+    known    : the same programs, already read by ``verify.program_reading.read_one``; None: they are read here
     """
     given = [p if isinstance(p, NcProgram) else NcProgram(*p) for p in programs]
     stages, total, done = StageProgress(report), max(sum(len(p.text) for p in given), 1), 0
     read = []
-    for nc in given:
+    for k, nc in enumerate(given):
         own, bounds = _own(nc, part, setup)
         top = top_of_all(bounds, own)
         share = stages.span(done / total, (done + len(nc.text)) / total)
-        if is_stepnc(nc.text):
-            program = read_stepnc(nc.text, name=nc.name, tools=tools, kinematics=setup.kinematics, report=share)
-        else:
-            program = read_program(
-                nc.text, name=nc.name, tools=frozenset(t.number for t in tools), work_offset=own.work_offset,
-                blend_limit=max(BLEND, BLEND_SHARE * setup.gouge_tolerance), kinematics=setup.kinematics,
-                gauge_length=setup.gauge_length, spindle_tool=spindle_tool, report=share, dialect=nc.dialect,
-                radii={t.number: t.radius for t in tools}, names={t.id: t.number for t in tools})
+        program = known[k] if known is not None else read_one(
+            nc, tools, work_offset=own.work_offset, gouge_tolerance=setup.gouge_tolerance, kinematics=setup.kinematics,
+            gauge_length=setup.gauge_length, spindle_tool=spindle_tool, report=share)
         read.append(FramedProgram(from_above(program, top + setup.clearance_rapid), nc.turn, own, bounds))
         done += len(nc.text)
     return read

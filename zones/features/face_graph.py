@@ -18,6 +18,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.rays import first_hits
 from geometry.part import EdgeInfo, EdgeKind, Part
 from geometry.sampling import SurfaceSamples, joined, sample_surface
+from zones.features.seat import seat_of
 
 STEEP_NZ = 0.5
 """A normal more than 60 degrees from +Z has n_z below this; below minus this it faces down."""
@@ -211,13 +212,7 @@ class FaceGraph:
     @cached_property
     def seat(self) -> np.ndarray:
         """(n,) bool: faces of the lowest plane facing away from the spindle."""
-        low = self.part.bounds[0, 2] + 1e-4 * self.height
-        flat = np.array([f.surface == "plane" for f in self.part.faces])
-        down = flat & (self.normal[:, 2] < -0.99)
-        if not down.any():
-            return np.zeros(self.n, bool)
-        lowest = max(low, float(self.z_range[down, 1].min()) + 1e-4 * self.height)
-        return np.asarray(down & (self.z_range[:, 1] <= lowest))
+        return seat_of(self.part)
 
     def normals_at(self, face: int, nodes: np.ndarray) -> F64:
         """Unit normals of a face at mesh vertices on its border.

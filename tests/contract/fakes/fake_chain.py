@@ -99,4 +99,6 @@ def verify_program(part_path, setup, program_text, progress, access=None, out=No
     findings = [{"kind": "gouge"}] if "GOUGE" in program_text else []
     if "SPINDLE" in program_text:
         findings.append({"spindle_tool": spindle_tool})
+    if "HIGH" in program_text:
+        return {"state": "clean", "findings": [{"kind": "stock_left", "face": "F3", "depth": 1.0}]}
     return {"state": "unproved" if findings else "proved", "findings": findings}

@@ -37,8 +37,8 @@ class FakeChain(types.ModuleType):
         return self._say(progress)
 
     def verify_program(self, part_path, setup, program_text, progress, access=None, out=None, mesh=None,
-                       spindle_tool=0, blank_path=None, dialect=None, ending=""):
-        assert program_text.strip()
+                       spindle_tool=0, blank_path=None, dialect=None, ending="", program=None):
+        assert program_text.strip() and program.nc.text == program_text and program.spindle_tool == spindle_tool
         self.out, self.mesh, self.spindle_tool = out, mesh, spindle_tool
         return self._say(progress)
 
@@ -85,7 +85,11 @@ def test_verify_answers_0_without_and_3_with_findings(chain, files):
     assert call(*args).exit_code == 0
     chain.answer = {"state": "unproved", "findings": [{"kind": "gouge"}]}
     assert call(*args).exit_code == 3
-    assert chain.spindle_tool == 0 and call(*args, "--spindle-tool", 4).exit_code == 3 and chain.spindle_tool == 4
+    assert chain.spindle_tool == 0 and call(*args, "--spindle-tool", 1).exit_code == 3 and chain.spindle_tool == 1
+    chain.answer = {"state": "clean", "findings": [{"kind": "stock_left"}]}
+    assert call(*args).exit_code == 3
+    got = call(*args, "--spindle-tool", 4)
+    assert got.exit_code == 2 and "no_such_tool" in got.stderr
     assert call(*args, "--spindle-tool", -1).exit_code == 2
     (files / "x.ngc").write_text("\n")
     got = call(*args)

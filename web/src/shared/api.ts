@@ -10,7 +10,7 @@ export type Problem = components["schemas"]["Problem"];
 export type Setup = components["schemas"]["Setup"];
 export type Tool = components["schemas"]["Tool"];
 
-export const FINAL = new Set(["proved", "unproved", "done", "failed", "cancelled"]);
+export const FINAL = new Set(["proved", "clean", "unproved", "done", "failed", "cancelled"]);
 const KEY = "zonemill-key";
 
 /** A request that failed, with the problem document of the service. */

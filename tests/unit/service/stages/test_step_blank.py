@@ -18,7 +18,8 @@ from service.commands.arguments import blank_file
 from service.from_wire import parse_setup
 from service.stages.blank_checks import check_against_part
 from service.stages.blank_model import blank_of
-from service.stages.preparation import load_blank, prepare
+from service.stages.job_part import load_blank
+from service.stages.preparation import prepare
 from tests.hand_parts import as_part, box_mesh, joined, terraces
 from tests.step_files import write_step
 from zones.reach.access_view import access_rotation

@@ -145,7 +145,7 @@ def test_what_is_met_at_one_end_of_a_long_move_does_not_count_at_the_other():
 def test_a_slot_above_the_limit_is_a_finding_on_its_line():
     lines = program()
     clean = prove([("p", text(lines))], PART, (TOOL, OTHER), SETUP, scored(PART), ("Z1", "Z2"))
-    assert clean.clean and clean.engaged[1].most > math.radians(160) and 2 not in clean.engaged
+    assert clean.no_findings and clean.engaged[1].most > math.radians(160) and 2 not in clean.engaged
     limited = replace(SETUP, max_engaged={1: math.radians(120), 2: math.radians(10)})
     proof = prove([("p", text(lines))], PART, (TOOL, OTHER), limited, scored(PART), ("Z1", "Z2"))
     assert set(proof.counts) == {"engagement"}

@@ -48,15 +48,15 @@ def test_forms_by_the_normal():
 def test_the_seat_and_what_faces_down_are_not_machinable():
     mesh = walls()
     samples = samples_of(mesh, 2.0)
-    faces = machinable_faces(samples, NOTHING, None, set())
+    faces = machinable_faces(samples, NOTHING.seat, None, set())
     assert 1 not in faces and faces == set(range(2, int(mesh.face_ids.max()) + 1))
-    assert machinable_faces(samples, NOTHING, None, {3}) == faces - {3}
-    assert machinable_faces(samples, NOTHING, {4, 5}, {5}) == {4}
+    assert machinable_faces(samples, NOTHING.seat, None, {3}) == faces - {3}
+    assert machinable_faces(samples, NOTHING.seat, {4, 5}, {5}) == {4}
     seat = {f for f in range(1, 7) if (samples.normals[samples.face == f] @ [0, 0, -1] > 0.9).all()}
     lies = Decomposition((), (), (), {}, tuple(seat))
     below = np.array([[0.0, 0.8, -0.6], [0.0, 0.0, 1.0]])
-    assert seat and not seat & machinable_faces(samples, lies, None, set(), below), "the part still lies on it"
-    assert seat <= machinable_faces(samples, lies, None, set(), [[0.0, 0.0, -1.0]]), "the part lies turned over"
+    assert seat and not seat & machinable_faces(samples, lies.seat, None, set(), below), "the part still lies on it"
+    assert seat <= machinable_faces(samples, lies.seat, None, set(), [[0.0, 0.0, -1.0]]), "the part lies turned over"
 
 
 def test_faces_of_a_connection_are_its_region():

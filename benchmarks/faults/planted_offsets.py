@@ -1,0 +1,249 @@
+"""Offsets planted into correct programs: is each found, as high or deep as it is, and is none proved?
+
+Run from the root of the checkout: ``python benchmarks/faults/planted_offsets.py [--sizes 0.3,5] [--ways +X,-Z]
+[--programs A,B] [--rows FILE]``. The programs are plans of small parts in five dialects, whole and of one operation
+each, and, where the collection of cases lies beside the checkout, one of its programs. Offsets go along X, Y and Z,
+both ways, into one tool length, and into the work offset. The smallest is twice the larger of scallop and gouge
+tolerance.
+
+Whether an offset changes anything is judged without the code under test: some sample that the right program leaves
+within tolerance must be out of it, by its residual alone. Depth and height are judged where such a sample faces along
+the offset, and where so much stock stands on it, or the offset goes into it. Right means within 10 % or 5 µm.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+import cadquery as cq  # noqa: E402
+import numpy as np  # noqa: E402
+
+from schemas.machine import DIALECT_ENDINGS  # noqa: E402
+from schemas.setup import Setup  # noqa: E402
+from service.from_wire import parse_setup  # noqa: E402
+from service.pipeline import plan  # noqa: E402
+from service.program_first import read_first  # noqa: E402
+from service.stages.job_part import ReadPart, read_job_part  # noqa: E402
+from service.stages.program_proof import ProgramProof, proved_program  # noqa: E402
+from tests.step_files import write_step  # noqa: E402
+from verify.blank.blank import stock_on_normals  # noqa: E402
+from verify.surface.sample_scores import proved_samples  # noqa: E402
+
+CASES = Path(__file__).resolve().parents[3] / "shared" / "cases"
+SIZES = (0.1, 0.3, 1.0, 2.0, 5.0)  # mm, beside the smallest
+CHANGED = 5  # samples out of tolerance, from which on an offset has changed something
+FIXED = re.compile(r"G53|G28|G30|M91|SUPA|G10|CYCL DEF|TOOL CALL|^\s*[(;]")
+WORD = re.compile(r"(?<![A-Z_])([XYZ])=?([+-]?(?:\d+\.?\d*|\.\d+))")
+FLAT = {"id": "T1", "number": 1, "kind": "flat", "diameter_mm": 4, "flute_length_mm": 12, "stickout_mm": 25}
+BALL = {"id": "T2", "number": 2, "kind": "ball", "diameter_mm": 3, "flute_length_mm": 8, "stickout_mm": 25}
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A correct program of a part: its name, the part as it was read, setup, text, and ending of its file."""
+
+    name: str
+    job: ReadPart
+    setup: Setup
+    text: str
+    ending: str
+
+    @property
+    def smallest(self) -> float:
+        """Twice the larger of scallop and gouge tolerance, mm."""
+        q = self.setup.quality
+        return 2.0 * max(q.scallop_height_mm, q.gouge_tolerance_mm)
+
+    def proof(self, text: str) -> ProgramProof:
+        """The proof of a text."""
+        return proved_program(self.job, read_first(self.setup, text, ending=self.ending), lambda _share: None)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One planted offset: whether it changes what is cut, whether a face stands square to it, the state, and the
+    finding that is nearest to it, mm."""
+
+    program: str
+    where: str
+    size: float
+    changes: bool
+    square: bool
+    state: str
+    nearest: float | None
+    kind: str
+    right: bool
+    seconds: float
+
+
+def shapes() -> dict[str, tuple[Any, list[dict[str, Any]]]]:
+    """Small parts with their tools."""
+    def box(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0)) -> cq.Workplane:
+        return cq.Workplane().box(x, y, z, centered=False).translate(at)
+
+    step = box(16, 12, 6).cut(box(8, 12, 3, (0, 0, 3)))
+    pocket = box(24, 20, 8).cut(box(14, 10, 4, (5, 5, 4)).edges("|Z").fillet(2.5))
+    boss = box(20, 16, 4).union(cq.Workplane().cylinder(4, 4, centered=(True, True, False)).translate((10, 8, 4)))
+    slope = box(16, 12, 7).cut(cq.Workplane("XZ").polyline([(6, 7), (16, 7), (16, 4)]).close().extrude(-12))
+    dome = box(14, 14, 3).union(cq.Workplane().sphere(5).intersect(box(20, 20, 6, (-10, -10, 1.5)))
+                                .translate((7, 7, 1.2)))
+    return {"step": (step, [FLAT]), "pocket": (pocket, [FLAT]), "boss": (boss, [FLAT]), "slope": (slope, [FLAT, BALL]),
+            "dome": (dome, [FLAT, BALL])}
+
+
+def cases(folder: Path, wanted: set[str]) -> Iterator[Case]:
+    """The correct programs."""
+    for (name, (shape, tools)), dialect in zip(shapes().items(), DIALECT_ENDINGS, strict=True):
+        step = write_step(shape, folder / f"{name}.step")
+        for what in ("whole", "one"):
+            if wanted and f"{name}-{what}" not in wanted:
+                continue
+            raw = {"tools": tools, "machine": {"dialects": [dialect]}, "quality": {"scallop_height_mm": 0.02},
+                   "stock": {"margin_mm": 1.0, "uncertainty_mm": 0.0}}
+            one = {"operations": {"roughing": False, "faces": _top_faces(step, raw)}} if what == "one" else {}
+            report = plan(step, parse_setup(json.dumps({**raw, **one})), folder / f"{name}-{what}", _quiet)
+            if report["state"] != "proved":
+                raise SystemExit(f"{name}-{what} is not proved: {report['findings'][:2]}")
+            ending = DIALECT_ENDINGS[dialect]
+            text = (folder / f"{name}-{what}" / f"program.{dialect}.{ending}").read_text()
+            setup = parse_setup(json.dumps(raw))
+            yield Case(f"{name}-{what}", read_job_part(step, setup, _quiet), setup, text, f".{ending}")
+    if (CASES / "nc" / "pocket_ok.ngc").is_file() and (not wanted or "pocket_ok" in wanted):
+        setup = parse_setup((CASES / "nc" / "pocket_setup.json").read_bytes())
+        yield Case("pocket_ok", read_job_part(CASES / "parts" / "pocket_plate.step", setup, _quiet), setup,
+                   (CASES / "nc" / "pocket_ok.ngc").read_text(), ".ngc")
+
+
+def _quiet(_stage: str, _share: float) -> None:
+    """No progress."""
+
+
+def _top_faces(step: Path, raw: dict[str, Any]) -> list[str]:
+    """The highest level face of a part, or the highest face where none is level: the one operation works on it."""
+    part = read_job_part(step, parse_setup(json.dumps(raw)), _quiet).part
+    mesh = part.mesh
+    middle = {f.number: mesh.triangles[mesh.face_ids == f.number][:, :, 2].mean() for f in part.faces}
+    up = {f.number: float(mesh.normals[mesh.face_ids == f.number][:, 2].mean()) for f in part.faces}
+    level = [n for n in middle if up[n] > 0.5]
+    return [f"F{max(level, key=lambda n: middle[n])}"]
+
+
+def shifted(text: str, by: np.ndarray, lines: Callable[[int], bool] = lambda _line: True) -> str:
+    """A text with its X, Y and Z words moved by ``by``, (3,) mm, on some of its lines; lines that name fixed places of
+    the machine stay."""
+    def moved(m: re.Match[str]) -> str:
+        value = float(m[2]) + float(by["XYZ".index(m[1])])
+        sign = "+" if m[2].startswith("+") and value >= 0 else ""
+        return f"{m[1]}{'=' if '=' in m[0] else ''}{sign}{value:.4f}"
+
+    out = []
+    for k, line in enumerate(text.split("\n"), 1):
+        out.append(line if FIXED.search(line) or not lines(k) else WORD.sub(moved, line))
+    return "\n".join(out)
+
+
+def tool_lines(case: Case) -> dict[int, Callable[[int], bool]]:
+    """Lines of each tool, by T number, of a program with several tools."""
+    read = read_first(case.setup, case.text, ending=case.ending).read
+    tools = np.unique(read.tool[read.tool > 0]).tolist()
+    return {} if len(tools) < 2 else {t: set(read.line[read.tool == t].tolist()).__contains__ for t in tools}
+
+
+def planted(case: Case, sizes: tuple[float, ...]) -> Iterator[tuple[str, np.ndarray, str]]:
+    """Name, offset (3,) mm and text of every offset."""
+    for size in (case.smallest, *(s for s in sizes if s > case.smallest)):
+        for axis, letter in enumerate("XYZ"):
+            for way in (1.0, -1.0):
+                by = np.zeros(3)
+                by[axis] = way * size
+                yield f"{'+' if way > 0 else '-'}{letter}", by, shifted(case.text, by)
+        for tool, lines in tool_lines(case).items():
+            for way in (1.0, -1.0):
+                by = np.array([0.0, 0.0, way * size])
+                yield f"length of T{tool} {'+' if way > 0 else '-'}", by, shifted(case.text, by, lines)
+    if "G54" in case.text:
+        yield "G55", np.zeros(3), case.text.replace("G54", "G55")
+
+
+def is_square(right: ProgramProof, made: ProgramProof, out: np.ndarray, by: np.ndarray) -> bool:
+    """Whether some of the samples (n,) that went out of tolerance show the whole offset (3,) mm."""
+    gouged = made.proof.residual[out] < 0.0
+    s, size = right.samples.subset(out), float(np.linalg.norm(by))
+    along = s.normals @ by / max(size, 1e-9)
+    stock = stock_on_normals(s.points, s.normals, right.frame.part.mesh.bounds, right.conditions, 100.0)
+    return bool(((along > 0.999) & (stock >= size) & ~gouged).sum() + ((along < -0.999) & gouged).sum() > CHANGED)
+
+
+def judge(case: Case, right: ProgramProof, where: str, by: np.ndarray, text: str) -> Row:
+    """Prove a text with an offset and look for the finding that is nearest to it."""
+    begin, size = time.monotonic(), float(np.linalg.norm(by))
+    made = case.proof(text)
+    good = np.asarray(right.proof.proved, np.bool_)
+    out = good & ~proved_samples(made.proof.residual, made.conditions)
+    depths = [(abs(f.depth), str(f.kind)) for f in made.proof.findings if str(f.kind) in ("gouge", "stock_left")]
+    nearest = min(depths, key=lambda d: abs(d[0] - size), default=(None, ""))
+    fits = nearest[0] is not None and abs(nearest[0] - size) <= max(0.1 * size, 0.005)
+    changes = int(out.sum()) > CHANGED or where == "G55"
+    square = changes and is_square(right, made, out, by)
+    return Row(case.name, where, size, changes, square, made.report["state"], *nearest, fits,
+               round(time.monotonic() - begin, 2))
+
+
+def main() -> None:
+    """Run the table."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--sizes", default=",".join(map(str, SIZES)))
+    options.add_argument("--ways", default="", help="only these, as +X,-Z,G55")
+    options.add_argument("--programs", default="")
+    options.add_argument("--rows", default="")
+    given = options.parse_args()
+    sizes = tuple(float(s) for s in given.sizes.split(",") if s)
+    ways = set(filter(None, given.ways.split(",")))
+    rows: list[Row] = []
+    with tempfile.TemporaryDirectory() as folder:
+        for case in cases(Path(folder), set(filter(None, given.programs.split(",")))):
+            begin = time.monotonic()
+            right = case.proof(case.text)
+            report, seconds = right.report, time.monotonic() - begin
+            rest = [(e["reason"], e["area_mm2"]) for e in report["remainder"]]
+            print(f"{case.name}: {report['state']}, coverage {report['coverage']:.3f}, {seconds:.1f} s, asked "
+                  f"{report['asked']['faces']}, remainder {rest}", [f["message"] for f in report["findings"]][:4],
+                  flush=True)
+            for where, by, text in planted(case, sizes):
+                if ways and where not in ways:
+                    continue
+                row = judge(case, right, where, by, text)
+                rows.append(row)
+                wrong = row.changes and (row.state == "proved" or row.square and not row.right)
+                if wrong or not row.changes:
+                    print("  ", "WRONG" if wrong else "nothing changes", row, flush=True)
+    if given.rows:
+        Path(given.rows).write_text("".join(json.dumps(asdict(r)) + "\n" for r in rows))
+    table(rows)
+
+
+def table(rows: list[Row]) -> None:
+    """Print one row for each program."""
+    print("| program | offsets | change something | proved of these | square to a face | of these right |")
+    print("|---|---|---|---|---|---|")
+    for name in dict.fromkeys(r.program for r in rows):
+        own = [r for r in rows if r.program == name]
+        change = [r for r in own if r.changes]
+        square = [r for r in change if r.square]
+        print(f"| {name} | {len(own)} | {len(change)} | {sum(r.state == 'proved' for r in change)} | {len(square)} | "
+              f"{sum(r.right for r in square)} |")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,59 @@
+"""The work that a program of any origin has to do: the samples that are judged, the faces, and what tools can touch."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from geometry.mesh import F64
+from geometry.sampling import SurfaceSamples
+from service.from_wire import face_numbers
+from service.stages.access_plan import ProofFrame
+from service.stages.job_part import JobPart
+from service.stages.preparation import machinable_triangles, table_height
+from service.stages.proof_samples import proof_samples
+from service.stages.tool_touch import ToolTouch
+from verify.model import Asked
+from verify.program.move_kinds import FEED
+from verify.program.program import Program
+from zones.features.seat import seat_of
+from zones.reach.access_view import access_rotation, turned, turned_samples
+
+AXES = 200  # tool axes of a program that count as directions it sees the part from
+
+
+def asked_work(job: JobPart, frame: ProofFrame, program: Program) -> tuple[SurfaceSamples, Asked]:
+    """Samples of the machinable area in the frame of the proof, and the work that is asked there.
+
+    frame   : of the proof; program : as it was read
+
+    The machinable area is what the accesses of the setup see, and what the tool axes of the program see.
+
+    Raises
+    ------
+    SetupError
+        The setup names faces the part does not have.
+    """
+    inputs, ops = job.inputs, job.inputs.operations
+    given = [access_rotation(a.direction) for a in job.accesses]
+    directions = np.vstack([[r[2] for r in given], _axes(program) @ frame.rotation])
+    first = turned(job.part, given[0])
+    seat = (np.flatnonzero(seat_of(first)) + 1).tolist()
+    triangles = machinable_triangles(first, seat, inputs, directions @ given[0].T)
+    samples = turned_samples(proof_samples(first.mesh, triangles), frame.rotation @ given[0].T)
+    table = table_height(inputs, job.blank) if inputs.turns else None
+    asked = frozenset[int]() if not ops.finishing else None if ops.faces is None else frozenset(face_numbers(ops.faces))
+    return samples, Asked(asked, ToolTouch(job.part, inputs, frame.rotation, table),
+                          max(job.part.chord, job.part.deviation))
+
+
+def _axes(program: Program) -> F64:
+    """(k, 3) float64, unit, frame of the program: tool axes at the ends of feed moves that do not stand along Z."""
+    if program.poses is None:
+        return np.zeros((0, 3))
+    axes = np.unique(np.round(program.poses.end_axis[program.kind == FEED], 3), axis=0)
+    if len(axes) > AXES:
+        axes = axes[np.linspace(0, len(axes) - 1, AXES).astype(np.int64)]
+    return np.asarray(axes / np.linalg.norm(axes, axis=1)[:, None])
+
+
+__all__ = ["asked_work"]

@@ -1,0 +1,98 @@
+"""Findings of stock that was left: connected places of a face, with height, area and the lines that left them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from geometry.mesh import F64, I32
+from geometry.sampling import SurfaceSamples
+from verify.findings import Source
+from verify.model import Finding, FindingKind, ProofSetup
+
+LEAST_PLACE = 0.05  # mm²: a smaller place is five samples or fewer, which prove nothing
+CONNECTED = 0.5  # mm, or three distances of samples: so near samples are one place
+ROUND = 0.5  # mm, or 2.5 distances of samples: a height is the median so far around
+HIGHEST = 300  # samples of a place whose surroundings are looked at
+MAX_LINES = 50
+BOOL = NDArray[np.bool_]
+INT = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class StandingStock:
+    """Stock on n samples: height over the allowance, (n,) float64, mm, and the move that left it, (n,) int32, index, -1
+    where none did.
+    """
+
+    height: F64
+    mover: I32
+
+    def subset(self, rows: INT) -> StandingStock:
+        """The selected samples. rows : (k,) int64, index."""
+        return StandingStock(self.height[rows], self.mover[rows])
+
+
+def stock_findings(samples: SurfaceSamples, stock: StandingStock, each: float, source: Source,
+                   setup: ProofSetup) -> tuple[list[Finding], BOOL]:
+    """A finding for each connected place of a face.
+
+    samples : SurfaceSamples with stock, n of them, frame of the proof
+    each    : how many samples each of them stands for
+
+    Returns the findings, and (n,) bool, whether a sample is part of one: places under ``LEAST_PLACE`` are none.
+
+    Notes
+    -----
+    The height of a place is the largest median of the heights within ``ROUND`` of a sample. So the scallop that a right
+    pass leaves does not count: stock of height d under scallops of height c has a median of d + c / 4.
+    """
+    found: list[Finding] = []
+    told = np.zeros(len(samples), np.bool_)
+    spacing = float(np.sqrt(each * samples.area.mean())) if len(samples) else 0.0
+    for face in np.unique(samples.face).tolist():
+        mine = np.flatnonzero(samples.face == face)
+        group = _connected(samples.points[mine], max(CONNECTED, 3.0 * spacing))
+        for number in range(int(group.max()) + 1):
+            rows = mine[group == number]
+            area = each * float(samples.area[rows].sum())
+            if area >= LEAST_PLACE:
+                told[rows] = True
+                found.append(_finding(samples, stock, rows, area, max(ROUND, 2.5 * spacing), source, setup))
+    return found, told
+
+
+def _connected(points: F64, apart: float) -> INT:
+    """Number of the place of each of (n, 3) points: neighbours at most ``apart`` mm apart share one."""
+    cell = np.floor(points / (0.5 * apart)).astype(np.int64)
+    cells, of = np.unique(cell, axis=0, return_inverse=True)
+    pairs = cKDTree(cells).query_pairs(2.0, output_type="ndarray")  # cells whose middles are one apart
+    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells), len(cells)))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64)[of.reshape(-1)]
+
+
+def _finding(samples: SurfaceSamples, stock: StandingStock, rows: INT, area: float, reach: float, source: Source,
+             setup: ProofSetup) -> Finding:
+    height, points = stock.height[rows], samples.points[rows]
+    tree = cKDTree(points)
+    highest = np.lexsort((np.arange(len(rows)), -height))[:HIGHEST]
+    typical = np.array([float(np.median(height[near])) for near in tree.query_ball_point(points[highest], reach)])
+    best = int(np.argmax(typical))
+    k, tall = int(highest[best]), float(typical[best])
+    movers = np.unique(stock.mover[rows][stock.mover[rows] >= 0])
+    lines = np.unique(source.line[movers])
+    m = int(stock.mover[rows[k]])
+    m = m if m >= 0 or not len(movers) else int(movers[0])
+    span = "" if len(lines) < 2 else f", lines {int(lines[0])} to {int(lines[-1])}"
+    who = f"T{source.tool[m]} leaves {tall:.4f} mm of stock" if m >= 0 else f"{tall:.4f} mm of stock stays"
+    text = f"{who} where {setup.scallop_height:g} mm is allowed ({area:.3g} mm² in this place){span}"
+    x, y, z = (round(float(v), 6) for v in points[k])
+    keep = lines if len(lines) <= MAX_LINES else lines[np.linspace(0, len(lines) - 1, MAX_LINES).astype(np.int64)]
+    return Finding(FindingKind.STOCK_LEFT, source.names[source.program[m]] if m >= 0 else source.names[0],
+                   int(source.line[m]) if m >= 0 else 0, None, f"F{samples.face[rows[0]]}", (x, y, z), tall,
+                   setup.scallop_height, text, len(rows), area, lines=tuple(int(v) for v in keep))

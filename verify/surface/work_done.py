@@ -1,0 +1,240 @@
+"""Work that was asked and is not done: stock that stands where a tool of the program can touch the part.
+
+A face that is asked must be within tolerance wherever the tools that the program uses can touch it. Theory with the
+error bounds: docs/theory/work-done.md. Coordinates are float64, mm, in the frame of the proof.
+
+Notation: h is the scallop height, e the largest error of a residual against the exact part; heights are those over the
+stock allowance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64, I32
+from geometry.mesh_queries.keyed_nearest import KeyedPoints
+from geometry.sampling import SurfaceSamples
+from geometry.tool_body import ToolBody
+from verify.findings import Source
+from verify.model import Asked, Finding, FindingKind, ProofSetup, WorkDone
+from verify.moves import Moves
+from verify.surface.asked_faces import (
+    ASIDE,
+    ASIDE_ROOM,
+    OFF_FACETS,
+    Cutting,
+    distance_aside,
+    thinned,
+    worked_faces,
+)
+from verify.surface.sample_scores import proved_samples
+from verify.surface.stock_places import StandingStock, stock_findings
+from verify.surface.ways_out import ways_out
+
+MAX_TRIED = 12_000  # samples with stock that tools are tried on; the others share the answer of their neighbour
+LEAST_TRIED = 50  # of them on each face
+MAX_WAYS = 1500  # samples whose shortest way out is looked for; the same for the others
+MAX_WAY = 12.0  # mm, longest such way
+LIFT_SHARE = 0.1  # of h: distance at which a tool on an open face touches a sample
+CORNER_SHARE = 0.5  # of h: the same in a corner
+MAX_AXES = 24
+SAME_AXIS = float(np.radians(0.01))
+NOT_IN_PROGRAM, LEFT = "not_in_program", "pass"  # words of the remainder
+BOOL = NDArray[np.bool_]
+INT = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Samples as a proof has measured them.
+
+    samples  : SurfaceSamples, n of them
+    residual : (n,) float64, mm of stock on their normals after all moves, not above ``reach``
+    mover    : (n,) int32, index, the move that left it, -1 where none did
+    reach    : mm
+    error    : mm, largest error of a residual against the mesh
+    """
+
+    samples: SurfaceSamples
+    residual: F64
+    mover: I32
+    reach: float
+    error: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Limits:
+    """Heights over the allowance, mm: h, e, and distances at which tools touch on open faces and in corners."""
+
+    h: float
+    error: float
+    lift: float
+    near: float
+
+    @classmethod
+    def of(cls, setup: ProofSetup, measured: Measured, facet: float) -> _Limits:
+        """The limits of a proof; facet : mm, as in ``Asked``."""
+        h = setup.scallop_height
+        lift = max(1.5 * facet, LIFT_SHARE * h)
+        return cls(h, measured.error + facet, lift, max(CORNER_SHARE * h, lift))
+
+    @property
+    def face(self) -> float:
+        """Largest height on an open face."""
+        return self.h + self.error
+
+    @property
+    def corner(self) -> float:
+        """Largest height in a corner."""
+        return self.h + self.near + self.error
+
+
+def work_done(asked: Asked, measured: Measured, cutting: Cutting, cut: BOOL,
+              source: Source) -> tuple[WorkDone, list[Finding]]:
+    """Stock that stands on the faces that were asked, where the tools of the program can touch the part.
+
+    cut : (m,) bool, whether each move removes stock
+
+    Returns WorkDone, and a finding ``stock_left`` for each connected place of a face.
+
+    Notes
+    -----
+    A sample is a finding in two cases.
+
+    1. A tool touches it with room of h + e to everything else, and more than h + e stands on it. That room keeps away
+       from stock that other faces may keep.
+    2. A tool without such room comes within h / 2 of it, and more than 1.5 h + e stands on it, along the normal and
+       along the shortest way out.
+
+    Beside a place of the same face that is cut, stock of which a way out is h + e or shorter is none.
+    """
+    s, setup = measured.samples, cutting.setup
+    faces = worked_faces(s, measured.residual, measured.mover, measured.reach, cutting) if asked.faces is None else \
+        tuple(sorted(asked.faces & set(np.unique(s.face).tolist())))
+    reason = np.full(len(s), "", dtype=object)
+    stays = ~proved_samples(measured.residual, setup) & (measured.residual > setup.stock_allowance)
+    on_asked = np.isin(s.face, faces)
+    reason[stays & ~on_asked] = NOT_IN_PROGRAM
+    rows = np.flatnonzero(stays & on_asked)
+    if asked.faces is None and not faces and cut.any():
+        return WorkDone(faces, reason), [_beside(cut, source)]
+    if not len(rows):
+        return WorkDone(faces, reason), []
+    tried = _tried(rows, s.face)
+    used = cut if cut.any() else cutting.moves.feed
+    tools = [cutting.tools[k] for k in np.unique(cutting.moves.tool[used])]
+    few = s.subset(tried)
+    standing, left, why = _standing(asked, measured, cutting, few, tried, tools, cutting_axes(cutting.moves, used))
+    found = np.flatnonzero(left)
+    findings, told = stock_findings(few.subset(found), standing.subset(found), len(rows) / len(tried), source, setup)
+    why[found] = np.where(told, "", LEFT)
+    near = KeyedPoints(few.face.astype(np.int64), few.points)
+    reason[rows] = why[near.nearest(s.face[rows].astype(np.int64), s.points[rows])[:, 0]]
+    return WorkDone(faces, reason), findings
+
+
+def _beside(cut: BOOL, source: Source) -> Finding:
+    """The finding of a program that removes stock, but none that stands on a judged face."""
+    m = int(np.flatnonzero(cut)[0])
+    return Finding(FindingKind.NOTHING_CUT, source.names[source.program[m]], int(source.line[m]), None, None, None, 0.0,
+                   0.0, "the program removes stock, but none that stands on a face of the part: check the program zero "
+                   "and the tool")
+
+
+def cutting_axes(moves: Moves, used: BOOL) -> F64:
+    """Axes along which tools cut, (k, 3) float64, unit, tip to spindle, k at most 24, the most used first.
+
+    used : (m,) bool, the moves that count
+
+    An axis nearer than 0.01 degrees to a more used one is the same. Where there are more than 24, that angle doubles
+    until there are not.
+    """
+    if moves.axes is None or not used.any():
+        return np.array([[0.0, 0.0, 1.0]])
+    size = np.linalg.norm(moves.end[used] - moves.start[used], axis=1) + 1e-9
+    axes, place = np.unique(np.round(moves.axes.only(used).middle, 6) + 0.0, axis=0, return_inverse=True)
+    weight = np.bincount(place.reshape(-1), weights=size, minlength=len(axes))
+    axes = axes[np.lexsort((np.arange(len(axes)), -weight))]
+    axes = axes / np.linalg.norm(axes, axis=1)[:, None]
+    angle = SAME_AXIS
+    while len(kept := _apart(axes, angle)) > MAX_AXES:
+        angle *= 2.0
+    return np.asarray(axes[kept])
+
+
+def _apart(axes: F64, angle: float) -> list[int]:
+    """The first of (k, 3) axes, and each further one that is ``angle`` rad from all chosen; more than 24 end it."""
+    left, kept = np.arange(len(axes)), list[int]()
+    while len(left) and len(kept) <= MAX_AXES:
+        kept.append(int(left[0]))
+        left = left[axes[left] @ axes[left[0]] < np.cos(angle)]
+    return kept
+
+
+def _tried(rows: INT, face: I32) -> INT:
+    """Samples that tools are tried on, ascending: all of ``rows``, or an even share of those on each face."""
+    if len(rows) <= MAX_TRIED:
+        return rows
+    share, parts = MAX_TRIED / len(rows), [rows[face[rows] == n] for n in np.unique(face[rows])]
+    return np.sort(np.concatenate([thinned(p, max(int(share * len(p)), min(len(p), LEAST_TRIED))) for p in parts]))
+
+
+def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSamples, tried: INT,
+              tools: Sequence[ToolBody], axes: F64) -> tuple[StandingStock, BOOL, NDArray[np.object_]]:
+    """Stock on the tried samples, which of them are findings, and why the others are none."""
+    limits = _Limits.of(cutting.setup, measured, asked.facet)
+    along, mover = measured.residual[tried].copy(), measured.mover[tried].copy()
+    far = np.flatnonzero(along >= measured.reach * (1.0 - 1e-9))
+    along[far], mover[far] = cutting.way_through_stock(few.points[far], few.normals[far], cutting.farthest, OFF_FACETS)
+    height = along - cutting.setup.stock_allowance
+    high = np.flatnonzero(height > limits.face)
+    left, why = np.zeros(len(tried), np.bool_), np.full(len(tried), LEFT, dtype=object)
+    left[high] = asked.touch.reaches(few.subset(high), tools, axes, limits.lift, limits.face)
+    tight = high[~left[high]]
+    touched = tight[asked.touch.reaches(few.subset(tight), tools, axes, limits.near, 0.0)]
+    beyond = np.setdiff1d(tight, touched)
+    why[beyond] = asked.touch.reasons(few.subset(beyond), tools, axes)
+    corner = np.zeros(len(tried), np.bool_)
+    corner[touched[height[touched] > limits.corner]] = True
+    left |= corner
+    rows, aside = _sides(measured, few, tried, height, np.flatnonzero(left), corner, cutting.setup)
+    way, by = _ways(few, rows, cutting.setup.stock_allowance + limits.h, cutting)
+    nearer = (way < height[rows]) & (aside <= ASIDE * way + ASIDE_ROOM)
+    left[rows[(nearer & (way <= limits.face)) | (corner[rows] & (way <= limits.corner))]] = False
+    moved = rows[(by >= 0) & (nearer | (mover[rows] < 0))]
+    mover[moved] = by[np.isin(rows, moved)]
+    height[rows[nearer]] = way[nearer]
+    return StandingStock(np.where(np.isfinite(height), height, MAX_WAY), mover), left, why
+
+
+def _sides(measured: Measured, few: SurfaceSamples, tried: INT, height: F64, rows: INT, corner: BOOL,
+           setup: ProofSetup) -> tuple[INT, F64]:
+    """Those of ``rows`` whose way out counts, (r,) index, and mm from each to a place of its face that is cut, (r,).
+
+    They stand in corners, or their normal does not lead out of the stock, or they stand at the side of a place: stock
+    that a cut passes along the face is as high as the way out to that cut, not as the way across it.
+    """
+    s = measured.samples
+    good = np.flatnonzero(proved_samples(measured.residual, setup) & np.isin(s.face, np.unique(few.face[rows])))
+    aside = distance_aside(s, good, tried[rows])
+    blocked = ~np.isfinite(height[rows])
+    wanted = corner[rows] | blocked | (aside <= ASIDE * np.minimum(height[rows], MAX_WAY) + ASIDE_ROOM)
+    return rows[wanted], np.where(blocked, 0.0, aside)[wanted]
+
+
+def _ways(few: SurfaceSamples, rows: INT, lift: float, cutting: Cutting) -> tuple[F64, I32]:
+    """Shortest ways out of the stock on some samples, (r,) mm, and the moves they lead to, (r,).
+
+    Of more than ``MAX_WAYS`` samples an even share is followed; each other one gets the way of the nearest of its face.
+    """
+    chosen = thinned(rows, MAX_WAYS)
+    way, by = ways_out(few.points[chosen], few.normals[chosen], lift, MAX_WAY, cutting)
+    if len(chosen) == len(rows):
+        return way, by
+    near = KeyedPoints(few.face[chosen].astype(np.int64), few.points[chosen])
+    of = near.nearest(few.face[rows].astype(np.int64), few.points[rows])[:, 0]
+    return np.where(of >= 0, way[of], np.inf), np.where(of >= 0, by[of], -1).astype(np.int32)
