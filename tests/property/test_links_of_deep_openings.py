@@ -46,7 +46,7 @@ def prism(plan, high):
             out.append(np.array([[ax, ay, 0.0], [bx, by, 0.0], [bx, by, high]]))
             out.append(np.array([[ax, ay, 0.0], [bx, by, high], [ax, ay, high]]))
     count = len(out)
-    return TriangleMesh(np.vstack(out), np.arange(3 * count).reshape(-1, 3), np.zeros(count, np.int32))
+    return TriangleMesh(np.vstack(out), np.arange(3 * count, dtype=np.int32).reshape(-1, 3), np.zeros(count, np.int32))
 
 
 def opening(rng):
@@ -100,7 +100,7 @@ def test_a_deep_opening_is_cut_without_a_plunge_and_without_a_run_that_cuts_noth
     mesh = prism(box(*(np.array(hole.bounds) + [-6, -6, 6, 6])).difference(hole), DEEP)
     top = DEEP + float(rng.uniform(0.5, 1.5))
     block = np.array([[*mesh.bounds[0][:2], 0.0], [*mesh.bounds[1][:2], top]])
-    stock = StockMap.box(TriangleTree(mesh), *block, 0.15)
+    stock = StockMap.box(TriangleTree(mesh), block[0], block[1], 0.15)
     step, depths = float(rng.uniform(0.6, 0.9)), Depths(stock.lattice)
     motions = Motions(800, 200, 3000, 10000, top + 4.0, top + 2.0, RAMP, step, 0.001)
     link = Linker(field_of(mesh, body), stock, motions, depths,
