@@ -15,6 +15,7 @@ from toolpath.kernels.contour import thin
 
 SAME_PLACE = 1e-6  # mm
 BESIDE = 0.1234  # share of that by which the borders between keys are shifted
+SHORTEST = 0.11  # mm, a part of a move down that is parted, at least
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,3 +123,28 @@ def stretch(points: F64, s: F64, low: float, high: float) -> F64:
     inner = points[(s > low) & (s < high)]
     ends = np.array([[np.interp(t, s, points[:, c]) for c in range(3)] for t in (low, high)])
     return np.vstack([ends[:1], inner, ends[1:]])
+
+
+def parting(points: F64, s: F64, at: F64) -> F64:
+    """Where to part a polyline: at given places, moved to its nearest point where they would leave a short move down.
+
+    points : (n, 3) float64, mm, access frame
+    s      : (n,) float64, mm, distance of its points along it
+    at     : (m,) float64, mm along it, ascending
+
+    Returns
+    -------
+    (k,) float64, mm along it, ascending, k <= m
+
+    Notes
+    -----
+    A program rounds Z by g / 2 and X and Y by g / 2 each, g = 0.0001 mm. A move of run l that descends at a share q of
+    the slope m of the steepest ramp keeps that slope in the program where q m l + g <= m (l - sqrt(2) g), so where
+    l >= (g / m + sqrt(2) g) / (1 - q). For a ramp of 3 degrees and q = 0.98 that is 0.103 mm. Moves of the polyline
+    itself may be shorter: ramps are laid for them (``toolpath.linking.ramp_entry``).
+    """
+    k = np.clip(np.searchsorted(s, at), 1, len(s) - 1)
+    before, after = s[k - 1], s[k]
+    short = np.minimum(at - before, after - at) < SHORTEST
+    nearest = np.where(at - before <= after - at, before, after)
+    return np.unique(np.where(short & (points[k, 2] < points[k - 1, 2]), nearest, at))

@@ -18,7 +18,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.lines import stretch
+from toolpath.lines import parting, stretch
 from toolpath.stock.engagement import SKIN_SHARE, angles
 from toolpath.stock.stock_map import AIR_TOLERANCE, SURE_RIM, StockMap
 
@@ -75,8 +75,10 @@ def paced(points: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> list[tupl
     near = maximum_filter1d(busy, 2 * LOOKS + 1, mode="nearest")  # stock may be cut as fast as moves in air go
     cuts = near[1:] | near[:-1] | (between < pace.air) | (pace.hidden is not None)
     ends = np.concatenate([[0], np.flatnonzero((np.diff(between) != 0.0) | (np.diff(cuts))) + 1, [len(between)]])
-    return [(not cuts[a], stretch(points, s, float(at[a]), float(at[b])), float(between[a]))
-            for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    bounds = parting(points, s, at[ends])
+    kinds = np.searchsorted(at, 0.5 * (bounds[1:] + bounds[:-1]), side="right") - 1
+    return [(not cuts[k], stretch(points, s, low, high), float(between[k]))
+            for k, low, high in zip(kinds.tolist(), bounds[:-1].tolist(), bounds[1:].tolist(), strict=True)]
 
 
 def _in_stock(way: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> NDArray[np.float64]:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from geometry.kernels.cutter_sizes import CutterSizes
 
 FAR = 1e3
+BELOW = 1e-6  # mm that a sharp-cornered end may stand over a place of a wall, whose tip a program has rounded
 LEVEL_PLANE, UPRIGHT = 1, 2
 
 
@@ -52,7 +53,7 @@ def _gap(px, py, pz, cx, cy, cz, radius, corner, level):
         return cz - pz + (corner - np.sqrt(corner * corner - u * u) if u > 0.0 else 0.0)
     u = max(np.sqrt((px - cx) ** 2 + (py - cy) ** 2) - (radius - corner), 0.0)
     w = max(cz + corner - pz, 0.0)
-    if level == UPRIGHT and corner == 0.0 and w > 1e-4:
+    if level == UPRIGHT and corner == 0.0 and w > BELOW:
         return FAR
     return np.sqrt(u * u + w * w) - corner
 

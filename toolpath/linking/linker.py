@@ -171,12 +171,24 @@ class Linker:
         height = FLUTE_SHARE * tool.flute_length
         for k in range(int(max(float(over.max()), 0.0) / height), 0, -1):
             lifted = Line(points + np.array([0.0, 0.0, k * height]), line.closed)
-            for piece in pieces_where(lifted, over > k * height, tool.radius, 4.0 * tool.radius):
-                walk = thinned(piece.points, self.motions.tolerance)
-                # where the tool has been as deep, it cannot reach the stock that the map still shows
-                if len(walk) > 1 and self.depths.above(walk).max() > 0.0 and not self._pass(walk, piece.closed):
+            for rest in self._not_been(lifted, over > k * height):
+                if not self._pass(rest.points, rest.closed):
                     return False
         return True
+
+    def _not_been(self, line: Line, wanted: NDArray[np.bool_]) -> Iterator[Line]:
+        """The wanted parts of a line, some way extended, where the tool has not been as deep.
+
+        Where it has been it cannot reach the stock that the map still shows. It walks no move of an earlier level
+        again, which a line above a pass may meet.
+
+        wanted : (n,) bool, for the points of the line
+        """
+        radius = self.field.tool.radius
+        for piece in pieces_where(line, wanted & ~self.depths.been(line.points), radius, 4.0 * radius):
+            walk = thinned(piece.points, self.motions.tolerance)
+            if len(walk) > 1:
+                yield from self._unwalked(Line(walk, piece.closed))
 
     def _stepped(self, points: F64, closed: bool) -> None:
         """Remove layer by layer what stands over a line in a gap that the tool has been in and only just fits.
@@ -191,12 +203,8 @@ class Linker:
             return
         for k in range(int(over.max() / step), 0, -1):
             lifted = Line(along + np.array([0.0, 0.0, k * step]), closed)
-            for piece in pieces_where(lifted, over > k * step, tool.radius, 4.0 * tool.radius):
-                walk = thinned(piece.points, self.motions.tolerance)
-                if len(walk) < 2 or self.depths.above(walk).max() <= 0.0:  # it cannot reach the stock that is left
-                    continue
-                for rest in self._unwalked(Line(walk, piece.closed)):
-                    self._one(rest.points, rest.closed, unless_over=True)
+            for rest in self._not_been(lifted, over > k * step):
+                self._one(rest.points, rest.closed, unless_over=True)
 
     def _pass(self, points: F64, closed: bool) -> bool:
         """Cut a line, skimmed first where it would have too much of the cutter in stock; False where it is left out."""

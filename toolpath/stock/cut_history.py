@@ -14,7 +14,8 @@ from geometry.mesh import F64
 from toolpath.lines import Line, dense, pieces_where, place_keys
 from zones.lattice import Lattice
 
-WRITTEN = 1e-4  # mm, resolution of programs: places that round alike are the same
+PER_MM = 10_000  # steps of a program in a mm; its writer multiplies and rounds the same
+WRITTEN = 1.0 / PER_MM  # mm, resolution of programs: places that round alike are the same
 OVERLAP = 3  # known moves of a line repeated on each side, fewer than the proof counts as a stretch cut twice
 ON = 2.0 * WRITTEN  # mm off a move that still count as on it
 CELL = 10.0 * WRITTEN  # mm, cells in which equal places are searched
@@ -90,6 +91,21 @@ class Depths:
         way = dense(points, self._lattice.step)
         there = self._cells[self._lattice.cells(way)] - way[:, 2]
         return np.where(self._lattice.inside(way), there, math.inf)
+
+    def been(self, points: F64) -> NDArray[np.bool_]:
+        """Whether the tool has been within a lattice step of places as deep, to what a program can tell, (n,) bool.
+
+        points : (n, 3) float64, mm, access frame
+
+        A cell holds one place of a way that crosses it, so a place on that way may be found in a cell beside its own.
+        """
+        lat, out = self._lattice, np.zeros(len(points), np.bool_)
+        i, j = lat.cells(points)
+        for up, right in itertools.product((-1, 0, 1), repeat=2):
+            at = np.clip(i + up, 0, lat.ny - 1), np.clip(j + right, 0, lat.nx - 1)
+            near = np.hypot(*(self._spots[at] - points[:, :2]).T) <= lat.step
+            out |= near & (self._cells[at] <= points[:, 2] + WRITTEN)
+        return out
 
     def copied(self) -> Depths:
         """A copy with a history of its own."""
@@ -197,7 +213,7 @@ def still_to_walk(line: Line, fresh: NDArray[np.bool_]) -> list[Line]:
 
 def _written(points: F64) -> list[bytes]:
     """A key for each of points (n, 3), mm, the same for points that round alike in a program."""
-    return [row.tobytes() for row in np.rint(points / WRITTEN).astype(np.int64)]
+    return [row.tobytes() for row in np.rint(points * PER_MM).astype(np.int64)]
 
 
 def _cells(points: F64) -> NDArray[np.int64]:

@@ -17,6 +17,7 @@ from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.kernels.leaning import lower_leaning
 from toolpath.kernels.residual import LEVEL_PLANE, UPRIGHT, SampleCells, lower
+from toolpath.stock.cut_history import PER_MM
 
 CELL = 0.6  # mm
 MIN_MARGIN = 0.02  # mm
@@ -48,10 +49,13 @@ class ResidualMap:
         return out
 
     def cut(self, path: F64, tool: ToolBody) -> None:
-        """Lower the residual by one polyline of tips.
+        """Lower the residual by one polyline of tips, with heights as a program rounds them.
 
         path : (m, 3) float64, mm, access frame
+
+        A flat end that only just comes down to a place at the top of a wall passes over it where rounding lifts it.
         """
+        path = np.column_stack([path[:, :2], np.rint(path[:, 2] * PER_MM) / PER_MM])
         lower(self.points, self.level, self._cells, np.ascontiguousarray(path), _sizes(tool), self.margin,
               self.residual)
 

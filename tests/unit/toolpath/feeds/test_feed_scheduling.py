@@ -13,8 +13,11 @@ from service.from_wire import parse_setup, tool_bodies
 from service.stages.job_inputs import JobInputs
 from tests.hand_parts import ball, box_mesh, tool
 from toolpath.feeds.feed_scheduling import ANGLE, GUARD, STEP, Pace, paced
+from toolpath.linking.ramp_entry import EASE_SHARE
 from toolpath.stock.engagement import SKIN_SHARE, angles
 from toolpath.stock.stock_map import SURE_RIM, StockMap
+from verify.material.stock_pass import descents
+from verify.moves import Moves
 
 SLOT, FULL, AIR, LAYER = 100.0, 400.0, 3000.0, 1.0
 MISSED = 2.0 * math.acos(1.0 - SURE_RIM * 0.1 / 2.0)  # what a row of nodes may leave out, on a radius of 2
@@ -134,3 +137,23 @@ def test_what_takes_stock_off_is_no_link_however_slow_links_are(air):
     cut = [part for in_air, part, _ in made if not in_air]
     assert min(p[:, 0].min() for p in cut) < 8.0 and max(p[:, 0].max() for p in cut) == 28.0
     assert all(part[:, 0].max() < 8.0 for in_air, part, _ in made if in_air)
+
+
+@pytest.mark.parametrize("share", [0.9, EASE_SHARE])
+def test_a_way_down_parted_for_its_feeds_is_no_steeper_in_the_program(share):
+    """Where a feed changes 7 um before a corner, rounding made that bit a descent that took a whole layer in front."""
+    rng, body, ramp, count = np.random.default_rng(11), tool(4.0, 0.0), math.radians(3.0), 0
+    for _ in range(40):
+        x = np.cumsum(rng.uniform(0.13, 0.5, 60))
+        x = 2.0 + 26.0 * (x - x[0]) / (x[-1] - x[0])
+        way = np.column_stack([x, np.full(60, 15.0), 0.9 - share * math.tan(ramp) * (x - 2.0)])
+        holes = np.sort(rng.uniform(4.0, 26.0, 6))
+        stock = low(block(), lambda x, y, at=holes: np.searchsorted(at, x) % 2 == 1)
+        parts = [part for _, part, _ in paced(way, stock, body, PACE)]
+        count += len(parts)
+        points = np.round(np.vstack([parts[0], *(p[1:] for p in parts[1:])]), 4)
+        still = np.zeros(len(points) - 1)
+        moves = Moves(points[:-1], points[1:], still == 0.0, still.astype(np.int32))
+        assert not descents(moves, ramp)[0].any()
+        assert np.array_equal(points[[0, -1]], np.round(way[[0, -1]], 4))
+    assert count > 300

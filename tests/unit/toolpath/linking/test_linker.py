@@ -9,16 +9,18 @@ import numpy as np
 import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
+from output.program_grid import to_grid
 from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
 from toolpath.counterexamples import BARRED, CARE, Counterexamples
 from toolpath.feeds.feed_scheduling import GUARD, Pace
 from toolpath.lines import Line, dense
-from toolpath.linking.linker import Linker
+from toolpath.linking.linker import FLUTE_SHARE, Linker
 from toolpath.linking.rapid_travel import OVER, Motions
 from toolpath.passes.pass_order import nearest_order
 from toolpath.stock.cut_history import Depths
 from toolpath.stock.stock_map import SKIN, StockMap
 from toolpath.workingsteps import TrajectoryKind
+from verify.checks.repeated_passes import WINDOW
 
 TOP = 4.0
 
@@ -136,6 +138,19 @@ def test_stock_that_stays_beside_a_wall_is_not_gone_over_layer_after_layer():
         assert link.add(straight(5, 25, 15, z))
         passes.append(link.passes - before)
     assert passes == [1] * 8
+
+
+def test_what_is_cut_first_above_a_line_is_no_level_that_was_cut_before():
+    """A ring 0.8 flute lengths below another: the ring above it is that one, to rounding."""
+    body = replace(tool(4.0, 0.0), flute_length=3.0)
+    link = linker(body)
+    high = FLUTE_SHARE * body.flute_length
+    for z in (3.3, 3.3 - 0.5 * high, 3.3 - high):
+        assert link.add(loop(6.0, z - 1.5e-4, (15.03, 14.98)))
+        link.stock.cover[:] = np.maximum(link.stock.cover, np.where(link.stock.part < 0.0, TOP, -np.inf))
+    cuts = [t.points for t in link.trajectories if t.motion is TrajectoryKind.CUT]
+    moves = [tuple(m) for p in map(to_grid, cuts) for m in np.hstack([p[:-1], p[1:]]).tolist()]
+    assert len(moves) - len(set(moves)) < WINDOW and len(cuts) == 3
 
 
 @pytest.mark.parametrize("length", [3.0, 12.0, 24.0])
