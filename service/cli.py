@@ -115,7 +115,7 @@ def verify(part: Part, setup: SetupPath,
     """
 
     def run(given: Setup, progress: Progress, blank: Path | None) -> tuple[Any, int]:
-        from service.program_first import read_first
+        from service.verification.program_first import read_first
 
         started, text = time.monotonic(), read_program(program)
         first = read_first(given, text, access=access, spindle_tool=spindle_tool, dialect=known_dialect(dialect),

@@ -19,18 +19,18 @@ from service.delivery.machined_mesh import MESH_NAME, MeshWish, machined_part
 from service.delivery.result_files import Files, clear_results, deliver
 from service.from_wire import check_plannable
 from service.pictures.proof_picture import MAP_NAME
-from service.program_first import ProgramFirst, read_first
 from service.report import report as reporting
 from service.stages.access_settings import proof_setup
 from service.stages.cautions import sentences
 from service.stages.job_part import read_job_part
 from service.stages.plan_prove_loop import Planner, Progress, ProvedPlan, plan_and_prove
 from service.stages.preparation import Prepared, prepare
-from service.stages.program_proof import proved_program
 from service.stages.programs import proof_frame
 from service.stages.proof_samples import Score, score
 from service.stages.resume import Resumed
 from service.stages.trimmed_faces import trimmed_faces
+from service.verification.program_first import ProgramFirst, read_first
+from service.verification.program_proof import proved_program
 from service.viewer.view_data import verification_view
 from toolpath.passes.trimmed_faces import Faces
 from toolpath.planning.job_plan import plan_job
@@ -140,7 +140,7 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
     blank_path   : as in ``plan``
     dialect      : of the program; None: found by marks in its text, by ``ending`` of its file name, or by the dialects
                    of the machine (``verify.gcode.dialects.dialect_of``)
-    program      : the same program, already read by ``service.program_first.read_first``
+    program      : the same program, already read by ``service.verification.program_first.read_first``
 
     Returns
     -------

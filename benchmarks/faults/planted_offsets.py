@@ -33,9 +33,9 @@ from schemas.machine import DIALECT_ENDINGS  # noqa: E402
 from schemas.setup import Setup  # noqa: E402
 from service.from_wire import parse_setup  # noqa: E402
 from service.pipeline import plan  # noqa: E402
-from service.program_first import read_first  # noqa: E402
 from service.stages.job_part import ReadPart, read_job_part  # noqa: E402
-from service.stages.program_proof import ProgramProof, proved_program  # noqa: E402
+from service.verification.program_first import read_first  # noqa: E402
+from service.verification.program_proof import ProgramProof, proved_program  # noqa: E402
 from tests.step_files import write_step  # noqa: E402
 from verify.blank.blank import stock_on_normals  # noqa: E402
 from verify.surface.sample_scores import proved_samples  # noqa: E402

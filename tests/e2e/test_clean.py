@@ -12,10 +12,10 @@ from typer.testing import CliRunner
 from schemas.report import Verification
 from service.cli import app
 from service.from_wire import parse_setup
-from service.program_first import read_first
 from service.stages.job_inputs import JobInputs
 from service.stages.job_part import read_job_part
-from service.stages.program_proof import proved_program
+from service.verification.program_first import read_first
+from service.verification.program_proof import proved_program
 
 CASES = Path(__file__).resolve().parents[3] / "shared" / "cases"
 PLATE, NC = CASES / "parts" / "pocket_plate.step", CASES / "nc"

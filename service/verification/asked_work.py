@@ -11,7 +11,7 @@ from service.stages.access_plan import ProofFrame
 from service.stages.job_part import JobPart
 from service.stages.preparation import machinable_triangles, table_height
 from service.stages.proof_samples import proof_samples
-from service.stages.tool_touch import ToolTouch
+from service.verification.tool_touch import ToolTouch
 from verify.model import Asked
 from verify.program.move_kinds import FEED
 from verify.program.program import Program

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
-from service.program_first import ProgramFirst
 from service.report.verification_report import verification_report
 from service.stages.access_plan import ProofFrame, in_setup_frame
 from service.stages.access_settings import proof_setup
-from service.stages.asked_work import asked_work
 from service.stages.job_part import JobPart
 from service.stages.programs import program_frame
+from service.verification.asked_work import asked_work
+from service.verification.program_first import ProgramFirst
 from verify.model import Proof, ProofSetup, ScoredSamples
 from verify.prove import prove
 from zones.reach.access_view import turned_samples
