@@ -9,7 +9,8 @@ from tests import heidenhain_pairs, siemens_pairs
 from tests.golden_file import FOLDER
 from tests.mutated_programs import mutated
 from tests.program_pairs import HEIDENHAIN, NAMES, RADII, SIEMENS, kinematics
-from verify.gcode.dialects import heidenhain_flow, siemens_flow
+from verify.gcode.dialects.heidenhain import heidenhain_flow
+from verify.gcode.dialects.siemens import siemens_flow
 from verify.gcode.reader import read_program
 
 SPACE = {

@@ -24,10 +24,10 @@ import numpy as np
 from geometry.errors import ProgramError, VerificationError
 from verify.gcode.block_motion import BlockMotion
 from verify.gcode.block_words import Block, BlockError, parse_block, straight, used_letters
-from verify.gcode.control_flow import Flow, has_flow
 from verify.gcode.dialects import CONTROLS, DIALECTS, LINUXCNC, translated_blocks
+from verify.gcode.flow.control_flow import Flow, has_flow
+from verify.gcode.flow.system_parameters import served
 from verify.gcode.program_text import cleaned
-from verify.gcode.system_parameters import served
 from verify.kinematics import Kinematics
 from verify.program.move_kinds import FEED, RAPID
 from verify.program.move_log import MAX_ERRORS, Log
@@ -77,7 +77,7 @@ class Reader(BlockMotion):
                        dialect, log.unbounded, tuple(log.pauses), log.leaves)
 
     def served(self, key: int | str) -> float:
-        """A parameter that the control serves (``verify.gcode.system_parameters``)."""
+        """A parameter that the control serves (``verify.gcode.flow.system_parameters``)."""
         return served(self.s, key)
 
     def here(self) -> list[float]:

@@ -13,8 +13,8 @@ from verify.gcode.block_words import BlockError
 from verify.gcode.dialects.base import DialectReader, Machine
 from verify.gcode.dialects.fanuc import FanucReader
 from verify.gcode.dialects.haas import HaasReader
-from verify.gcode.dialects.heidenhain import HeidenhainReader, is_conversational
-from verify.gcode.dialects.siemens import SiemensReader, is_siemens
+from verify.gcode.dialects.heidenhain.heidenhain import HeidenhainReader, is_conversational
+from verify.gcode.dialects.siemens.siemens import SiemensReader, is_siemens
 from verify.program.move_log import MAX_ERRORS, Log
 
 LINUXCNC = "linuxcnc"

@@ -2,7 +2,7 @@
 
 Differences: further work offsets are G54.1 P, fast contouring is G05.1 Q, G04 and P of cycles count ms, Q without a
 decimal point counts thousandths, ';' ends a block. X10 without a decimal point is 10 mm or 0.010 mm, depending on a
-parameter. Subprograms and macros are followed by ``verify.gcode.macro_flow``.
+parameter. Subprograms and macros are followed by ``verify.gcode.flow.macro_flow``.
 
 Words that change speed, smoothing, coolant or devices of the machine move nothing and are left out: they are listed
 here, and an M word that is not known counts as one, with a note. A word that moves or cuts and is not followed is
@@ -17,7 +17,7 @@ from collections.abc import Iterator, Sequence
 from verify.gcode.block_words import FURTHER, bare
 from verify.gcode.dialects.base import NUMBER, BlockError, Machine, zero_word
 from verify.gcode.dialects.fanuc_planes import FanucPlanes
-from verify.gcode.macro_flow import MacroFlow, has_macros
+from verify.gcode.flow.macro_flow import MacroFlow, has_macros
 
 _PLAIN = re.compile(r"(?:N[0-9]+ ?)?(?:G0?[01] ?)?(?:[XYZABC][+-]?(?:[0-9]*\.[0-9]*|0) ?)*(?:F[0-9]+\.[0-9]* ?)?\r?")
 _WORD = re.compile(rf"([A-Z])({NUMBER})")
@@ -64,7 +64,7 @@ class FanucReader(FanucPlanes):
         self.hole = False
 
     def order(self, lines: Sequence[str], machine: Machine) -> Iterator[tuple[int, str]]:
-        """As in the base class; subprograms, macros, jumps and variables are followed (``verify.gcode.macro_flow``)."""
+        """As in the base class; ``verify.gcode.flow.macro_flow`` follows subprograms, macros, jumps and variables."""
         self.machine = machine
         if has_macros(lines):
             return MacroFlow(lines, machine, self.local_calls).lines_run()

@@ -12,8 +12,8 @@ from dataclasses import replace
 
 from verify.gcode.dialects.base import BlockError
 from verify.gcode.dialects.corners import chamfer, rounding
-from verify.gcode.dialects.heidenhain_q import VALUE
-from verify.gcode.dialects.heidenhain_words import Blocks, HeidenhainWords, Move, Way, Words
+from verify.gcode.dialects.heidenhain.heidenhain_q import VALUE
+from verify.gcode.dialects.heidenhain.heidenhain_words import Blocks, HeidenhainWords, Move, Way, Words
 from verify.gcode.dialects.stated_places import digits
 
 

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from verify.gcode.dialects.base import BlockError
-from verify.gcode.dialects.heidenhain_edges import HeidenhainEdges
-from verify.gcode.dialects.heidenhain_words import M_AFTER, M_BEFORE, M_REFUSED, M_WORDS, Blocks, Move, Words
+from verify.gcode.dialects.heidenhain.heidenhain_edges import HeidenhainEdges
+from verify.gcode.dialects.heidenhain.heidenhain_words import M_AFTER, M_BEFORE, M_REFUSED, M_WORDS, Blocks, Move, Words
 from verify.gcode.dialects.stated_places import digits
 from verify.gcode.dialects.tilted_planes import turn
 

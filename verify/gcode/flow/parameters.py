@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from verify.gcode.block_words import BlockError
-from verify.gcode.system_parameters import NAMES, is_served
+from verify.gcode.flow.system_parameters import NAMES, is_served
 
 LOCAL = 30
 LAST = 5000

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from verify.gcode.dialects.base import BlockError
 from verify.gcode.dialects.oriented_moves import STRAIGHT
-from verify.gcode.dialects.siemens_swivel import SiemensFrames
+from verify.gcode.dialects.siemens.siemens_swivel import SiemensFrames
 from verify.gcode.dialects.stated_places import digits
 from verify.program.arc_chords import PLANE_AXES
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from geometry.errors import VerificationError
 from verify.gcode.block_words import BlockError
 from verify.gcode.dialects.base import Machine
-from verify.gcode.dialects.siemens_expressions import Value, ValueReader, Variables
+from verify.gcode.dialects.siemens.siemens_expressions import Value, ValueReader, Variables
 
 MAX_JUMPS = 200_000
 MAX_CALLS = 16

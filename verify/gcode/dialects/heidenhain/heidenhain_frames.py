@@ -10,7 +10,7 @@ import numpy as np
 
 from geometry.mesh import F64
 from verify.gcode.dialects.base import BlockError
-from verify.gcode.dialects.heidenhain_q import VALUE
+from verify.gcode.dialects.heidenhain.heidenhain_q import VALUE
 from verify.gcode.dialects.orientation import angles_of, needed
 from verify.gcode.dialects.oriented_moves import OrientedMoves
 from verify.gcode.dialects.stated_places import digits

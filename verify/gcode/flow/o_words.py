@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from verify.gcode.block_words import BlockError
-from verify.gcode.parametric_lines import OWord, is_plain, read_o_word
+from verify.gcode.flow.parametric_lines import OWord, is_plain, read_o_word
 
 _OPENS = frozenset({"sub", "if", "while", "do", "repeat"})
 _CLOSES = {"endsub": "sub", "endif": "if", "endwhile": "while", "endrepeat": "repeat"}

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from verify.gcode.dialects.base import BlockError
-from verify.gcode.dialects.siemens_corners import SiemensCorners
-from verify.gcode.dialects.siemens_cycles import DrillingCall, drilling_blocks
-from verify.gcode.dialects.siemens_words import UNBOUNDED
+from verify.gcode.dialects.siemens.siemens_corners import SiemensCorners
+from verify.gcode.dialects.siemens.siemens_cycles import DrillingCall, drilling_blocks
+from verify.gcode.dialects.siemens.siemens_words import UNBOUNDED
 from verify.gcode.dialects.stated_places import digits
 from verify.program.arc_chords import PLANE_AXES
 

@@ -16,12 +16,12 @@ import re
 from collections.abc import Iterator, Sequence
 
 from verify.gcode.dialects.base import NUMBER, ZEROS, BlockError, Machine, zero_word
-from verify.gcode.dialects.siemens_cycles import DrillingCall, drilling_blocks, row_of_holes
-from verify.gcode.dialects.siemens_expressions import MAX_ELEMENTS, Value, ValueReader, Variables
-from verify.gcode.dialects.siemens_flow import LABEL, NUMBERED, PLAIN, SiemensFlow, statement
-from verify.gcode.dialects.siemens_moves import CURVES, Line, SiemensMoves
-from verify.gcode.dialects.siemens_swivel import is_number
-from verify.gcode.dialects.siemens_words import (
+from verify.gcode.dialects.siemens.siemens_cycles import DrillingCall, drilling_blocks, row_of_holes
+from verify.gcode.dialects.siemens.siemens_expressions import MAX_ELEMENTS, Value, ValueReader, Variables
+from verify.gcode.dialects.siemens.siemens_flow import LABEL, NUMBERED, PLAIN, SiemensFlow, statement
+from verify.gcode.dialects.siemens.siemens_moves import CURVES, Line, SiemensMoves
+from verify.gcode.dialects.siemens.siemens_swivel import is_number
+from verify.gcode.dialects.siemens.siemens_words import (
     COMPRESSORS,
     ENVELOPES,
     IDLE,

@@ -10,13 +10,12 @@ import pytest
 from geometry.errors import ProgramError, VerificationError
 from tests.program_pairs import NAMES, RADII, apart, read, same_feeds
 from tests.siemens_pairs import PAIRS
-from verify.gcode.dialects import dialect_of, siemens_flow
+from verify.gcode.dialects import dialect_of
+from verify.gcode.dialects.siemens import siemens_flow
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
 
-CASES = Path(__file__).parents[5] / "shared" / "cases"
-if not CASES.exists():
-    CASES = Path(__file__).parents[6] / "shared" / "cases"
+CASES = Path(__file__).resolve().parents[7] / "shared" / "cases"
 
 @pytest.mark.parametrize("name", [k for k, (_, plain) in PAIRS.items() if plain])
 def test_the_same_moves(name):

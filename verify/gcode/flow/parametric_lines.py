@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from verify.gcode.block_words import BlockError, bare
-from verify.gcode.expressions import ExpressionReader, ParameterReference, Value
-from verify.gcode.parameters import Parameters
+from verify.gcode.flow.expressions import ExpressionReader, ParameterReference, Value
+from verify.gcode.flow.parameters import Parameters
 
 _O_WORD = re.compile(r"(/?)(?:n[0-9]+\.?[0-9]*)?o(?:<([^<>]*)>|([0-9]+)(?![0-9])|(?=[\[#]))(?=.)")
 _KEYWORD = re.compile(r"endsub|endif|endwhile|endrepeat|elseif|else|sub|return|call|if|while|do|break|continue|repeat")

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from verify.gcode.dialects.base import BlockError, Machine
-from verify.gcode.dialects.heidenhain_q import NUM, VALUE
+from verify.gcode.dialects.heidenhain.heidenhain_q import NUM, VALUE
 from verify.gcode.dialects.holes import DrilledHole, even_pecks, hole_blocks
 from verify.gcode.dialects.stated_places import digits
 

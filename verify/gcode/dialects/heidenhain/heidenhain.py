@@ -15,7 +15,7 @@ import re
 from collections.abc import Iterator, Sequence
 
 from verify.gcode.dialects.base import NUMBER, BlockError, Machine, zero_word
-from verify.gcode.dialects.heidenhain_cycles import (
+from verify.gcode.dialects.heidenhain.heidenhain_cycles import (
     AT_ONCE,
     NOT_FOLLOWED,
     OLD,
@@ -25,10 +25,10 @@ from verify.gcode.dialects.heidenhain_cycles import (
     defined,
     old_cycle,
 )
-from verify.gcode.dialects.heidenhain_flow import HeidenhainFlow, block_text
-from verify.gcode.dialects.heidenhain_paths import HeidenhainPaths
-from verify.gcode.dialects.heidenhain_q import VALUE
-from verify.gcode.dialects.heidenhain_words import M_AFTER, M_BEFORE
+from verify.gcode.dialects.heidenhain.heidenhain_flow import HeidenhainFlow, block_text
+from verify.gcode.dialects.heidenhain.heidenhain_paths import HeidenhainPaths
+from verify.gcode.dialects.heidenhain.heidenhain_q import VALUE
+from verify.gcode.dialects.heidenhain.heidenhain_words import M_AFTER, M_BEFORE
 from verify.gcode.dialects.stated_places import digits
 
 _NUM = r"[+-]?(?:[0-9]{1,8}(?:\.[0-9]*)?|\.[0-9]+)"

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from geometry.errors import VerificationError
 from verify.gcode.dialects.base import BlockError, Machine
-from verify.gcode.dialects.heidenhain_q import QParameters
+from verify.gcode.dialects.heidenhain.heidenhain_q import QParameters
 
 MAX_JUMPS = 200_000
 MAX_CALLS = 19

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from verify.gcode.cutter_compensation import Approach, Corner, Style
 from verify.gcode.dialects.base import BlockError
 from verify.gcode.dialects.corners import Leg
-from verify.gcode.dialects.heidenhain_flow import HeidenhainFlow
-from verify.gcode.dialects.heidenhain_frames import HeidenhainFrames
-from verify.gcode.dialects.heidenhain_q import VALUE, QParameters
+from verify.gcode.dialects.heidenhain.heidenhain_flow import HeidenhainFlow
+from verify.gcode.dialects.heidenhain.heidenhain_frames import HeidenhainFrames
+from verify.gcode.dialects.heidenhain.heidenhain_q import VALUE, QParameters
 from verify.gcode.dialects.stated_places import digits
 
 HEIDENHAIN_STYLE = Style(Corner.ARC, Approach.NEXT_NORMAL)

@@ -16,10 +16,10 @@ from dataclasses import dataclass, field
 from geometry.errors import VerificationError
 from verify.gcode.block_words import NUMBER, BlockError, bare
 from verify.gcode.dialects.base import Machine
-from verify.gcode.expressions import ExpressionReader, Value
-from verify.gcode.macro_variables import ARGUMENTS, MACRO_GRAMMAR, MacroVariables
-from verify.gcode.parameters import CallFrame
-from verify.gcode.parametric_lines import digits
+from verify.gcode.flow.expressions import ExpressionReader, Value
+from verify.gcode.flow.macro_variables import ARGUMENTS, MACRO_GRAMMAR, MacroVariables
+from verify.gcode.flow.parameters import CallFrame
+from verify.gcode.flow.parametric_lines import digits
 
 MAX_CALLS = 10
 MAX_RUNS = 5_000_000

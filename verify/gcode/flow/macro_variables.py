@@ -13,8 +13,8 @@ import operator
 from collections.abc import Callable
 
 from verify.gcode.block_words import BlockError
-from verify.gcode.expressions import Grammar, divided, modulo, rounded, small_enough, within
-from verify.gcode.parameters import Parameters
+from verify.gcode.flow.expressions import Grammar, divided, modulo, rounded, small_enough, within
+from verify.gcode.flow.parameters import Parameters
 
 LOCALS = 33
 POSITIONS = {5001: 5420, 5002: 5421, 5003: 5422, 5041: 5420, 5042: 5421, 5043: 5422}

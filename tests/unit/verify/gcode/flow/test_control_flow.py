@@ -8,10 +8,10 @@ import pytest
 
 from geometry.errors import CamError, ProgramError, VerificationError
 from verify.checks.machine_limits import notes_on
-from verify.gcode import control_flow
-from verify.gcode.control_flow import has_flow
-from verify.gcode.o_words import find_structure
-from verify.gcode.parametric_lines import is_plain
+from verify.gcode.flow import control_flow
+from verify.gcode.flow.control_flow import has_flow
+from verify.gcode.flow.o_words import find_structure
+from verify.gcode.flow.parametric_lines import is_plain
 from verify.gcode.reader import FEED, RAPID, read_program
 from verify.model import ProofSetup
 

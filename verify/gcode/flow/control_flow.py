@@ -12,10 +12,10 @@ from typing import Protocol
 
 from geometry.errors import VerificationError
 from verify.gcode.block_words import BlockError, bare
-from verify.gcode.expressions import Value
-from verify.gcode.o_words import OWordStep, Structure, StructureError, find_structure
-from verify.gcode.parameters import LOCAL, CallFrame, Parameters
-from verify.gcode.parametric_lines import ParametricLine, read_line
+from verify.gcode.flow.expressions import Value
+from verify.gcode.flow.o_words import OWordStep, Structure, StructureError, find_structure
+from verify.gcode.flow.parameters import LOCAL, CallFrame, Parameters
+from verify.gcode.flow.parametric_lines import ParametricLine, read_line
 from verify.program.move_log import Log
 
 MAX_BLOCKS = 5_000_000

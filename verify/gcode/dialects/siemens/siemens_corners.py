@@ -13,7 +13,7 @@ import numpy as np
 
 from verify.gcode.dialects.base import BlockError
 from verify.gcode.dialects.corners import Leg, chamfer, rounding
-from verify.gcode.dialects.siemens_paths import SiemensPaths
+from verify.gcode.dialects.siemens.siemens_paths import SiemensPaths
 from verify.gcode.dialects.stated_places import digits
 from verify.program.arc_chords import PLANE_AXES, ArcError, centre_from_radius
 

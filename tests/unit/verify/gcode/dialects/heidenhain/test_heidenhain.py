@@ -10,13 +10,11 @@ import pytest
 from geometry.errors import ProgramError, VerificationError
 from tests.heidenhain_pairs import PAIRS
 from tests.program_pairs import NAMES, RADII, apart, read, same_feeds
-from verify.gcode.dialects import heidenhain_flow
+from verify.gcode.dialects.heidenhain import heidenhain_flow
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
 
-CASES = Path(__file__).parents[5] / "shared" / "cases"
-if not CASES.exists():
-    CASES = Path(__file__).parents[6] / "shared" / "cases"
+CASES = Path(__file__).resolve().parents[7] / "shared" / "cases"
 
 @pytest.mark.parametrize("name", [k for k, (_, plain) in PAIRS.items() if plain])
 def test_the_same_moves(name):

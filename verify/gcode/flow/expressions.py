@@ -2,7 +2,7 @@
 
 Precedence in LinuxCNC, from the highest: ** ; * / MOD ; + - ; EQ NE GT GE LT LE ; AND OR XOR. Operators of one level
 run from left to right, and a sign belongs to the value after it. Angles are degrees. EQ and NE treat numbers within
-1e-5 as equal. Another ``Grammar`` has other functions, operators and levels (``verify.gcode.macro_variables``).
+1e-5 as equal. Another ``Grammar`` has other functions, operators and levels (``verify.gcode.flow.macro_variables``).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from verify.gcode.block_words import NUMBER, BlockError
-from verify.gcode.parameters import Parameters
+from verify.gcode.flow.parameters import Parameters
 
 Value = Callable[[Parameters], float]
 
