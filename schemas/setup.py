@@ -27,8 +27,14 @@ Box = Annotated[list[Triple], Field(min_length=2, max_length=2, description="Low
 class PartChoice(WireModel):
     """The body of the STEP file to machine."""
 
-    solid: Annotated[Count | None, Field(ge=1, description="Number of the solid, from 1, where the file has several "
-                                                           "separate solids; null: the only one.")] = None
+    solid: Annotated[Count | None, Field(
+        ge=1, description="Number of the solid, from 1, where the file has several separate solids; null: the only "
+                          "one. Bodies of one product that overlap count as one solid. A product that an assembly "
+                          "places is read at its place.")] = None
+    fuse: Annotated[bool, Field(
+        description="true: the products of the file are one part, and bodies that overlap or share a face are "
+                    "united. false: products that an assembly places are separate solids, and so is a body that only "
+                    "touches another.")] = False
 
 
 class Placement(WireModel):

@@ -10,8 +10,11 @@ import pytest
 PARTS = Path(__file__).resolve().parents[2] / "shared" / "parts"
 
 
-def write_step(shape: Any, path: Path, unit: str = "MM") -> Path:
-    """Write a cadquery object or kernel shape; ``unit`` is the kernel's word (MM, CM, M, INCH)."""
+def write_step(shape: Any, path: Path, unit: str = "MM", *, assembly: bool = False) -> Path:
+    """Write a cadquery object or kernel shape; ``unit`` is the kernel's word (MM, CM, M, INCH).
+
+    assembly : a compound is written as an assembly with a product for each member, else as one product
+    """
     from OCP.Interface import Interface_Static
     from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
 
@@ -20,11 +23,13 @@ def write_step(shape: Any, path: Path, unit: str = "MM") -> Path:
     writer = STEPControl_Writer()
     Interface_Static.SetCVal_s("xstep.cascade.unit", "MM")
     Interface_Static.SetCVal_s("write.step.unit", unit)
+    Interface_Static.SetIVal_s("write.step.assembly", int(assembly))
     try:
         writer.Transfer(shape, STEPControl_AsIs)
         writer.Write(str(path))
     finally:
         Interface_Static.SetCVal_s("write.step.unit", "MM")
+        Interface_Static.SetIVal_s("write.step.assembly", 2)
     return path
 
 

@@ -70,14 +70,15 @@ class FaceSurface:
 
 
 def read_patches(path: str | os.PathLike[str], faces: Iterable[int] | None = None, *,
-                 placement: SetupFrame | None = None, solid: int | None = None, time_limit: float = 120.0,
-                 memory_limit: float = 6e9) -> dict[int, FaceSurface]:
+                 placement: SetupFrame | None = None, solid: int | None = None, fuse: bool = False,
+                 time_limit: float = 120.0, memory_limit: float = 6e9) -> dict[int, FaceSurface]:
     """Faces of one solid of a STEP file as NURBS surfaces.
 
     path         : STEP file
     faces        : 1-based numbers, as in ``read_part``; all when None
     placement    : Placement, the setup frame in STEP coordinates (mm); the file's own frame when None
     solid        : int, 1-based number of one of several separate solids
+    fuse         : bool, as in ``read_part``
     time_limit   : float, s of wall time
     memory_limit : float, bytes of resident memory
 
@@ -93,7 +94,7 @@ def read_patches(path: str | os.PathLike[str], faces: Iterable[int] | None = Non
         The errors of ``geometry.step_import.reader.read_part`` about the file, its solids and the limits;
         GeometryError (``no_such_face``).
     """
-    request = {"wanted": "patches", "path": os.path.abspath(path), "solid": solid,
+    request = {"wanted": "patches", "path": os.path.abspath(path), "solid": solid, "fuse": fuse,
                "faces": None if faces is None else [int(f) for f in faces],
                "placement": placement.as_dict() if placement else None}
     return patches_from_bytes(ask_reader(request, time_limit, memory_limit))

@@ -22,13 +22,14 @@ READER_MODULE = "geometry.step_import.reader_process"
 
 
 def read_part(path: str | os.PathLike[str], *, placement: SetupFrame | None = None, solid: int | None = None,
-              chord: float = 0.002, angle: float = 0.2, time_limit: float = 120.0,
+              fuse: bool = False, chord: float = 0.002, angle: float = 0.2, time_limit: float = 120.0,
               memory_limit: float = 6e9) -> Part:
     """Read one solid from a STEP file [ISO10303-21], heal it where that is safe, and mesh it.
 
     path         : STEP file in clear text; mm, cm, m, inch ... are converted to mm
     placement    : Placement, the setup frame in STEP coordinates (mm); the file's own frame when None
     solid        : int, 1-based number of one of several separate solids; None when there is one
+    fuse         : bool, the products of an assembly are one part: their bodies are united
     chord        : float, mm, requested limit of the distance between mesh and exact surface
     angle        : float, rad, requested limit of the turn of the normal between neighbouring mesh points
     time_limit   : float, s of wall time
@@ -37,14 +38,14 @@ def read_part(path: str | os.PathLike[str], *, placement: SetupFrame | None = No
     Returns Part in the setup frame; ``part.deviation`` is the distance measured against the exact surface.
     Raises StepError (``no_file``, ``empty_file``, ``not_step``, ``truncated_step``, ``dangling_reference``,
     ``bad_number``, ``file_too_large``, ``unreadable_step``, ``no_solid``), PartError (``open_shell``,
-    ``several_solids``, ``no_such_solid``, ``part_too_small``, ``part_too_large``), SetupError (``bad_placement``,
-    ``bad_tolerance``), GeometryError (``mesh_failed``, ``kernel_failed``). A part that exceeds the limits of the reader
+    ``several_solids``, ``no_such_solid``, ``part_too_small``, ``part_too_large``, ``mesh_failed``, ``kernel_failed``),
+    SetupError (``bad_placement``, ``bad_tolerance``). A part that exceeds the limits of the reader
     or crashes it is PartError (``reader_timeout``, ``reader_memory``, ``reader_crashed``), since a retry fails as well.
     A reader killed from outside is ResourceError (``reader_crashed``).
     """
     check_tolerances(chord, angle)
-    request: dict[str, Any] = {"path": os.path.abspath(path), "solid": solid, "chord": chord, "angle": angle,
-                               "placement": placement.as_dict() if placement else None}
+    request: dict[str, Any] = {"path": os.path.abspath(path), "solid": solid, "fuse": fuse, "chord": chord,
+                               "angle": angle, "placement": placement.as_dict() if placement else None}
     return Part.from_bytes(ask_reader(request, time_limit, memory_limit))
 
 

@@ -9,7 +9,7 @@ import json
 import sys
 
 from geometry.child_process import TYPED_ERROR, guard_child
-from geometry.errors import CamError, GeometryError, ResourceError
+from geometry.errors import CamError, PartError, ResourceError
 
 
 def main() -> int:
@@ -47,8 +47,8 @@ def _load(request: dict) -> bytes:
         # pybind registers the kernel's exceptions below Exception; others are bugs and appear as a crash
         if not type(problem).__module__.startswith("OCP"):
             raise
-        raise GeometryError(f"the CAD kernel failed: {type(problem).__name__}: {problem}", code="kernel_failed",
-                            remedy="export the part again, if possible from another program") from problem
+        raise PartError(f"the CAD kernel failed: {type(problem).__name__}: {problem}", code="kernel_failed",
+                        remedy="export the part again, if possible from another program") from problem
 
 
 if __name__ == "__main__":

@@ -29,6 +29,7 @@ _REFERENCE = re.compile(rb"#(\d+)")
 _FACE = re.compile(rb"=\s*(?:ADVANCED_FACE|FACE_SURFACE)\s*\(")
 _UNCERTAINTY = re.compile(rb"UNCERTAINTY_MEASURE_WITH_UNIT\s*\(\s*LENGTH_MEASURE\s*\(\s*([-+0-9.Ee]+)\s*\)")
 _PRODUCT = re.compile(rb"=\s*PRODUCT\s*\(\s*'([^']*)'\s*,\s*'([^']*)'")
+_PRODUCT_START = re.compile(rb"=\s*PRODUCT\s*\(")
 # NAN and INF as C printf writes them, 1.#QNAN as older Windows did; a STEP enumeration stands between dots.
 _NOT_FINITE = re.compile(rb"[(,]\s*([-+]?(?:nan|inf|infinity|1\.#(?:inf|ind|[qs]nan))(?:\([^()]*\))?)\s*(?=[,)])",
                          re.IGNORECASE)
@@ -49,6 +50,7 @@ class StepText:
     uncertainty : length uncertainty in units of the file, None when the file names none
     has_unit    : the text declares a length unit
     products    : names of products
+    product_count : statements that define a product
     """
 
     sha256: str
@@ -56,6 +58,7 @@ class StepText:
     uncertainty: float | None
     has_unit: bool
     products: tuple[str, ...]
+    product_count: int
 
 
 def check_text(path: str | Path, *, max_bytes: int = MAX_BYTES) -> StepText:
@@ -83,6 +86,7 @@ def check_text(path: str | Path, *, max_bytes: int = MAX_BYTES) -> StepText:
         uncertainty=max(uncertainty) if uncertainty else None,
         has_unit=b"LENGTH_UNIT" in bare,
         products=products,
+        product_count=len(_PRODUCT_START.findall(bare)),
     )
 
 

@@ -49,6 +49,7 @@ class JobInputs:
     sha256        : of the setup in canonical form
     labels        : texts of the user by key
     solid         : which solid of the STEP file, from 1; None for the only one
+    fuse          : whether the products of the STEP file are one part
     placement     : the setup frame in the coordinates of the STEP file
     accesses      : as in the setup, the first one is that of the decomposition
     tools, bodies : entries and shapes of the tools, in the same order
@@ -63,6 +64,7 @@ class JobInputs:
     sha256: str
     labels: Mapping[str, str]
     solid: int | None
+    fuse: bool
     placement: SetupFrame
     accesses: tuple[Access, ...]
     tools: tuple[Tool, ...]
@@ -83,11 +85,12 @@ class JobInputs:
     def of(cls, setup: Setup) -> JobInputs:
         """The inputs of a job from its setup."""
         c, bodies = setup.clearance_mm, tool_bodies(setup)
-        return cls(setup_sha256(setup), setup.labels, setup.part.solid, placement_of(setup), tuple(setup.access),
-                   tuple(setup.tools), bodies, _cut_table(setup, bodies), gauge_lengths(setup.tools, bodies),
-                   setup.machine, setup.stock, tuple(np.array(f.box_mm, dtype=np.float64) for f in setup.fixtures),
-                   Clearances(c.neck, c.shank, c.holder, c.rapid), setup.quality, setup.operations, setup.material,
-                   material_name(setup), rates_of(setup))
+        return cls(setup_sha256(setup), setup.labels, setup.part.solid, setup.part.fuse, placement_of(setup),
+                   tuple(setup.access), tuple(setup.tools), bodies, _cut_table(setup, bodies),
+                   gauge_lengths(setup.tools, bodies), setup.machine, setup.stock,
+                   tuple(np.array(f.box_mm, dtype=np.float64) for f in setup.fixtures),
+                   Clearances(c.neck, c.shank, c.holder, c.rapid), setup.quality, setup.operations,
+                   setup.material, material_name(setup), rates_of(setup))
 
     @property
     def turns(self) -> bool:

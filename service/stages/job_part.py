@@ -61,7 +61,8 @@ class ReadPart:
 
 def load(path: Path, setup: Setup) -> Part:
     """The part of a STEP file in the setup frame."""
-    return read_part(path, placement=placement_of(setup), solid=setup.part.solid, chord=mesh_chord(setup.quality))
+    return read_part(path, placement=placement_of(setup), solid=setup.part.solid, fuse=setup.part.fuse,
+                     chord=mesh_chord(setup.quality))
 
 
 def load_blank(path: Path, setup: Setup) -> Part:

@@ -37,7 +37,8 @@ def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
     numbers = sorted({f for z in wanted for f in z.faces} & curved | flat)
     if not numbers:
         return {}
-    exact = read_patches(path, numbers, placement=ready.inputs.placement, solid=ready.inputs.solid)
+    exact = read_patches(path, numbers, placement=ready.inputs.placement, solid=ready.inputs.solid,
+                         fuse=ready.inputs.fuse)
     pieces = trim_faces(ready.part, numbers, _whole, WIDE)[0]
     uv = np.array(ready.part.uv)
     for f, patch in exact.items():

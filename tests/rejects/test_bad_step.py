@@ -193,11 +193,6 @@ def test_two_separate_solids(tmp_path):
         assert refused(PartError, "no_such_solid", lambda k=wrong: load_part(path, solid=k)).limit == 2
 
 
-def test_solids_that_meet_in_an_edge_stay_separate(tmp_path):
-    two = cq.Compound.makeCompound([cq.Solid.makeBox(10, 10, 10), cq.Solid.makeBox(5, 5, 5, cq.Vector(10, 10, 0))])
-    refused(PartError, "several_solids", lambda: load_part(write_step(two, tmp_path / "two.step")))
-
-
 def test_part_of_a_tenth_of_a_millimetre(tmp_path):
     path = write_step(cq.Workplane().box(0.1, 0.1, 0.1), tmp_path / "dust.step")
     found = refused(PartError, "part_too_small", lambda: load_part(path))

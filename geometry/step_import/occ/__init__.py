@@ -2,7 +2,7 @@
 
 No other folder of the product imports OCP. ``loading`` calls the others in this order:
 
-- ``reading``: STEP file to a kernel shape in mm
+- ``reading``: STEP file to the kernel shapes of its products, in mm and in their places
 - ``healing``: one valid closed solid
 - ``meshing``: watertight triangles with face numbers, and their distance from the exact surface
 - ``curvature``: kind and curvature of each face

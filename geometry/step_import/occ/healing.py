@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from OCP.BRep import BRep_Tool
@@ -15,41 +16,93 @@ from OCP.ShapeFix import ShapeFix_Shape
 from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
 from OCP.TopoDS import TopoDS
 from OCP.TopTools import TopTools_ListOfShape
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from geometry.errors import PartError
 from geometry.step_import.occ.gaps import free_edge_gap, free_edges
+from geometry.step_import.occ.meetings import FUSE_TOLERANCE, Meeting, Share, box_groups, meetings, split_bodies
+from geometry.step_import.occ.products import Product
 from geometry.step_import.occ.topology import Shape, box_of, edges_of, faces_of, shells_of, solids_of, volume_of
 
 # Faces farther apart than this do not belong together. Sewing must stay below the size of machined features.
 SEWING_TOLERANCE = 0.01
-# Bodies nearer than this count as one; well above the kernel's 1e-7, well below any cutting tolerance.
-FUSE_TOLERANCE = 1e-4
 STRAY_VOLUME = 1e-5
 STRAY_WIDTH = 0.2
 # A clean-up after fusing that changes the volume by more than this share did more than merge faces.
 UNIFY_VOLUME = 1e-6
+# Bodies of different products with more faces than this are not searched for places where they touch.
+MAX_SEARCHED_FACES = 400
+SHOWN = 20  # lines of a list in an error
+TOUCH = {Share.POINT: "only touches {} at the point", Share.LINE: "only touches {} along an edge at",
+         Share.FACE: "only touches {} on a face at", Share.MATERIAL: "overlaps {} at"}
 
 
-def one_solid(shape: Shape, solid: int | None, warnings: list[str]) -> Shape:
-    """Reduce a shape to the one solid to machine.
+@dataclass(frozen=True)
+class Body:
+    """A solid of the file.
 
-    shape    : kernel shape, mm
+    shape    : kernel solid, mm
+    products : that it comes from; several where they were fused
+    """
+
+    shape: Shape
+    products: tuple[Product, ...]
+
+    @property
+    def name(self) -> str:
+        """Names of its products."""
+        return ", ".join(dict.fromkeys(p.name for p in self.products if p.name))
+
+    @property
+    def paths(self) -> set[tuple[int, ...]]:
+        """Paths of its products."""
+        return {p.path for p in self.products}
+
+
+def one_solid(products: Sequence[Product], solid: int | None, warnings: list[str], *, fuse: bool = False) -> Shape:
+    """Reduce the products of a file to the one solid to machine.
+
+    products : Product each
     solid    : 1-based number among the separate solids, None when there must be only one
     warnings : sentences are appended for every change made
+    fuse     : all products are one part: bodies that overlap or share a face are united, also those of two products
 
     Returns a closed kernel solid with its normals outward.
-    Raises PartError (``open_shell``, ``several_solids``, ``no_such_solid``).
+
+    Raises
+    ------
+    PartError
+        ``open_shell``, ``several_solids``, ``no_such_solid``.
+
+    Notes
+    -----
+    Bodies of one product that overlap are one solid. So are overlapping bodies of a product and of one that it places
+    beside its own, since some programs write groups of bodies like that. Without ``fuse``, bodies of other products
+    stay separate, and so does a body that only touches another one.
     """
-    solids = solids_of(shape)
-    if solids:
-        loose = len(faces_of(shape)) - sum(len(faces_of(s)) for s in solids)
-        if loose > 0:
-            warnings.append(f"{loose} loose faces outside the solids were left out")
-    else:
-        solids = [_sewn(shape, warnings)]
-    if len(solids) > 1:
-        solids = _fused(_without_strays(solids, warnings), warnings)
-    return _outward(_valid(_chosen(solids, solid), warnings), warnings)
+    bodies = _bodies(products, warnings)
+    met: list[Meeting] = []
+    if len(bodies) > 1:
+        bodies = _without_strays(bodies, warnings)
+    if len(bodies) > 1:
+        bodies, met = _united(bodies, solid, fuse, warnings)
+    return _outward(_valid(_chosen(bodies, solid, met, fuse), warnings), warnings)
+
+
+def _bodies(products: Sequence[Product], warnings: list[str]) -> list[Body]:
+    """The solids of all products; without any, one sewn from all faces."""
+    out, loose = [], 0
+    for product in products:
+        own = solids_of(product.shape)
+        loose += max(len(faces_of(product.shape)) - sum(len(faces_of(s)) for s in own), 0)
+        out += [Body(s, (product,)) for s in own]
+    if not out:
+        faces = [f for product in products for f in faces_of(product.shape)]
+        return [Body(_sewn(faces, warnings), tuple(products))]
+    if loose:
+        warnings.append(f"{loose} loose faces outside the solids were left out")
+    return out
 
 
 def swept_as_splines(solid: Shape) -> Shape:
@@ -69,8 +122,7 @@ def swept_as_splines(solid: Shape) -> Shape:
     return solids_of(out)[0]
 
 
-def _sewn(shape: Shape, warnings: list[str]) -> Shape:
-    faces = faces_of(shape)
+def _sewn(faces: list[Shape], warnings: list[str]) -> Shape:
     tolerance, sewn, free = 0.0, None, 0
     for tolerance in (SEWING_TOLERANCE / 100, SEWING_TOLERANCE / 10, SEWING_TOLERANCE):
         tool = BRepBuilderAPI_Sewing(tolerance)
@@ -95,12 +147,12 @@ def _sewn(shape: Shape, warnings: list[str]) -> Shape:
     return maker.Solid()
 
 
-def _without_strays(solids: list[Shape], warnings: list[str]) -> list[Shape]:
-    volumes = [abs(volume_of(s)) for s in solids]
+def _without_strays(bodies: list[Body], warnings: list[str]) -> list[Body]:
+    volumes = [abs(volume_of(b.shape)) for b in bodies]
     largest = max(volumes)
     kept = []
-    for number, (body, volume) in enumerate(zip(solids, volumes, strict=True), 1):
-        box = box_of(body)
+    for number, (body, volume) in enumerate(zip(bodies, volumes, strict=True), 1):
+        box = box_of(body.shape)
         size = box[1] - box[0]
         if volume < STRAY_VOLUME * largest and size.min() < STRAY_WIDTH:
             warnings.append(f"solid {number} of the file was dropped as a stray sliver: {_size(size)} mm, "
@@ -110,37 +162,63 @@ def _without_strays(solids: list[Shape], warnings: list[str]) -> list[Shape]:
     return kept
 
 
-def _fused(solids: list[Shape], warnings: list[str]) -> list[Shape]:
-    out = []
-    for group in _groups([box_of(s) for s in solids]):
-        bodies = [solids[i] for i in group]
-        out += bodies if len(bodies) == 1 else _fuse(bodies, warnings)
-    return out
+def _united(bodies: list[Body], solid: int | None, fuse: bool,
+            warnings: list[str]) -> tuple[list[Body], list[Meeting]]:
+    """Bodies after uniting those that are one solid, in order of their first member; how the others meet."""
+    met: list[Meeting] = []
+    splits: dict[int, Shape] = {}
+    for group in box_groups([box_of(b.shape) for b in bodies]):
+        some = any(_one_part(bodies[i], bodies[j]) for i in group for j in group if i < j)
+        few = solid is None and sum(len(faces_of(bodies[i].shape)) for i in group) <= MAX_SEARCHED_FACES
+        if len(group) > 1 and (fuse or some or few):
+            shapes = [bodies[i].shape for i in group]
+            split = split_bodies(shapes)
+            met += [Meeting(group[m.first], group[m.second], m.share, m.place) for m in meetings(shapes, split)]
+            splits |= dict.fromkeys(group, split)
+    pairs = [(m.first, m.second) for m in met if _belong(bodies[m.first], bodies[m.second], m.share, fuse)]
+    ends = np.array(pairs, np.int64).reshape(-1, 2)
+    graph = coo_matrix((np.ones(len(ends), np.int8), (ends[:, 0], ends[:, 1])), shape=(len(bodies),) * 2)
+    label = connected_components(graph, directed=False)[1]
+    out: list[Body] = []
+    place = np.full(len(bodies), -1, np.int64)
+    for k in dict.fromkeys(label.tolist()):
+        members = np.flatnonzero(label == k).tolist()
+        place[members] = len(out)
+        out += _joined([bodies[i] for i in members], splits.get(members[0]), warnings)
+    apart = {(int(place[m.first]), int(place[m.second])): m for m in reversed(met) if label[m.first] != label[m.second]}
+    return out, [Meeting(*pair, m.share, m.place) for pair, m in sorted(apart.items(), key=lambda item: item[0])]
 
 
-def _groups(boxes: Sequence[np.ndarray]) -> list[list[int]]:
-    """Indices of solids whose boxes overlap in groups, in order of their first member."""
-    left, groups = list(range(len(boxes))), []
-    while left:
-        group, todo = [left[0]], [left.pop(0)]
-        while todo:
-            here = boxes[todo.pop()]
-            near = [i for i in left if (boxes[i][0] <= here[1] + FUSE_TOLERANCE).all()
-                    and (here[0] <= boxes[i][1] + FUSE_TOLERANCE).all()]
-            left = [i for i in left if i not in near]
-            group += near
-            todo += near
-        groups.append(sorted(group))
-    return groups
+def _belong(one: Body, other: Body, share: Share, fuse: bool) -> bool:
+    """Whether two bodies are one solid."""
+    return share >= Share.FACE if fuse else share is Share.MATERIAL and _one_part(one, other)
 
 
-def _fuse(bodies: list[Shape], warnings: list[str]) -> list[Shape]:
-    """Union of bodies; bodies that share no volume and no face area stay separate."""
+def _one_part(one: Body, other: Body) -> bool:
+    """Whether the products of two bodies are one part, so that the bodies are united where they overlap."""
+    a, b = one.products[0], other.products[0]
+    return a.path == b.path or a.holds(b) or b.holds(a)
+
+
+def _joined(members: list[Body], split: Shape, warnings: list[str]) -> list[Body]:
+    """One body of several; split : of ``split_bodies``."""
+    if len(members) == 1:
+        return members
+    products = tuple({p.path: p for b in members for p in b.products}.values())
+    name = Body(members[0].shape, products).name
+    return [Body(s, products) for s in _fuse([b.shape for b in members], split, name, warnings)]
+
+
+def _fuse(bodies: list[Shape], split: Shape, name: str, warnings: list[str]) -> list[Shape]:
+    """Union of bodies that overlap or share a face.
+
+    split : of ``split_bodies``, of these and others; name : of their products, for messages
+    """
     first, rest = TopTools_ListOfShape(), TopTools_ListOfShape()
     first.Append(bodies[0])
     for body in bodies[1:]:
         rest.Append(body)
-    tool = BRepAlgoAPI_Fuse()
+    tool = BRepAlgoAPI_Fuse(split)
     tool.SetArguments(first)
     tool.SetTools(rest)
     tool.SetFuzzyValue(FUSE_TOLERANCE)
@@ -149,11 +227,11 @@ def _fuse(bodies: list[Shape], warnings: list[str]) -> list[Shape]:
     fused = solids_of(tool.Shape()) if tool.IsDone() else []
     total, kept = sum(abs(volume_of(b)) for b in bodies), sum(abs(volume_of(f)) for f in fused)
     if not fused or kept > total * (1 + 1e-6) or kept < max(abs(volume_of(b)) for b in bodies) * (1 - 1e-6):
-        raise PartError(f"{len(bodies)} solids touch or overlap and could not be fused into one",
+        raise PartError(f"{len(bodies)} solids{_of(name)} touch or overlap and could not be fused into one",
                         code="several_solids", measured=len(bodies), limit=1,
                         remedy="unite the bodies in the CAD system and export one solid")
     if len(fused) < len(bodies):
-        warnings.append(f"{len(bodies)} solids that touch or overlap were fused into {len(fused)}")
+        warnings.append(f"{len(bodies)} solids{_of(name)} that touch or overlap were fused into {len(fused)}")
         fused = [_unified(f) for f in fused]
     return fused
 
@@ -171,28 +249,47 @@ def _unified(solid: Shape) -> Shape:
     return merged[0]
 
 
-def _chosen(solids: list[Shape], solid: int | None) -> Shape:
+def _chosen(bodies: list[Body], solid: int | None, met: Sequence[Meeting], fuse: bool) -> Shape:
     if solid is not None:
-        if not 1 <= solid <= len(solids):
-            raise PartError(f"solid {solid} does not exist; the file holds {len(solids)} solids", code="no_such_solid",
-                            subjects=(f"solid {solid}",), measured=solid, limit=len(solids),
-                            remedy=f"name a solid from 1 to {len(solids)}:\n" + _listing(solids))
-        return solids[solid - 1]
-    if len(solids) > 1:
-        raise PartError(f"the file holds {len(solids)} separate solids; a job needs one:\n" + _listing(solids),
-                        code="several_solids", subjects=tuple(f"solid {i + 1}" for i in range(len(solids))),
-                        measured=len(solids), limit=1,
-                        remedy="name one with part.solid in the setup, or export it alone")
-    return solids[0]
+        if not 1 <= solid <= len(bodies):
+            raise PartError(f"solid {solid} does not exist; the file holds {len(bodies)} solids", code="no_such_solid",
+                            subjects=(f"solid {solid}",), measured=solid, limit=len(bodies),
+                            remedy=f"name a solid from 1 to {len(bodies)}:\n" + "\n".join(_listing(bodies)))
+        return bodies[solid - 1].shape
+    if len(bodies) > 1:
+        products = len({path for b in bodies for path in b.paths})
+        of = f" of {products} products" if products > 1 else _of(bodies[0].name)
+        more = "" if fuse else "set part.fuse: true if they are one part, "
+        raise PartError(f"the file holds {len(bodies)} separate solids{of}; a job needs one:\n"
+                        + "\n".join([*_listing(bodies), *_touching(met)]),
+                        code="several_solids", subjects=tuple(f"solid {i + 1}" for i in range(len(bodies))),
+                        measured=len(bodies), limit=1,
+                        remedy=f"name one with part.solid: N (1 to {len(bodies)}) in the setup, {more}or export it "
+                               "alone")
+    return bodies[0].shape
 
 
-def _listing(solids: list[Shape]) -> str:
+def _listing(bodies: Sequence[Body]) -> list[str]:
     lines = []
-    for number, body in enumerate(solids, 1):
-        box = box_of(body)
-        lines.append(f"solid {number}: {_size(box[1] - box[0])} mm at {_point(box.mean(axis=0))}, "
-                     f"{abs(volume_of(body)):.4g} mm³")
-    return "\n".join(lines[:20] + ([f"and {len(lines) - 20} more"] if len(lines) > 20 else []))
+    for number, body in enumerate(bodies[:SHOWN], 1):
+        box = box_of(body.shape)
+        lines.append(f"solid {number}{_of(body.name)}: {_size(box[1] - box[0])} mm at {_point(box.mean(axis=0))}, "
+                     f"{abs(volume_of(body.shape)):.4g} mm³")
+    return _cut_off(lines, len(bodies))
+
+
+def _touching(met: Sequence[Meeting]) -> list[str]:
+    lines = [f"solid {m.second + 1} {TOUCH[m.share].format(f'solid {m.first + 1}')} {_point(m.place)}" for m in met]
+    return _cut_off(lines[:SHOWN], len(lines))
+
+
+def _cut_off(lines: list[str], count: int) -> list[str]:
+    return [*lines, f"and {count - len(lines)} more"] if count > len(lines) else lines
+
+
+def _of(name: str) -> str:
+    """The product behind the number of a solid, in words."""
+    return f" ({name})" if name else ""
 
 
 def _valid(solid: Shape, warnings: list[str]) -> Shape:

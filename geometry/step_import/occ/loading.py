@@ -40,25 +40,25 @@ class LoadedSolid:
     warnings: list[str]
 
 
-def load_solid(path: str | Path, solid: int | None = None) -> LoadedSolid:
+def load_solid(path: str | Path, solid: int | None = None, fuse: bool = False) -> LoadedSolid:
     """Read a file and heal it into one solid; errors are those of ``geometry.step_import.reader.read_part``."""
     step = read_shape(path)
     warnings = list(step.warnings)
     _check_size(step.shape, step)
-    body = one_solid(step.shape, solid, warnings)
+    body = one_solid(step.products, solid, warnings, fuse=fuse)
     _check_size(body, step)
     surfaces = [surface_name(f) for f in faces_of(body)]
     return LoadedSolid(step, swept_as_splines(body), surfaces, warnings)
 
 
 def load_part(path: str | Path, *, placement: SetupFrame | None = None, solid: int | None = None,
-              chord: float = 0.002, angle: float = 0.2) -> Part:
+              fuse: bool = False, chord: float = 0.002, angle: float = 0.2) -> Part:
     """The work of ``geometry.step_import.reader.read_part`` in this process, with its arguments and errors.
 
     Nothing limits time or memory here.
     """
     check_tolerances(chord, angle)
-    loaded = load_solid(path, solid)
+    loaded = load_solid(path, solid, fuse)
     step, body, warnings = loaded.step, loaded.body, loaded.warnings
     mesh = mesh_solid(body, chord, angle)
     warnings += mesh.warnings

@@ -69,7 +69,7 @@ def mesh_solid(solid: Shape, chord: float, angle: float) -> SolidMesh:
     angle : float, rad
 
     Returns SolidMesh.
-    Raises GeometryError (``mesh_failed``) when faces stay without triangles.
+    Raises PartError (``mesh_failed``) when faces stay without triangles.
     Notes   Faces that deviate too far are refined one by one between the nodes of their edges. Where that does not
             suffice, and gaps between edges and faces are not the cause, the whole solid is meshed again with a smaller
             chord: at most twice, as long as it helps and the mesh stays below half a million triangles.

@@ -35,12 +35,12 @@ LOOKS = 15
 
 
 def load_patches(path: str | Path, *, placement: SetupFrame | None = None, solid: int | None = None,
-                 faces: Iterable[int] | None = None) -> bytes:
+                 fuse: bool = False, faces: Iterable[int] | None = None) -> bytes:
     """The work of ``geometry.step_import.face_surfaces.read_patches`` in this process, arguments and errors as there.
 
     Returns the bytes ``patches_from_bytes`` reads.
     """
-    shapes = faces_of(load_solid(path, solid).body)
+    shapes = faces_of(load_solid(path, solid, fuse).body)
     wanted = range(1, len(shapes) + 1) if faces is None else sorted(set(faces))
     for number in wanted:
         if not 1 <= number <= len(shapes):

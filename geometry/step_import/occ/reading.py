@@ -11,6 +11,7 @@ from OCP.STEPControl import STEPControl_Reader
 from OCP.TColStd import TColStd_SequenceOfAsciiString
 
 from geometry.errors import StepError
+from geometry.step_import.occ.products import Product, assembly_reader, placed_products
 from geometry.step_import.occ.topology import Shape, faces_of
 from geometry.step_import.text_checks import StepText, check_text
 
@@ -26,7 +27,8 @@ UNITS = {
 class StepShape:
     """A shape as the kernel read it.
 
-    shape    : kernel shape, mm
+    shape    : kernel shape of the whole file, mm
+    products : the uses of its products, at their places; one where the file has no assembly
     unit     : length unit of the file, a key word such as 'mm' or 'inch'
     factor   : mm in one unit of the file
     text     : facts read from the bytes
@@ -34,6 +36,7 @@ class StepShape:
     """
 
     shape: Shape
+    products: tuple[Product, ...]
     unit: str
     factor: float
     text: StepText
@@ -46,20 +49,27 @@ def read_shape(path: str | Path) -> StepShape:
     Raises StepError: the codes of ``check_text``, ``unreadable_step`` and ``no_solid``.
     """
     text = check_text(path)
-    reader = STEPControl_Reader()
+    placing = assembly_reader() if text.product_count > 1 else None
+    reader = placing.ChangeReader() if placing else STEPControl_Reader()
     Interface_Static.SetCVal_s("xstep.cascade.unit", "MM")
-    if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
+    if (placing or reader).ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
         raise StepError("the CAD kernel cannot parse the STEP file", code="unreadable_step",
                         remedy="export the part again, as AP214 or AP242")
     unit, factor, warnings = _unit(reader, text)
-    reader.TransferRoots()
+    products: list[Product] = []
+    if placing:
+        products = [p for p in placed_products(placing) if faces_of(p.shape)]
+    else:
+        reader.TransferRoots()
     shape = reader.OneShape() if reader.NbShapes() else None
     if shape is None or shape.IsNull() or not (faces := faces_of(shape)):
         raise StepError("the STEP file holds no solid and no surface", code="no_solid", measured=0, limit=1,
                         remedy="export the solid body, not a drawing, a sketch or an empty assembly")
     if len(faces) < text.faces:
         warnings.append(f"only {len(faces)} of the {text.faces} faces in the file could be read")
-    return StepShape(shape, unit, factor, text, tuple(warnings))
+    if not products:
+        products = [Product(text.products[0] if text.products else "", shape)]
+    return StepShape(shape, tuple(products), unit, factor, text, tuple(warnings))
 
 
 def _unit(reader: STEPControl_Reader, text: StepText) -> tuple[str, float, list[str]]:

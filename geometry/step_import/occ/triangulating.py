@@ -15,9 +15,11 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 
-from geometry.errors import GeometryError
+from geometry.errors import PartError
 from geometry.mesh import F64, I32
-from geometry.step_import.occ.topology import Shape, faces_of
+from geometry.step_import.occ.topology import Shape, faces_of, quick_box
+
+SHOWN = 10  # faces that an error lists
 
 
 @dataclass
@@ -42,22 +44,33 @@ def triangulate(solid: Shape, chord: float, angle: float) -> list[FaceMesh]:
     angle : float, rad
 
     Returns list of FaceMesh in the order of the faces.
-    Raises GeometryError (``mesh_failed``) when faces stay without triangles.
+    Raises PartError (``mesh_failed``) when faces stay without triangles; it names them, with their places.
     """
     _run(solid, _parameters(chord, angle))
-    out, bare = [], []
+    out, bare = [], {}
     for number, face in enumerate(faces_of(solid), 1):
         location = TopLoc_Location()
         triangulation = BRep_Tool.Triangulation_s(face, location)
         if triangulation is None or triangulation.NbTriangles() == 0:
-            bare.append(f"F{number}")
+            bare[f"F{number}"] = face
             continue
         out.append(_face_mesh(face, triangulation, location))
     if bare:
-        raise GeometryError(f"{len(bare)} faces could not be meshed: {', '.join(bare[:10])}", code="mesh_failed",
-                            subjects=tuple(bare), measured=len(bare), limit=0,
-                            remedy="rebuild these faces in the CAD system; they are probably degenerate")
+        raise _unmeshed(bare)
     return out
+
+
+def _unmeshed(bare: dict[str, Shape]) -> PartError:
+    """The error that names faces without triangles, by id, and shows where they lie."""
+    lines = []
+    for name, face in list(bare.items())[:SHOWN]:
+        low, high = quick_box(face)
+        at, size = (", ".join(f"{x:.4g}" for x in 0.5 * (low + high)), " x ".join(f"{x:.4g}" for x in high - low))
+        lines.append(f"{name} at ({at}), {size} mm")
+    more = f"\nand {len(bare) - SHOWN} more" if len(bare) > SHOWN else ""
+    return PartError(f"{len(bare)} faces of the part cannot be meshed (STEP coordinates):\n" + "\n".join(lines) + more,
+                     code="mesh_failed", subjects=tuple(bare), measured=len(bare), limit=0,
+                     remedy="rebuild these faces in the CAD system; they are probably degenerate")
 
 
 def triangulate_plainly(solid: Shape, chord: float, angle: float) -> list[FaceMesh | None]:

@@ -160,13 +160,6 @@ def test_overlapping_solids_become_one(tmp_path):
     assert any("fused" in w for w in part.warnings) and count_open_edges(part.mesh) == 0
 
 
-def test_solids_that_share_a_face_area_become_one(tmp_path):
-    two = cq.Compound.makeCompound([cq.Solid.makeBox(10, 10, 10), cq.Solid.makeBox(10, 10, 10, cq.Vector(10, 0, 0))])
-    part = load_part(write_step(two, tmp_path / "two.step"))
-    assert part.volume == pytest.approx(2000) and len(part.faces) == 6
-    assert kinds(part) == {"convex": 12}
-
-
 def test_stray_sliver_is_dropped_by_name(tmp_path):
     two = cq.Compound.makeCompound([cq.Solid.makeBox(50, 50, 50), cq.Solid.makeBox(0.1, 0.1, 0.1, cq.Vector(70, 0, 0))])
     part = load_part(write_step(two, tmp_path / "two.step"))
