@@ -3,7 +3,7 @@
 No other folder of the product imports OCP. ``loading`` calls the others in this order:
 
 - ``reading``: STEP file to the kernel shapes of its products, in mm and in their places
-- ``healing``: one valid closed solid
+- ``solid.healing``: one valid closed solid
 - ``meshing``: watertight triangles with face numbers, and their distance from the exact surface
 - ``curvature``: kind and curvature of each face
 - ``edges``: how faces meet

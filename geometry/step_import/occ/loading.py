@@ -11,10 +11,10 @@ from geometry.part import EdgeInfo, FaceInfo, Part
 from geometry.setup_frame import SetupFrame
 from geometry.step_import.occ.curvature import face_info, surface_name
 from geometry.step_import.occ.edges import edge_infos
-from geometry.step_import.occ.healing import one_solid, swept_as_splines
 from geometry.step_import.occ.meshing import SolidMesh, mesh_solid
 from geometry.step_import.occ.reading import StepShape, read_shape
 from geometry.step_import.occ.sizes import REFUSE_ABOVE, REFUSE_BELOW, check_size, doubts
+from geometry.step_import.occ.solid.healing import one_solid, swept_as_splines
 from geometry.step_import.occ.topology import Shape, box_of, exact_volume, faces_of, quick_box
 from geometry.step_import.reader import check_tolerances
 

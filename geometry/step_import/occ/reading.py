@@ -11,7 +11,7 @@ from OCP.STEPControl import STEPControl_Reader
 from OCP.TColStd import TColStd_SequenceOfAsciiString
 
 from geometry.errors import StepError
-from geometry.step_import.occ.products import Product, assembly_reader, placed_products
+from geometry.step_import.occ.solid.products import Product, assembly_reader, placed_products
 from geometry.step_import.occ.topology import Shape, faces_of
 from geometry.step_import.text_checks import StepText, check_text
 

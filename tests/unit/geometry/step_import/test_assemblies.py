@@ -138,8 +138,8 @@ def test_one_product_of_overlapping_bodies_is_one_part_and_a_touching_one_is_not
 
 def test_a_group_of_bodies_beside_those_of_its_product_is_no_part_of_its_own():
     """One product holds the other: its bodies and those it places are one part where they overlap."""
-    from geometry.step_import.occ.healing import one_solid
-    from geometry.step_import.occ.products import Product
+    from geometry.step_import.occ.solid.healing import one_solid
+    from geometry.step_import.occ.solid.products import Product
 
     hub, blade = box(20, 20, 10).wrapped, box(4, 2, 30, (8, 5, 5)).wrapped
     notes = []

@@ -20,9 +20,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from geometry.errors import PartError
-from geometry.step_import.occ.gaps import free_edge_gap, free_edges
-from geometry.step_import.occ.meetings import FUSE_TOLERANCE, Meeting, Share, box_groups, meetings, split_bodies
-from geometry.step_import.occ.products import Product
+from geometry.step_import.occ.solid.gaps import free_edge_gap, free_edges
+from geometry.step_import.occ.solid.meetings import FUSE_TOLERANCE, Meeting, Share, box_groups, meetings, split_bodies
+from geometry.step_import.occ.solid.products import Product
 from geometry.step_import.occ.topology import Shape, box_of, edges_of, faces_of, shells_of, solids_of, volume_of
 
 # Faces farther apart than this do not belong together. Sewing must stay below the size of machined features.
