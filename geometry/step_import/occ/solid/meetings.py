@@ -74,7 +74,10 @@ def box_groups(boxes: Sequence[F64]) -> list[list[int]]:
 
 
 def boxes_meet(one: F64, other: F64) -> bool:
-    """Whether two boxes, (2, 3) float64, mm, in one frame, overlap or come nearer than ``FUSE_TOLERANCE``."""
+    """Whether two boxes overlap or come nearer than ``FUSE_TOLERANCE``.
+
+    one, other : (2, 3) float64, mm, frame of the file, least and greatest corner
+    """
     return bool((one[0] <= other[1] + FUSE_TOLERANCE).all() and (other[0] <= one[1] + FUSE_TOLERANCE).all())
 
 

@@ -17,7 +17,7 @@ from collections.abc import Iterator, Sequence
 
 from verify.gcode.dialects.base import NUMBER, ZEROS, BlockError, Machine, zero_word
 from verify.gcode.dialects.siemens.siemens_cycles import DrillingCall, drilling_blocks, row_of_holes
-from verify.gcode.dialects.siemens.siemens_expressions import MAX_ELEMENTS, Value, ValueReader, Variables
+from verify.gcode.dialects.siemens.siemens_expressions import MAX_ELEMENTS, Value, ValueReader, Variables, arguments
 from verify.gcode.dialects.siemens.siemens_flow import LABEL, NUMBERED, PLAIN, SiemensFlow, statement
 from verify.gcode.dialects.siemens.siemens_moves import CURVES, Line, SiemensMoves
 from verify.gcode.dialects.siemens.siemens_swivel import is_number
@@ -216,7 +216,7 @@ class SiemensReader(SiemensMoves):
             behind = text[name.end():].lstrip()
             if behind.startswith("("):
                 reader.at = text.index("(", name.end()) + 1
-                return self._call(name[0], _arguments(reader), line)
+                return self._call(name[0], arguments(reader), line)
             if behind.startswith("=") and not behind.startswith("=="):
                 reader.at = text.index("=", name.end()) + 1
                 return self._value(name[0], reader, line)
@@ -576,29 +576,6 @@ class SiemensReader(SiemensMoves):
         if self.cycle is not None and self.moved and "G53" not in line.out:
             blocks += self._cycle_there(line)
         return blocks
-
-
-def _arguments(reader: ValueReader) -> list[str]:
-    """Text of the arguments up to the closing bracket; quotes and inner brackets are kept whole."""
-    text, depth, quoted, begun = reader.text, 0, False, reader.at
-    out: list[str] = []
-    for at in range(reader.at, len(text)):
-        c = text[at]
-        if c == '"':
-            quoted = not quoted
-        elif quoted:
-            continue
-        elif c in "([":
-            depth += 1
-        elif c == ")" and depth == 0:
-            reader.at = at + 1
-            return [*out, text[begun:at].strip()]
-        elif c in ")]":
-            depth -= 1
-        elif c == "," and depth == 0:
-            out.append(text[begun:at].strip())
-            begun = at + 1
-    raise BlockError(f"a bracket is not closed in '{text[:40]}'")
 
 
 __all__ = ["SMALL", "ZEROS", "SiemensReader", "is_siemens"]

@@ -309,4 +309,34 @@ _FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
     "MINVAL": (2, min), "MAXVAL": (2, max), "BOUND": (3, lambda low, high, v: min(max(v, low), high)),
 }
 
-__all__ = ["MAX_ELEMENTS", "Value", "ValueReader", "Variables"]
+
+def arguments(reader: ValueReader) -> list[str]:
+    """Text of the arguments up to the closing bracket; quotes and inner brackets are kept whole.
+
+    Raises
+    ------
+    BlockError
+        A bracket is not closed.
+    """
+    text, depth, quoted, begun = reader.text, 0, False, reader.at
+    out: list[str] = []
+    for at in range(reader.at, len(text)):
+        c = text[at]
+        if c == '"':
+            quoted = not quoted
+        elif quoted:
+            continue
+        elif c in "([":
+            depth += 1
+        elif c == ")" and depth == 0:
+            reader.at = at + 1
+            return [*out, text[begun:at].strip()]
+        elif c in ")]":
+            depth -= 1
+        elif c == "," and depth == 0:
+            out.append(text[begun:at].strip())
+            begun = at + 1
+    raise BlockError(f"a bracket is not closed in '{text[:40]}'")
+
+
+__all__ = ["MAX_ELEMENTS", "Value", "ValueReader", "Variables", "arguments"]
