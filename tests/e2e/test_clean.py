@@ -143,6 +143,8 @@ def test_a_program_that_takes_nothing_off_is_clean(verify):
 
 @pytest.mark.slow
 def test_harm_beside_work_undone_is_unproved(verify):
-    text = higher(right(), 1.0).replace("Z7\nX-4", "Z6.9\nX-4", 1).replace("G1 Z11 F500", "G1 Z9.5 F500", 1)
+    raised = higher(right(), 1.0)
+    text = raised.replace("X4 Z7.0000\n", "X4 Z7.0000\nX0 Z5.0000\nX4 Z7.0000\n", 1)  # the floor lies at 6
+    assert text != raised
     report = verify(text)
     assert report["state"] == "unproved" and {"stock_left"} < set(report["finding_counts"])
