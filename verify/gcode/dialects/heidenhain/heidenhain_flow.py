@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from geometry.errors import VerificationError
-from verify.gcode.dialects.base import BlockError, Machine
+from verify.gcode.dialects.base import BlockError, Machine, too_many_jumps
 from verify.gcode.dialects.heidenhain.heidenhain_q import QParameters
 
 MAX_JUMPS = 200_000
@@ -153,12 +152,7 @@ class HeidenhainFlow:
     def _jump(self, to: int) -> int:
         self._jumps += 1
         if self._jumps > MAX_JUMPS:
-            log = self.machine.log
-            raise VerificationError(f"{log.name}, line {log.line}: the program makes more than {MAX_JUMPS} jumps; a "
-                                    f"loop "
-                                    "may have no end", code="program_too_long", subjects=(f"line {log.line}",),
-                                    measured=MAX_JUMPS + 1, limit=MAX_JUMPS,
-                                    remedy="correct the condition of the jump, or split the program")
+            raise too_many_jumps(self.machine.log, MAX_JUMPS)
         return to
 
 

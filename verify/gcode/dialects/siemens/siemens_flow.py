@@ -10,9 +10,8 @@ import re
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from geometry.errors import VerificationError
 from verify.gcode.block_words import BlockError
-from verify.gcode.dialects.base import Machine
+from verify.gcode.dialects.base import Machine, too_many_jumps
 from verify.gcode.dialects.siemens.siemens_expressions import Value, ValueReader, Variables
 
 MAX_JUMPS = 200_000
@@ -228,12 +227,7 @@ class SiemensFlow:
     def _jump(self, to: int) -> int:
         self._jumps += 1
         if self._jumps > MAX_JUMPS:
-            log = self.machine.log
-            raise VerificationError(f"{log.name}, line {log.line}: the program makes more than {MAX_JUMPS} jumps; a "
-                                    f"loop "
-                                    "may have no end", code="program_too_long", subjects=(f"line {log.line}",),
-                                    measured=MAX_JUMPS + 1, limit=MAX_JUMPS,
-                                    remedy="correct the condition of the loop, or split the program")
+            raise too_many_jumps(self.machine.log, MAX_JUMPS)
         return to
 
     def _structure(self, word: str, reader: ValueReader, at: int) -> int:
