@@ -10,12 +10,13 @@ from typing import Any
 
 import pytest
 
+from tests.long_tests import pytest_itemcollected
 from tests.no_skip import pytest_make_collect_report, pytest_runtest_makereport
 from tests.shards import pytest_collection_modifyitems, pytest_runtest_setup
 from tests.skips import pytest_terminal_summary
 
-__all__ = ["pytest_collection_modifyitems", "pytest_make_collect_report", "pytest_runtest_makereport",
-           "pytest_runtest_setup", "pytest_terminal_summary"]  # hooks
+__all__ = ["pytest_collection_modifyitems", "pytest_itemcollected", "pytest_make_collect_report",
+           "pytest_runtest_makereport", "pytest_runtest_setup", "pytest_terminal_summary"]  # hooks
 
 HERE = Path(__file__).resolve()
 WRITTEN_PARTS = os.environ.get("ZONEMILL_PARTS")  # set where the environment has no cadquery (make test-runtime)

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from tests.long_tests import LIST, long_tests, pytest_itemcollected
 from tests.shards import pytest_collection_modifyitems, pytest_runtest_setup, shard_of, turned
 from tests.skips import remedies
 
@@ -45,3 +46,18 @@ def test_a_slow_test_that_would_begin_too_late_is_skipped_and_an_everyday_one_is
 def test_skips_for_want_of_programs_name_the_commands_once() -> None:
     reasons = ["rs274 is not installed", "needs Chromium", "no module opencamlib", "no rs274", "other"]
     assert remedies(reasons) == (4, ["apt-get install chromium", "apt-get install linuxcnc-uspace", "make peers"])
+
+
+def test_a_test_of_the_list_is_marked_slow_and_no_other() -> None:
+    marked: list[str] = []
+    for name in (min(long_tests()), "tests/unit/house/test_runs.py::test_x"):
+        pytest_itemcollected(SimpleNamespace(nodeid=name, add_marker=lambda mark: marked.append(mark.name)))  # type: ignore[arg-type]
+    assert marked == ["slow"]
+
+
+def test_the_list_of_long_tests_names_tests_that_are_there() -> None:
+    root = LIST.parents[1]
+    assert LIST.read_text(encoding="utf-8").splitlines() == sorted(long_tests())
+    for name in long_tests():
+        module, test = name.split("[")[0].split("::")
+        assert f"def {test}(" in (root / module).read_text(encoding="utf-8"), name
