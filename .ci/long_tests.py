@@ -3,7 +3,7 @@
     python -m pytest -q -m "not slow and not soak" -n 2 --junitxml build/tests.xml
     python .ci/long_tests.py build/tests.xml [--over 1.5]
 
-Tests that the run has no duration of keep their place in the list. Of a module whose tests are all long the quickest one
+Tests of which the run has no duration keep their place in the list. Where all tests of a module are long, the quickest
 stays in the everyday run. So do the tests in ``KEPT``.
 """
 

@@ -1,6 +1,6 @@
 """Everyday tests that take long: ``tests/long_tests.txt`` names them, and they are marked slow.
 
-What is left runs in ten minutes on two idle cores. ``.ci/long_tests.py`` writes the list from the durations of a run. In
+What is left runs in ten minutes on two idle cores. ``.ci/long_tests.py`` writes the list from durations of a run. In
 each module at least one test stays in the everyday run. The others run in ``make test-slow`` and in the shares of CI.
 """
 
