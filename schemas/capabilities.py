@@ -20,9 +20,9 @@ class Limits(ReportModel):
     """Limits of the service; null where there is none."""
 
     body_bytes: Annotated[int, Field(description="Largest request body, bytes.")]
-    job_time_s: Annotated[float, Field(description="Longest time of one attempt, s.")]
+    job_time_s: Annotated[float, Field(description="Time limit of one attempt, s.")]
     job_memory_bytes: int
-    attempts: Annotated[int, Field(description="How often a job starts at most when its process is lost.")]
+    attempts: Annotated[int, Field(description="Largest number of starts of a job whose process is lost.")]
     submissions: Annotated[str, Field(description="Largest number of submissions of one principal in a period.",
                                       examples=["120/minute"])]
     queued: Annotated[int, Field(description="Largest number of waiting jobs.")]
@@ -42,13 +42,13 @@ class Capabilities(ReportModel):
     kinds: Annotated[list[str], Field(description="Kinds of job.")]
     dialects: list[Dialect]
     stepnc: Annotated[list[str], Field(description="Forms of STEP-NC that the service writes and reads.")]
-    tools: Annotated[list[str], Field(description="Kinds of tool that it plans and verifies.")]
+    tools: Annotated[list[str], Field(description="Kinds of tool that the service plans and verifies.")]
     machines: Annotated[list[str], Field(description="Values of machine.kind.")]
     kinematics: Annotated[list[str], Field(description="Values of machine.kinematics.")]
     stock: Annotated[list[str], Field(description="Values of stock.kind.")]
     materials: Annotated[list[str], Field(description="Built-in materials.")]
     webhooks: Annotated[bool, Field(description="Whether a submission may contain webhook_url.")]
-    slots: Annotated[int, Field(description="Number of jobs that can run at once, at present.")]
-    principal: Annotated[str, Field(description="Name to which the API key belongs.")]
+    slots: Annotated[int, Field(description="Number of jobs that can run at the same time, at present.")]
+    principal: Annotated[str, Field(description="Principal of the API key: the owner of its jobs and library entries.")]
     scopes: Annotated[list[str], Field(description="Scopes of the API key.")]
     limits: Limits

@@ -32,8 +32,7 @@ class JobLinks(ReportModel):
 class JobSummary(ReportModel):
     """Figures of the report, enough for a release gate."""
 
-    complete: Annotated[bool | None, Field(description="True where the remainder is empty; "
-                                                       "null for a verification.")] = None
+    complete: Annotated[bool | None, Field(description="true: the remainder is empty. null for a verification.")] = None
     coverage: Annotated[float | None, Field(description="Proved area divided by machinable area.")] = None
     reach_coverage: Annotated[float | None, Field(
         description="Proved area divided by the machinable area that some tool of the setup reaches.")] = None
@@ -81,13 +80,14 @@ class Job(ReportModel):
                                                  "only: the program does no harm, but work is left undone.")]
     stage: Annotated[str, Field(description="Current stage, in words.", examples=["finishing"])]
     progress: Annotated[float, Field(
-        ge=0, le=1, description="Share done, 0 to 1. It never decreases during an attempt. A new attempt starts "
-                                "again from 0.")]
-    attempt: Annotated[int, Field(ge=0, description="Number of starts.")]
-    resumed: Annotated[JobResumed | None, Field(description="Results that the newest attempt took over from earlier "
-                                                            "ones; null where it took none.")] = None
-    content_sha256: Annotated[str, Field(description="Hash of part and canonical setup, and of blank and program where "
-                                                     "there are any.")]
+        ge=0, le=1, description="Share done, 0 to 1. It never decreases during an attempt. A new attempt starts from "
+                                "0.")]
+    attempt: Annotated[int, Field(ge=0, description="Number of starts of the job so far.")]
+    resumed: Annotated[JobResumed | None, Field(
+        description="Results that the newest attempt took over from earlier attempts; null: none.")] = None
+    content_sha256: Annotated[str, Field(
+        description="Hash of part and canonical setup. If there are a blank, a program and spindle_tool, it covers "
+                    "them too.")]
     part_sha256: Annotated[str, Field(description="Hash of the bytes of the part.")]
     setup_sha256: Annotated[str, Field(description="Hash of the canonical setup.")]
     stock_sha256: Annotated[str | None, Field(description="Hash of the bytes of the blank's file; null where there is "
@@ -101,12 +101,12 @@ class Job(ReportModel):
     finished_at: Annotated[str | None, Field(description="UTC, ISO 8601; null until the state is final.")] = None
     expired_at: Annotated[str | None, Field(description="Time when its files were deleted, UTC, ISO 8601; null while "
                                                         "they are kept.")] = None
-    summary: Annotated[JobSummary | None, Field(description="For plans and verifications in state "
-                                                            "proved, clean or unproved.")] = None
+    summary: Annotated[JobSummary | None, Field(
+        description="Figures of a plan or verification in state proved, clean or unproved; null otherwise.")] = None
     library: Annotated[list[JobLibraryEntry], Field(
-        description="Library entries that its setup used, as they were when it was posted.")] = []
+        description="Library entries that the setup used, in the versions at the time of the request.")] = []
     webhook: Annotated[JobWebhook | None, Field(description="null where the submission had no webhook_url.")] = None
-    error: Annotated[Problem | None, Field(description="Reason of the failure.")] = None
+    error: Annotated[Problem | None, Field(description="Why the job failed; null if it did not fail.")] = None
     links: JobLinks
 
 
@@ -132,8 +132,7 @@ class JobFiles(ReportModel):
     """The files of a job. Programs and STEP-NC are listed only when the job is proved."""
 
     items: list[JobFile]
-    withheld: Annotated[str | None, Field(description="Reason why programs are missing; null "
-                                                      "where none is missing.")] = None
+    withheld: Annotated[str | None, Field(description="Why programs are missing; null: none is missing.")] = None
 
 
 class JobEvent(ReportModel):
@@ -144,8 +143,8 @@ class JobEvent(ReportModel):
     stage: str
     progress: Annotated[float, Field(ge=0, le=1)]
     resumed: Annotated[JobResumed | SkipJsonSchema[None], Field(
-        description="As in the job; absent where an attempt took nothing over.",
-        json_schema_extra=lambda schema: schema.pop("default"))] = None
+        description="As in the job; absent if the attempt took nothing "
+                    "over.", json_schema_extra=lambda schema: schema.pop("default"))] = None
 
 
 class LibraryEntry(ReportModel):
@@ -174,8 +173,9 @@ class MaterialEntry(LibraryEntry):
     """A material of the library, or a built-in one."""
 
     entry: Material
-    built_in: Annotated[bool, Field(description="A setup refers to a built-in material by its name alone. Built-in "
-                                                "materials cannot be changed.")] = False
+    built_in: Annotated[bool, Field(
+        description="true: a built-in material. A setup refers to it by its name alone, and it cannot be "
+                    "changed.")] = False
 
 
 class ToolList(ReportModel):

@@ -14,12 +14,13 @@ KeyScope = Literal["submit", "read", "admin", "metrics"]
 class NewKey(WireModel):
     """Request for a new key."""
 
-    principal: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._@-]{0,63}$", examples=["mes"],
-                                    description="Name of the owner. Jobs and library entries belong to this name.")]
+    principal: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._@-]{0,63}$",
+        description="Principal: the owner of the key. Jobs and library entries belong to the "
+                    "principal.", examples=["mes"])]
     scopes: Annotated[list[KeyScope], Field(
-        min_length=1, max_length=4, description="submit: post and cancel jobs, write library entries; read: read jobs, "
-                                                "files and libraries; admin: manage keys and shared library entries; "
-                                                "metrics: read /metrics only.")] = ["submit", "read"]
+        min_length=1, max_length=4, description="submit: post and cancel jobs, write library entries. read: read jobs, "
+                                                "files and libraries. admin: manage keys and shared library entries, "
+                                                "read /metrics. metrics: read /metrics only.")] = ["submit", "read"]
     days: Annotated[Number | None, Field(gt=0, le=36500, description="Days until the key "
                                                                      "expires; null: never.")] = 365.0
     note: Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$", description="Purpose of the key.")] = ""
@@ -40,7 +41,7 @@ class Key(ReportModel):
 
 
 class MadeKey(ReportModel):
-    """A new key with its text, which is shown only once."""
+    """A new key with its secret text. No later answer shows this text."""
 
     key: Annotated[str, Field(description="The key. Send it in the header Authorization: Bearer KEY.")]
     about: Key

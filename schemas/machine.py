@@ -22,8 +22,9 @@ class Machine(WireModel):
         "kind": "3-axis", "dialects": ["linuxcnc"], "max_rpm": 18000, "rapid_mm_min": 10000}]}}
 
     kind: Annotated[Literal["3-axis", "5-axis"], Field(
-        description="5-axis: one program with fixed tool axes (3+2). With machine.simultaneous the axes also move "
-                    "during the cut, for example to finish walls with the flank of a tool.")] = "3-axis"
+        description="3-axis: one program for each access. 5-axis: one program for all tool axes, which are fixed "
+                    "during each cut (3+2). With machine.simultaneous they also move during some finishing cuts, such "
+                    "as flank milling.")] = "3-axis"
     kinematics: Annotated[Literal["table-table-AC", "table-table-BC", "head-table-BC", "head-head-BC",
                                   "head-head-AC"] | None, Field(
         description="Rotary axes: whether each turns the table or the head, and its letter; the tilting axis comes "
@@ -31,23 +32,23 @@ class Machine(WireModel):
                     "and then Rx(A) or Ry(B), as LinuxCNC's xyzac-trt does. A head turns the tool by Rx(A) or Ry(B) "
                     "and then Rz(C).")] = None
     iso_axes: Annotated[list[Literal["A", "B", "C"]], Field(
-        max_length=2,
-        description="Table axes that follow ISO 841: a positive angle turns the tool right-handed as seen from the "
-                    "table, so the table turns the other way. All other axes turn the table right-handed, as "
-                    "LinuxCNC's do. This holds for planned programs, verified programs and rotary_deg.")] = []
-    tcp: Annotated[bool, Field(description="true: the control keeps the tool tip during rotary moves. false: programs "
-                                           "contain positions of the linear joints, and pivots_mm is required. No "
-                                           "effect on a 3-axis machine. No effect on a verified program, whose own "
-                                           "words decide: M428, G43.4, G234, TRAORI or M128.")] = True
+        max_length=2, description="Letters of the table axes that follow ISO 841: at a positive angle the tool turns "
+                                  "right-handed as seen from the table, so the table itself turns left-handed. Any "
+                                  "other table axis turns the table right-handed, as in LinuxCNC. This holds for "
+                                  "planned programs, verified programs and rotary_deg.")] = []
+    tcp: Annotated[bool, Field(
+        description="true: the control keeps the tool tip during rotary moves. false: programs contain positions of "
+                    "the linear joints, and pivots_mm is required. No effect on a 3-axis machine. Verified programs "
+                    "ignore it: their own words decide (M428, G43.4, G234, TRAORI or M128).")] = True
     dialects: Annotated[list[str], Field(
         min_length=1, max_length=8,
         description=f"Controls that need a program: {', '.join(DIALECT_ENDINGS)}. Each gets its own program. The first "
                     f"is simulated; the others are read back and compared with it move for move.")] = ["linuxcnc"]
     restart_points: Annotated[bool, Field(
-        description="true: the program can be started at every step. Each step has a label and then states tool, "
+        description="true: the program can be started at every workingstep. Each begins with a label and states tool, "
                     "length, zero, speed, coolant and tool centre point control, as after a tool change. On a 5-axis "
-                    "machine the axes return to 0 between steps. false: no labels; only steps after a tool change "
-                    "state these.")] = True
+                    "machine the rotary axes return to 0 between workingsteps. false: there are no labels, and only "
+                    "workingsteps after a tool change state these.")] = True
     max_program_kb: Annotated[Number | None, Field(
         ge=1, le=1e6, description="Largest program that the control accepts, in 1000 bytes. A larger program is split, "
                                   "at tool changes where possible, into programs that run in order: "
@@ -58,33 +59,34 @@ class Machine(WireModel):
                     "coolant is off (M9). The default cutting data assume flood coolant, so give a dry machine its own "
                     "cutting data.")] = "flood"
     high_speed: Annotated[bool, Field(
-        description="Use fast contouring where a control has it as an option: G05.1 "
-                    "Q1 on fanuc, CYCLE832 on siemens.")] = False
+        description="true: programs use an option of the control for fast contouring: G05.1 Q1 on fanuc, CYCLE832 on "
+                    "siemens.")] = False
     haas_tcp: Annotated[Literal["G234", "G43.4"], Field(
-        description="Word of tool centre point control on haas.")] = "G234"
+        description="Word that turns on tool centre point control on haas.")] = "G234"
     heidenhain_plane: Annotated[bool, Field(
-        description="On heidenhain, steps with a fixed tool axis are in a tilted plane (PLANE SPATIAL, STAY) instead "
-                    "of the setup frame. M128 keeps the tip in both cases.")] = False
+        description="true: on heidenhain, workingsteps with a fixed tool axis are in a tilted plane (PLANE SPATIAL, "
+                    "STAY). false: they are in the setup frame. M128 keeps the tip in both cases.")] = False
     siemens_cycle800: Annotated[str | None, Field(
         max_length=32, pattern=r"^[A-Za-z0-9_]*$",
         description="On siemens, steps with a fixed tool axis are in a plane of CYCLE800 (direction 0: no axis moves) "
                     "instead of the setup frame. TRAORI keeps the tip in both cases. The value is the name of the "
                     "swivel data record, empty where the machine has only one. null: no such planes.")] = None
     arcs: Annotated[bool, Field(
-        description="Write cuts as arcs and helices in the XY plane, and as longer lines. They stay within half of "
-                    "quality.chordal_tolerance_mm of the planned path; the plan uses the other half. Steps with a "
-                    "moving tool axis keep straight moves.")] = False
+        description="true: programs contain arcs and helices in the XY plane, and longer straight moves. They stay "
+                    "within half of quality.chordal_tolerance_mm of the planned path; the plan uses the other half. "
+                    "Only workingsteps whose tool axis is Z of the program get arcs, and a moving tool axis gets "
+                    "neither.")] = False
     travel_mm: Annotated[Triple | None, Field(
-        description="Largest extent of the moves of a program in X, Y and Z, mm. In Z it is the extent of the spindle "
-                    "face, so gauge lengths count. Only the extent is checked, not where it lies on the machine. "
-                    "null: no limit.")] = None
+        description="Travel of the machine in X, Y and Z, mm: the largest extent of the moves of a program. In Z it is "
+                    "the extent of the spindle face, so gauge lengths count. The place of the moves within the travel "
+                    "is not checked. null: no limit.")] = None
     rotary_deg: Annotated[list[AngleRange] | None, Field(
         min_length=2, max_length=2, description="Smallest and largest angle of each rotary axis, deg, the tilting axis "
                                                 "first. null: no limit. Leave it null on a 3-axis machine.")] = None
     table_z_mm: Annotated[BoundedNumber | None, Field(
         description="Height of the table, or of the fixture under the part, mm, in the setup frame with the rotary "
-                    "axes at 0. Tools stay clearance_mm.rapid above it. Add a spindle nose that is wider than the "
-                    "holder as the last segment of tools[].holder. null: tilted tools stay above the bottom of the "
+                    "axes at 0. Tools stay clearance_mm.rapid above it. If the spindle nose is wider than the holder, "
+                    "add it as the last segment of tools[].holder. null: tilted tools stay above the bottom of the "
                     "blank. Leave it null on a 3-axis machine.")] = None
     orientations: Annotated[Literal["find", "given"], Field(
         description="find: a 5-axis machine also uses other tool axes for areas that the accesses of the setup do not "
@@ -93,9 +95,9 @@ class Machine(WireModel):
         description="true: the rotary axes move while the tool cuts. false: they turn between cuts only (3+2). No "
                     "effect on a 3-axis machine, nor on a verified program.")] = True
     rotary_rate_deg_min: Annotated[Number | None, Field(
-        ge=1, le=1e7, description="Highest rotary speed, deg/min: a limit on feed moves, and the speed with which "
-                                  "rapids are timed. null: no limit, and rapids are timed with 7200. Leave it null on "
-                                  "a 3-axis machine.")] = None
+        ge=1, le=1e7, description="Highest rotary speed, deg/min. It limits feed moves, and times of rapids are "
+                                  "computed with it. null: no limit; rapids are timed with 7200. Leave it null on a "
+                                  "3-axis machine.")] = None
     pivots_mm: Annotated[list[Triple] | None, Field(
         min_length=1, max_length=2,
         description="Pivots of the rotary axes, mm, in the frame of the program with both axes at 0. table-table: a "
@@ -104,11 +106,11 @@ class Machine(WireModel):
                     "null: the travel of the linear axes is not checked, and programs that turn the axes away from 0 "
                     "without tool centre point control are refused. Leave it null on a 3-axis machine.")] = None
     max_rpm: Annotated[Number | None, Field(
-        ge=1, le=1e6, description="Highest spindle speed, 1/min. null: plans stay at or below 18000; verified programs "
-                                  "have only the limits of their tools.")] = None
+        ge=1, le=1e6, description="Highest spindle speed, 1/min. null: at most 18000 in plans; in verified programs "
+                                  "only the limits of the tools apply.")] = None
     max_feed_mm_min: Annotated[Number | None, Field(
-        ge=0.1, le=1e6, description="Highest feed, mm/min. null: plans stay at or below 5000; verified programs have "
-                                    "no limit.")] = None
+        ge=0.1, le=1e6, description="Highest feed, mm/min. null: at most 5000 in plans, no limit in verified "
+                                    "programs.")] = None
     rapid_mm_min: Annotated[Number | None, Field(
         ge=1, le=1e6, description="Rapid rate, mm/min, for machining times; null: 10000.")] = None
     acceleration_mm_s2: Annotated[Number | None, Field(
@@ -118,9 +120,10 @@ class Machine(WireModel):
                     "speed, so the path is not straight. A rapid of several axes is then a finding unless it stays "
                     "clearance_mm.rapid above part, stock and fixtures.")] = "linear"
     ap238: Annotated[Literal["cc1", "cc2", "integrated_cnc"], Field(
-        description="Conformance class of job.stpnc. cc1: class 1, tool paths. cc2: class 2, which adds part and "
-                    "blank as shapes, strategies and setup instructions. integrated_cnc: as cc1, under the schema name "
-                    "of the first edition, INTEGRATED_CNC_SCHEMA, for readers that know only that one.")] = "cc1"
+        description="Form of job.stpnc. cc1: conformance class 1 of AP238, tool paths. cc2: class 2, which adds the "
+                    "shapes of part and blank, strategies and setup instructions. integrated_cnc: like cc1, with the "
+                    "schema name of the first edition, INTEGRATED_CNC_SCHEMA, for readers that know only this "
+                    "name.")] = "cc1"
 
     @model_validator(mode="after")
     def _check(self) -> Machine:

@@ -35,8 +35,8 @@ class Material(WireModel):
     cutting_speed_m_min: Annotated[Number, Field(
         ge=0.1, le=5000, description="Cutting speed at the full diameter, m/min.")]
     feed_per_tooth: Annotated[list[FeedPoint], Field(
-        min_length=1, description="Feed per tooth by diameter, ascending. Beyond the ends "
-                                  "it scales with the diameter.")]
+        min_length=1, description="Feeds per tooth, by ascending cutter diameter. Below the first and above the last "
+                                  "diameter the feed is proportional to the diameter.")]
     specific_cutting_force_n_mm2: Annotated[Number | None, Field(
         ge=1, le=100000, description="kc1.1: cutting force of a chip of 1 mm by 1 mm, N/mm2. The deflection of tools "
                                      "is estimated from it; null: no estimate.")] = None
@@ -44,7 +44,7 @@ class Material(WireModel):
         ge=0, le=0.9, description="mc: the specific cutting force of a chip h mm thick is kc1.1 / h^mc. Give both or "
                                   "none.")
     ] = None
-    source: Annotated[str, Field(max_length=200, description="Source of the figures.")] = "user"
+    source: Annotated[str, Field(max_length=200, description="Where the figures come from.")] = "user"
 
     @model_validator(mode="after")
     def _both_or_none(self) -> Material:

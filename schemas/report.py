@@ -12,13 +12,12 @@ from schemas.zones import Remainder, Share, ZoneFacts, Zones
 Findings = Annotated[list[Any], Field(
     description="Findings of the proof, then those of the whole job; empty in state proved. kind: collision, gouge, "
                 "rapid, plunge, rubbing, engagement, support, limit, program, residual or stock_left; of the whole "
-                "job: nothing_cut or coverage. stock_left: only in a verification; it has height (mm, the same as "
-                "depth) and lines (those that left the stock) as well. message: the finding in one sentence. program, "
-                "line: place in the programs; "
-                "line 0: no line causes it. zone, face: ids, or null. point: worst place, mm, setup frame, or null. "
-                "tip: the tool tip there, or null. depth, limit: measured and allowed value, in the unit of message. "
-                "near: true where nothing touches; depth is then the distance. count, area: number and area, mm2, of "
-                "the merged places.")]
+                "job: nothing_cut or coverage. message: the finding in one sentence. program, line: place in the "
+                "programs; line 0: no line causes it. zone, face: ids, or null. point: worst place, mm, setup frame, "
+                "or null. tip: the tool tip there, or null. depth, limit: measured and allowed value, in the unit of "
+                "message. near: true: nothing touches, and depth is the distance. count, area: number and area, mm2, "
+                "of the merged places. A stock_left, only in a verification, also has height (mm, the same as depth) "
+                "and lines (those that left the stock).")]
 
 
 class Inputs(ReportModel):
@@ -45,18 +44,21 @@ class PlannedZone(ZoneFacts):
         description="Number of cutting passes of the finish; a pass ends where a link begins.")] = None
     cutting_length_mm: Annotated[float | None, Field(description="Cutting length of all its workingsteps, mm.")] = None
     machining_time_s: Annotated[float | None, Field(description="Machining time of all its workingsteps, s.")] = None
-    step: Annotated[str | None, Field(description="First entry of steps; null where there is none.")] = None
+    step: Annotated[str | None, Field(description="The first entry of steps; null: none.")] = None
     steps: Annotated[list[str], Field(
-        description="Its finishing workingsteps in machining order. Empty where none could be planned. A zone has a "
-                    "second step where stock of another zone blocked the first. Thin walls that are finished in "
-                    "alternating bands of depth have one step for each band.")] = []
-    scallop_mm: ScallopFacts | None = None
-    gouge_mm: float | None = None
-    coverage: Share | None = None
+        description="Ids of its finishing workingsteps in machining order. Empty if none could be planned. A zone has "
+                    "a second workingstep if stock of another zone blocked the first. Thin walls that are finished in "
+                    "alternating bands of depth have one workingstep for each band.")] = []
+    scallop_mm: Annotated[ScallopFacts | None, Field(
+        description="Stock left over the allowance, at the samples of the zone.")] = None
+    gouge_mm: Annotated[float | None, Field(
+        description="Deepest cut into the part at a sample of the zone, mm.")] = None
+    coverage: Annotated[Share | None, Field(
+        description="Area within tolerance divided by the area of the zone.")] = None
 
 
 class Engaged(ReportModel):
-    """Engagement of the front half of a cutter in stock, deg.
+    """Engaged angle: how much of the front half of the cutter is in stock, deg.
 
     max: largest value. p99: value that 99 % of the path in stock does not exceed.
     """
@@ -73,12 +75,14 @@ class ToolUse(ReportModel):
                                                               "stock, as simulated.")] = None
     metres_in_cut: Annotated[float | None, Field(description="Metres of its cutting passes, as planned.")] = None
     life_min: float | None = None
-    cutters: Annotated[int | None, Field(description="Number of cutters that the program requests.")] = None
-    slenderness: Annotated[float | None, Field(description="Neck length over neck diameter; without a neck, stickout "
-                                                           "over diameter.")] = None
+    cutters: Annotated[int | None, Field(
+        description="Number of cutters that the plan uses: one, and one more for each stop for a fresh cutter. 0: the "
+                    "tool has no workingstep.")] = None
+    slenderness: Annotated[float | None, Field(
+        description="Neck length over neck diameter; without a neck, stickout over diameter.")] = None
     deflection_mm: Annotated[float | None, Field(
-        description="Largest estimated deflection of the tip in any step of this tool, mm. null: no force is given for "
-                    "the material, or the tool has no step.")] = None
+        description="Largest estimated deflection of the tip in any workingstep of this tool, mm. null: the material "
+                    "has no cutting force, or the tool has no workingstep.")] = None
     engagement_deg: Engaged | None = None
 
 
@@ -106,12 +110,14 @@ class MachinedPart(ReportModel):
     """machined.stl: the stock after all programs, in the coordinates of the program."""
 
     file: str
-    access: Annotated[str, Field(description="The mesh is in the coordinates of this access (the first, where there "
-                                             "are several). On a 5-axis machine it is in the setup frame.")]
+    access: Annotated[str, Field(
+        description="Access in whose coordinates the mesh is: the first of several. On a 5-axis machine the mesh is in "
+                    "the setup frame.")]
     volume_mm3: Annotated[float, Field(description="Volume of the remaining stock, mm3, inside the window where one "
                                                    "was requested.")]
-    step_mm: Annotated[float, Field(description="Distance between mesh nodes, mm. It is wider than requested where "
-                                                "that would need more than 24 million nodes.")]
+    step_mm: Annotated[float, Field(
+        description="Distance between mesh nodes, mm. It is larger than requested if the mesh would need more than 24 "
+                    "million nodes.")]
     error_mm: Annotated[float, Field(description="Largest distance between the mesh and the machined surface, mm. "
                                                  "Details thinner than this may be missing.")]
     box_mm: Annotated[list[list[float]], Field(description="Lower and upper corner of the mesh.")]
@@ -141,17 +147,16 @@ class TimeSpent(ReportModel):
 class Caution(ReportModel):
     """A warning for the machinist that is not a finding."""
 
-    kind: Annotated[str, Field(description="limited: the setup requires more than the tool or the machine allows. dry: "
-                                           "a tool cuts without coolant, with cutting data that assume coolant. "
-                                           "deflection: a tool bends too far at its full feed. thin_wall: a wall is "
-                                           "high for its thickness; measured is height over thickness. support: thin "
-                                           "walls are finished without stock beside them; measured is the free height "
-                                           "in multiples of the thickness. tool_life: a tool needs more than one "
-                                           "cutter, or one step outlasts a cutter. center_cutting: a tool that does "
-                                           "not cut to its centre plunges into stock. upright: a tool should be tilted "
-                                           "on a zone and is not, or not for half of the cut; measured is the length "
-                                           "cut upright, mm.")]
-    subjects: Annotated[list[str], Field(description="Ids of tools, steps or walls.")]
+    kind: Annotated[str, Field(
+        description="limited: a speed or feed of the setup is above a limit of tool or machine. dry: a tool cuts "
+                    "without coolant, but its cutting data assume coolant. deflection: a tool would bend too far at "
+                    "its full feed. thin_wall: a wall is high for its thickness; measured is height over thickness. "
+                    "support: thin walls are finished without support; measured is the free height in multiples of the "
+                    "thickness. tool_life: a tool needs more than one cutter, or one workingstep outlasts a cutter. "
+                    "center_cutting: a tool that does not cut to its centre ramps into stock. upright: a zone should "
+                    "be cut with a tilted tool, but the tool is upright along half of the cut or more; measured is the "
+                    "length cut upright, mm.")]
+    subjects: Annotated[list[str], Field(description="Ids of tools, workingsteps, zones or walls.")]
     message: str
     measured: Annotated[float | None, Field(description="Measured value, in the unit named in message. limit has the "
                                                              "same unit.")] = None
@@ -164,22 +169,23 @@ class Report(Zones):
     """report.json: the plan and its proof."""
 
     state: Literal["proved", "unproved"]
-    complete: Annotated[bool, Field(description="True where the remainder is empty.")]
+    complete: Annotated[bool, Field(description="true: the remainder is empty.")]
     labels: dict[str, str] = {}
     inputs: Inputs
     zones: list[PlannedZone]  # type: ignore[assignment]
-    steps: list[Any]
+    steps: Annotated[list[Any], Field(description="The workingsteps in machining order.")]
     findings: Findings
     coverage: Annotated[Share | None, Field(description="Proved area divided by machinable area.")] = None
     reach_coverage: Annotated[Share | None, Field(
         description="Proved area divided by the machinable area that some tool of the setup reaches.")] = None
     machining_time_s: float | None = None
     time: TimeSpent | None = None
-    warnings: Annotated[list[Caution], Field(description="Warnings. part.warnings has the same as sentences.")] = []
+    warnings: Annotated[list[Caution], Field(
+        description="Warnings. part.warnings has the same as plain sentences.")] = []
     tools: list[ToolUse]
     deviation: Annotated[list[FaceDeviation], Field(description="Figures after all programs, by face number.")] = []
     machined: Annotated[MachinedPart | None, Field(
-        description="The machined part, where the setup or the request wants it.")] = None
+        description="The machined part. Only on the command line, with --mesh-step; null over HTTP.")] = None
     files: list[ReportFile]
     version: str
 
@@ -188,8 +194,9 @@ class AskedFaces(ReportModel):
     """The faces that have to be within tolerance wherever the tools of the program can touch them."""
 
     by: Annotated[Literal["setup", "program", "nothing"], Field(
-        description="setup: operations.faces names them. program: the program works on them; it removes stock along "
-                    "their normals on a fifth of their area or more. nothing: operations.finishing is false.")]
+        description="setup: operations.faces names them. program: the program works on them, which means that it "
+                    "removes stock along the normals of a fifth of their area or more; if no face has as much, all "
+                    "faces from which it removes stock. nothing: operations.finishing is false.")]
     faces: Annotated[list[str], Field(examples=[["F3", "F12"]])]
 
 
@@ -200,11 +207,14 @@ class Verification(ReportModel):
         description="proved: no finding. clean: the program does no harm, but work is left undone; all findings are "
                     "stock_left or nothing_cut. unproved: any other finding.")]
     findings: Findings
-    asked: AskedFaces | None = None
+    asked: Annotated[AskedFaces | None, Field(
+        description="The asked faces: too much stock on them is a finding.")] = None
     remainder: Annotated[list[Remainder], Field(
-        description="Area that is neither within tolerance nor a finding, one entry for each reason: what the tools of "
-                    "the program cannot touch (undercut, fixture, shank, holder, corner, sharp corner), faces that the "
-                    "program does not work on (not_in_program), and places within the error of the proof (pass).")] = []
+        description="Area that is neither within tolerance nor a finding, one entry for each reason. undercut, "
+                    "fixture, shank, holder, corner, sharp corner: the tools of the program cannot touch it. "
+                    "not_in_program: the program does not work on the face. pass: places within the error of the "
+                    "proof.")] = []
     deviation: Annotated[list[FaceDeviation], Field(description="Figures by face number.")] = []
-    machined: Annotated[MachinedPart | None, Field(description="The machined part, where the request wants it.")] = None
+    machined: Annotated[MachinedPart | None, Field(
+        description="The machined part. Only on the command line, with --out; null over HTTP.")] = None
     files: list[ReportFile] = []

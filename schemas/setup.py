@@ -28,8 +28,8 @@ class PartChoice(WireModel):
     """The body of the STEP file to machine."""
 
     solid: Annotated[Count | None, Field(
-        ge=1, description="Number of the solid, from 1, where the file has several separate solids; null: the only "
-                          "one. Bodies of one product that overlap count as one solid. A product that an assembly "
+        ge=1, description="Number of the solid, from 1. Required if the file has several separate solids; null: the "
+                          "only one. Bodies of one product that overlap count as one solid. A product that an assembly "
                           "places is read at its place.")] = None
     fuse: Annotated[bool, Field(
         description="true: the products of the file are one part, and bodies that overlap or share a face are "
@@ -61,13 +61,14 @@ class Placement(WireModel):
 
 
 class Access(WireModel):
-    """A direction from which the part is machined: tool tip to spindle, in the setup frame."""
+    """A direction from which the part is machined, in the setup frame."""
 
     id: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9]{0,15}$", description="Id of the access.")] = "A1"
     direction: Annotated[Triple, Field(
-        description="Tool axis, of any length above zero. On a 3-axis machine each access has its own program and "
-                    "frame: Z is this axis, and X is the X of the setup frame projected perpendicular to it. On a "
-                    "5-axis machine all accesses are one program in the setup frame.")] = [0.0, 0.0, 1.0]
+        description="Tool axis, from tool tip to spindle; any length above zero. On a 3-axis machine each access has "
+                    "its own program in its own frame: Z is this direction, and X is the X axis of the setup frame "
+                    "projected perpendicular to Z. On a 5-axis machine one program in the setup frame serves all "
+                    "accesses.")] = [0.0, 0.0, 1.0]
     work_offset: Annotated[str, Field(pattern=r"^G5(4|5|6|7|8|9(\.[123])?)$", description="Work offset, G54 to G59, "
                                       "G59.1 to G59.3.")] = "G54"
 
@@ -94,9 +95,8 @@ class Stock(WireModel):
     """The blank from which the job starts."""
 
     kind: Annotated[Literal["part_offset", "box", "cylinder", "step"], Field(
-        description="part_offset: the part, enlarged by margin_mm; box: see box_mm; cylinder: see cylinder_mm; step: "
-                    "the solid of a STEP file, see step_file.")
-        ] = "part_offset"
+        description="part_offset: the part, enlarged by margin_mm. box: see box_mm. cylinder: see cylinder_mm. step: "
+                    "the solid of a STEP file, see step_file.")] = "part_offset"
     margin_mm: Annotated[Number, Field(ge=0, le=1000, description="Distance between part and blank, mm.")] = 1.0
     uncertainty_mm: Annotated[Number, Field(
         ge=0, le=100, description="How much larger the real blank may be than the nominal one, mm.")] = 0.5
@@ -154,24 +154,25 @@ class Quality(WireModel):
     chordal_tolerance_mm: Annotated[Number, Field(
         ge=1e-4, le=1, description="Largest distance from path to surface along a pass, mm; from 0.0001.")] = 0.002
     gouge_tolerance_mm: Annotated[Number, Field(
-        ge=1e-3, le=1, description="Deepest cut into the part that is not a finding, mm; from 0.001, since the mesh "
-                                   "must be finer.")] = 0.01
-    stock_allowance_mm: Annotated[Number, Field(ge=0, le=50, description="Material left on the part, mm.")] = 0.0
+        ge=1e-3, le=1, description="Deepest cut into the part that is not a finding, mm; at least 0.001, since the "
+                                   "mesh of the part must be finer than this tolerance.")] = 0.01
+    stock_allowance_mm: Annotated[Number, Field(
+        ge=0, le=50, description="Material left on the part on purpose, mm.")] = 0.0
     coverage_min: Annotated[Number, Field(
-        ge=0, le=1, description="Smallest share of the machinable area for the state proved.")] = 0.0
+        ge=0, le=1, description="Smallest coverage of a proved job: proved area divided by machinable area.")] = 0.0
 
 
 class Lean(WireModel):
     """Lead and tilt angles of ball and bull-nose tools, measured from the normal of the finished face."""
 
     lead_deg: Annotated[Number, Field(
-        ge=0, le=60, description="Lead: angle forward along the pass, degrees. Above 7 degrees the tool retracts "
+        ge=0, le=60, description="Lead: angle forward along the pass, degrees. Above 7.5 degrees the tool retracts "
                                  "before a pass in the opposite direction.")] = 0.0
     tilt_deg: Annotated[Number, Field(
-        ge=0, le=60, description="Tilt: angle across the pass, degrees, toward the side on which the tool can stay "
-                                 "tilted over more of the passes.")] = 0.0
+        ge=0, le=60, description="Tilt: angle across the pass, degrees, toward the side on which more of the passes "
+                                 "are free of collision.")] = 0.0
     walls_tilt_deg: Annotated[Number | None, Field(
-        ge=0, le=89, description="Tilt on walls, degrees, without a lead; null: walls are cut upright or with the "
+        ge=0, le=89, description="Tilt on walls, degrees, without a lead. null: walls are cut upright or with the "
                                  "flank of the tool.")] = None
 
     @property
@@ -181,32 +182,34 @@ class Lean(WireModel):
 
 
 class Operations(WireModel):
-    """What to machine, and how."""
+    """Which faces to machine, and how."""
 
     roughing: Annotated[bool, Field(description="Remove the stock in layers first.")] = True
     semi_finishing: Annotated[bool, Field(
-        description="After roughing, the same tool also cuts the terraces between its layers. The stock left on "
-                    "inclined walls and floors then varies by at most a quarter of the deepest layer.")] = False
+        description="After roughing, the same tool also cuts the steps that its layers leave. The stock on inclined "
+                    "walls and floors then varies by at most a quarter of the deepest layer.")] = False
     finishing: Annotated[bool, Field(description="Finish the zones.")] = True
-    faces: Annotated[list[FaceId] | None, Field(description="Faces to machine; null: all faces within reach.")] = None
-    exclude_faces: Annotated[list[FaceId], Field(description="Faces to leave uncut.")] = []
+    faces: Annotated[list[FaceId] | None, Field(
+        description="Faces to machine. null: every face that some access sees.")] = None
+    exclude_faces: Annotated[list[FaceId], Field(
+        description="Faces that are not finished and not checked for stock left.")] = []
     cut_direction: Annotated[Literal["climb", "conventional", "either"], Field(
         description="Direction of cut on walls.")] = "climb"
     pattern: Annotated[Literal["auto", "zigzag", "one_way", "spiral"], Field(
         description="Pattern of passes on shallow areas. auto: zigzag or spiral, whichever is shorter.")] = "auto"
     lean: Annotated[Lean, Field(
-        description="Angles: on a 5-axis machine ball and bull-nose tools are tilted by them from the normal of faces "
-                    "that are not level, so that the tool centre does not rub. Obstacles: where the tool would "
-                    "collide, it takes the nearest free axis, up to 45 degrees away, and turns evenly. Upright: the "
-                    "tool stays upright on level faces and where no axis is free. Other strategies: flank milling and "
-                    "curvature-matched passes come first where they are faster and leave as little area upright. "
-                    "Default, no angles: tools are tilted for these two strategies only, where "
-                    "they are faster.")] = Lean()
+        description="On a 5-axis machine with machine.simultaneous: ball and bull-nose tools are tilted by these "
+                    "angles from the normal of faces that are not level, so that the tool centre does not rub. Where "
+                    "the tilted tool would collide, its axis turns evenly to the nearest free axis, up to 45 degrees "
+                    "away. The tool stays upright on level faces and where no axis is free. Flank milling and "
+                    "curvature-matched passes are used instead if they are faster and cut as little upright. Without "
+                    "angles (the default) tools are tilted for these two strategies only.")] = Lean()
     walls_in_turn: Annotated[bool, Field(
-        description="true: a wall that is more than 10 times as high as thick is finished on both sides in alternating "
-                    "bands of depth. No more than 10 times its thickness may stand unsupported where it is finished. "
-                    "On a 3-axis machine with one access, breaking this rule is a finding; elsewhere it is a warning. "
-                    "false: such walls are supported by other means, and the plan has a warning.")] = True
+        description="true: on a 3-axis machine with one access, a wall that is more than 10 times as high as thick is "
+                    "finished on both sides in alternating bands of depth. It is a finding if more than 10 times its "
+                    "thickness stands unsupported where it is finished. On a 5-axis machine or with several accesses "
+                    "there are no bands, and this is a warning. false: no bands; you support such walls by other "
+                    "means, and the report has a warning.")] = True
 
     @model_validator(mode="after")
     def _check(self) -> Operations:
@@ -237,22 +240,23 @@ def _describe(schema: dict[str, Any]) -> None:
 
 
 class Setup(WireModel):
-    """A setup: tools, machine, stock and required quality. Only ``tools`` has no default."""
+    """A setup: tools, machine, blank and required quality. Only ``tools`` is required."""
 
     model_config = {"json_schema_extra": lambda schema: _describe(schema)}
 
-    part: Annotated[PartChoice, Field(description="The solid of the STEP file.")] = PartChoice()
+    part: Annotated[PartChoice, Field(description="Which body of the STEP file is the part.")] = PartChoice()
     placement: Annotated[Placement, Field(description="The setup frame in STEP coordinates.")] = Placement()
     access: Annotated[list[Access], Field(min_length=1, max_length=6,
                                           description="Directions from which the part is machined.")] = [Access()]
-    tools: Annotated[list[Annotated[Tool, Shelf("tools")]], Field(min_length=1, max_length=200,
-                                                                  description="Available tools, or 'lib:NAME'.")]
-    machine: Annotated[Machine, Shelf("machines"), Field(description="Machine, or 'lib:NAME'.")] = Machine()
+    tools: Annotated[list[Annotated[Tool, Shelf("tools")]], Field(
+        min_length=1, max_length=200, description="Tools, each as an object or 'lib:NAME'.")]
+    machine: Annotated[Machine, Shelf("machines"), Field(
+        description="The machine, as an object or 'lib:NAME'.")] = Machine()
     stock: Annotated[Stock, Field(description="The blank.")] = Stock()
     fixtures: Annotated[list[Fixture], Field(max_length=200, description="Boxes that nothing may touch.")] = []
     clearance_mm: Annotated[Clearance, Field(description="Radial clearances.")] = Clearance()
     quality: Annotated[Quality, Field(description="Requirements on the surface.")] = Quality()
-    operations: Annotated[Operations, Field(description="What to machine, and how.")] = Operations()
+    operations: Annotated[Operations, Field(description="Which faces to machine, and how.")] = Operations()
     material: Annotated[MaterialField, Field(
         description=f"Built-in material ({', '.join(MATERIALS)}), 'lib:NAME', or an object.")] = MATERIALS["Ti-6Al-4V"]
     labels: Labels = {}

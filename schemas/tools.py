@@ -17,7 +17,7 @@ Length = Annotated[Number, Field(ge=1e-3, le=2000)]
 
 
 class HolderSegment(WireModel):
-    """A frustum of the holder; segments stack upwards from the holder nose."""
+    """A conical or cylindrical segment of the holder; segments stack upwards from the holder nose."""
 
     diameter_mm: Annotated[Length, Field(description="Diameter at the lower end, mm.")]
     diameter_top_mm: Annotated[Length | None, Field(description="Diameter at the upper end, mm; "
@@ -48,16 +48,17 @@ class Tool(WireModel):
                                                 "yet.")]
     diameter_mm: Annotated[Length, Field(ge=0.01, description="Diameter of the cutting part, mm, from 0.01.")]
     corner_radius_mm: Annotated[Number, Field(
-        ge=0, description="Corner radius, mm. A bull nose needs it, a flat end mill has 0. For a ball, 0 means half "
+        ge=0, description="Corner radius, mm. Above 0 for a bull nose, 0 for a flat end mill. For a ball, 0 means half "
                           "the diameter.")] = 0.0
-    taper_angle_deg: Annotated[Number, Field(ge=0, lt=90, description="0 for every kind available so far.")] = 0.0
+    taper_angle_deg: Annotated[Number, Field(
+        ge=0, lt=90, description="Taper angle, deg. Must be 0, since tapered tools are not available yet.")] = 0.0
     profile_radius_mm: Annotated[Number | None, Field(
-        gt=0, description="For barrels only; null for every kind available so far.")] = None
+        gt=0, description="Radius of a barrel, mm. Must be null, since barrel tools are not available yet.")] = None
     flutes: Annotated[Count, Field(ge=1, le=50, description="Number of teeth.")] = 2
     flute_length_mm: Annotated[Length | None, Field(
         description="Tip to the end of the cutting part, mm. Default: 3 x diameter_mm, but not more than "
                     "neck_length_mm and stickout_mm where they are given.")] = None
-    center_cutting: Annotated[bool, Field(description="Whether the end cuts to the centre.")] = True
+    center_cutting: Annotated[bool, Field(description="true: the end of the tool cuts to the centre.")] = True
     neck_diameter_mm: Annotated[Length | None, Field(
         description="Diameter of the relieved part, mm. Default: diameter_mm.")] = None
     neck_length_mm: Annotated[Length | None, Field(
@@ -74,12 +75,13 @@ class Tool(WireModel):
     max_rpm: Annotated[Number | None, Field(
         ge=1, le=1e6, description="Highest spindle speed of the tool, 1/min; null: no limit.")] = None
     max_engagement_deg: Annotated[Number | None, Field(
-        ge=30, le=180, description="Largest engagement of the front half of the cutter, deg, at depths of more than a "
-                                   "twentieth of its radius. 180 is a slot. At least 30, since the proof resolves "
-                                   "engagement to about 11 degrees. null: no limit.")] = None
+        ge=30, le=180, description="Largest engaged angle, deg: how much of the front half of the cutter may be in "
+                                   "stock. 180 is a slot. Stock no deeper than a twentieth of the cutter radius does "
+                                   "not count. At least 30, since the proof resolves the angle to about 11 degrees. "
+                                   "null: no limit.")] = None
     life_min: Annotated[Number | None, Field(
-        gt=0, le=1e6, description="Tool life in cut, min. The program stops for a fresh cutter between two passes "
-                                  "before this time is used up. null: not counted.")] = None
+        gt=0, le=1e6, description="Tool life, in minutes of cutting. The program stops for a fresh cutter between two "
+                                  "passes before this time is used up. null: tool life is not counted.")] = None
     spindle_rpm: Annotated[Number | None, Field(
         ge=1, le=1e6, description="Spindle speed of all its steps, 1/min, at most max_rpm and machine.max_rpm. null: "
                                   "computed from the material.")] = None

@@ -53,7 +53,8 @@ class AccessFacts(ReportModel):
     found: Annotated[bool, Field(description="true: the planner found this axis on a 5-axis machine. false: the setup "
                                              "gave it.")]
     rotary_deg: Annotated[list[float] | None, Field(
-        description="Angles of the tilting and the turning axis, deg, up to whole turns; null on a 3-axis machine.")]
+        description="Angles of the tilting and the turning axis, deg. The program may add whole turns. null on a "
+                    "3-axis machine.")]
 
 
 class Rejection(ReportModel):
@@ -72,12 +73,13 @@ class SideProfile(ReportModel):
     wall: Annotated[str, Field(examples=["W1"])]
     profile: Annotated[str | None, Field(description="C1 to C10; null: straight.")] = None
     level: Level
-    margin: Annotated[float, Field(ge=0, le=1, description="How clear the type is: the smallest relative change of a "
-                                                           "measured size that would give another type.")]
+    margin: Annotated[float, Field(
+        ge=0, le=1, description="How far the shape is from another type: the smallest relative change of a measured "
+                                "size that would change the type.")]
 
 
 class ApproachCone(ReportModel):
-    """A circular cone of tool axes. With each of them the tool reaches the whole zone."""
+    """A circular cone of tool axes. Along each of them the tool reaches at least 98 % of the zone."""
 
     axis: Annotated[list[float], Field(min_length=3, max_length=3, description="Tip to spindle, setup frame.")]
     half_angle_deg: float
@@ -101,28 +103,36 @@ class ZoneFacts(ReportModel):
         description="SCZI: a zone on, under or over a connection. SCZ: any other zone.")] = None
     profile: Annotated[str | None, Field(description="Profile type C1 to C10 of the most complex side; null: straight, "
                                                      "or no wall.")] = None
-    level: Annotated[Level | None, Field(description="Complexity of the profile; null: no wall.")] = None
+    level: Annotated[Level | None, Field(
+        description="Complexity of the profile (not of the height); null: no wall.")] = None
     profiles: Annotated[list[SideProfile], Field(description="Profiles of the wall sides in this zone.")] = []
     open: Annotated[bool | None, Field(
         description="true: over nearly all of the zone the tool can leave the part sideways at the level of its "
                     "passes. false: walls or connections close the zone.")] = None
-    region: Annotated[str | None, Field(examples=["H1", "H1.2", "H1 over C2", "W1", "C2", "top", "floor",
-                                                  "free"])] = None
+    region: Annotated[str | None, Field(
+        description="Region of the part: a channel (H), wall (W) or connection (C), with 'over', 'under' or a piece "
+                    "number; or top, floor, "
+                    "free.", examples=["H1", "H1.2", "H1 over C2", "W1", "C2", "top", "floor", "free"])] = None
     merged: Annotated[list[str], Field(
         description="Regions over or under connections that are part of this zone.")] = []
-    form: Literal["level", "shallow", "steep"] | None = None
+    form: Annotated[Literal["level", "shallow", "steep"] | None, Field(
+        description="level: a plane perpendicular to the axis. shallow: inclined by less than 45 degrees. steep: 45 "
+                    "degrees and more.")] = None
     faces: list[Any] = []
     patches: Annotated[list[Patch], Field(description="The same area as trimmed faces.")] = []
-    access: str | None = None
-    tool: str | None = None
+    access: Annotated[str | None, Field(description="Id of the access along which the zone is cut.")] = None
+    tool: Annotated[str | None, Field(description="Id of the tool that finishes the zone.")] = None
     axis: Annotated[list[float] | None, Field(description="Tool axis in the setup frame.")] = None
-    approach: ApproachCone | None = None
+    approach: Annotated[ApproachCone | None, Field(
+        description="Tool axes along which the tool reaches nearly all of the zone; null: the axis of the zone itself "
+                    "reaches less.")] = None
     depth_mm: Annotated[list[float] | None, Field(description="Top and bottom along the axis, mm.")] = None
     cutting_plane_mm: Annotated[float | None, Field(
         description="Height along the axis, mm, below which the tool is not used.")] = None
     area_mm2: float | None = None
     strategy: str | None = None
-    rejected: list[Rejection] = []
+    rejected: Annotated[list[Rejection], Field(
+        description="Tools and strategies that were considered and rejected.")] = []
 
 
 class ComputableZone(ReportModel):
@@ -135,12 +145,12 @@ class ComputableZone(ReportModel):
 
 
 class CuttingPlane(ReportModel):
-    """Height in a region below which a tool, or every tool from one access, does not cut."""
+    """Height in a region below which a tool, or every tool of one access, does not cut."""
 
     access: str
     z_mm: Annotated[float, Field(description="Height along the access direction, mm.")]
     region: str
-    tool: str | None = None
+    tool: Annotated[str | None, Field(description="Id of the tool; null: every tool of the access.")] = None
     reason: str
 
 
@@ -154,7 +164,7 @@ class Place(ReportModel):
 
 
 class Remainder(ReportModel):
-    """Area that the setup cannot reach, the reason, and what would reach it."""
+    """Area that stays uncut, the reason, and the tool or access that would cut it."""
 
     faces: list[Any]
     area_mm2: float
@@ -165,10 +175,11 @@ class Remainder(ReportModel):
                     "gap, corner: only a thinner or sharper cutter fits. sharp corner: no rotating tool fits. "
                     "not_in_program: only in a verification; the program does not work on the face.")]
     would_need: Annotated[dict[str, Any], Field(
-        description="The tool that would reach it, in available sizes: kind, diameter_mm, corner_radius_mm, "
+        description="The tool that would reach the area, in available sizes: kind, diameter_mm, corner_radius_mm, "
                     "neck_length_mm, shank_diameter_mm, stickout_mm, like (the tool of the setup with the same holder) "
-                    "and share (of the area it reaches). Or kind 'other access', 'other clamping' or 'other process'. "
-                    "Empty where no tool is needed or none would reach it.")] = {}
+                    "and share (of the area that it reaches). Or kind 'other access', 'other clamping' or 'other "
+                    "process'; the last has slenderness. With several accesses also access. Empty if no tool is needed "
+                    "or none would reach the area.")] = {}
     tool_at_hand: Annotated[str | None, Field(description="Reason pass: the tool of the setup that touches the area. "
                                                           "Reason fixture: the tool that would touch it without "
                                                           "fixtures.")] = None
@@ -187,21 +198,23 @@ class ProposedTool(ReportModel):
     neck_length_mm: float
     shank_diameter_mm: float
     stickout_mm: float
-    slenderness: Annotated[float, Field(description="Neck length over diameter.")]
+    slenderness: Annotated[float, Field(
+        description="Neck length over cutter diameter. The slenderness in tools of the report is over the neck "
+                    "diameter.")]
     instead_of: Annotated[str | None, Field(description="Tool of the setup with the same cutter.")] = None
     like: Annotated[str | None, Field(description="Tool of the setup with the same holder.")] = None
     access: str
     area_mm2: Annotated[float, Field(
         description="Area of the remainder that zones with this tool cover, mm2. The tool is proposed for this area "
                     "only.")]
-    tool: Annotated[Tool | None, Field(description="The same tool as a complete entry for tools of the setup.")] = None
+    tool: Annotated[Tool | None, Field(description="The same tool as an entry for tools of a setup.")] = None
 
 
 class Proposal(ReportModel):
     """The fewest tools to add, and the area that remains with them."""
 
     tools: list[ProposedTool]
-    emptied_mm2: float
+    emptied_mm2: Annotated[float, Field(description="Area of the remainder that the proposed tools cut, mm2.")]
     stays_mm2: Annotated[dict[str, float], Field(
         description="Area by reason, mm2. undercut, fixture, sharp corner, pass: as in remainder. slender: only a neck "
                     "longer than 20 diameters reaches it. too little: the area is not worth a tool.")]
@@ -218,10 +231,12 @@ class Zones(ReportModel):
     mcz: list[ComputableZone] = []
     cutting_planes: list[CuttingPlane] = []
     machinable_area_mm2: Annotated[float | None, Field(
-        description="Area of all requested faces. In zones.json it is the sum of zones and remainder; in report.json "
-                    "it is the sum of proved area, findings and remainder.")] = None
+        description="Machinable area, mm2: the faces in operations.faces, or else those that an access sees. In "
+                    "zones.json it is the sum of zones and remainder; in report.json it is the sum of proved area, "
+                    "findings and remainder.")] = None
     machinable_by_role_mm2: Annotated[dict[str, float], Field(
-        description="The same by the role of the faces: wall, connection, floor, base, fillet, free.")] = {}
+        description="The same by the role of the faces. base: the body that carries the walls. floor: faces of it that "
+                    "point up. free: any other face. Further roles: wall, connection, fillet.")] = {}
     zones: list[ZoneFacts]
     remainder: list[Remainder]
     proposal: Proposal | None = None

@@ -37,7 +37,7 @@ KEY_LOOK_S = 5.0
 STREAM: dict[int | str, dict[str, Any]] = {
     200: {"description": "Events 'progress' and, once, 'end'; data is a JobEvent.",
           "content": {"text/event-stream": {"schema": {"type": "string"}}}},
-    204: {"description": "Last-Event-ID is the final event."}}
+    204: {"description": "No more events: Last-Event-ID is that of the final event."}}
 
 
 @router.get("/{job_id}/events", operation_id="followJob", summary="Follow a job", response_class=StreamingResponse,

@@ -17,7 +17,7 @@ router = APIRouter(tags=["operation"])
 @router.get("/healthz", operation_id="healthz", summary="Check the process",
             response_description="The process answers.")
 async def healthz() -> Health:  # without a thread: all threads may wait for the database
-    """Answer ok. It needs neither database nor disk."""
+    """Answer ok while the process runs, even without database and disk."""
     return Health(status="ok")
 
 
@@ -25,7 +25,7 @@ async def healthz() -> Health:  # without a thread: all threads may wait for the
             response_description="The service is ready.",
             responses={503: {"model": Health, "description": "Not ready."}})
 def readyz(request: Request, response: Response) -> Health:
-    """Check database, engine, data folder and free disk space; 503 names what fails."""
+    """Check database, engine, data folder and free disk space. An answer 503 names the failed checks."""
     checks = request.app.state.engine.ready()
     if all(text == "ok" for text in checks.values()):
         return Health(status="ok", checks=checks)

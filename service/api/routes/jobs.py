@@ -41,13 +41,13 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
 ONE = responses(UnauthorizedError, NotFoundError, RequestError)
 SENT: dict[int | str, dict[str, Any]] = responses(RangeError) | {
-    206: {"description": "The parts that Range requests, if If-Range allows."},
-    304: {"description": "If-None-Match names the version that the client has."}}
+    206: {"description": "The bytes that Range requests, if If-Range allows it."},
+    304: {"description": "The client has this version already (If-None-Match)."}}
 RESULT = responses(UnauthorizedError, NotFoundError, RequestError, NotReadyError, GoneError)
 
 
 Labels = Annotated[list[Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}:[^\x00-\x1f\x7f]{0,200}$")]],
-                   Query(max_length=8, description="KEY:VALUE of a label; several labels must all match.",
+                   Query(max_length=8, description="Label of the job as KEY:VALUE. Several labels must all match.",
                          examples=[["order:4711"]])]
 From = Annotated[datetime | None, Query(description="Only jobs posted at or after this time; ISO 8601, UTC where no "
                                                     "time zone is given.")]
@@ -86,7 +86,7 @@ def get_job(request: Request, principal: Principal, job_id: str) -> Job:
                response_description="The job after the request.", responses=ONE)
 def cancel_job(request: Request, principal: Submitter, job_id: str, purge: Annotated[bool, Query(
         description="Also delete the files of the job, even if the job ended earlier. Requests for them get 410 at "
-                    "once. Within hours the service removes them, unless another job has the same "
+                    "once. The service removes them within hours, unless another job has the same "
                     "files.")] = False) -> Job:
     """Cancel a job that has not ended. A job that has ended is returned unchanged."""
     jobs = request.app.state.engine.jobs
@@ -122,14 +122,14 @@ def get_files(request: Request, principal: Principal, job_id: str) -> JobFiles:
 FILE_OK: dict[int | str, dict[str, Any]] = {200: {
     "description": "The file; ETag is its SHA-256.",
     "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}},
-    206: {"description": "The parts that Range requests, if If-Range allows.",
+    206: {"description": "The bytes that Range requests, if If-Range allows it.",
           "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}}}
 
 
 @router.get("/{job_id}/files/{name}", operation_id="getFile", summary="One file", response_class=FileResponse,
             responses=RESULT | SENT | FILE_OK | responses(NotReadyError, WithheldError))
 def get_file(request: Request, principal: Principal, job_id: str, name: str) -> Response:
-    """A file, or parts of it with Range. Programs and STEP-NC of a job that is not proved are withheld (409)."""
+    """A file, or a part of it with Range. The answer is 409 for programs and STEP-NC of a job that is not proved."""
     row = request.app.state.engine.jobs.get(job_id, principal)
     path = find_file(result_folder(request.app.state.engine.artifacts, row), row, name)
     return _sent(request, path, media_type(name), filename=name)

@@ -29,7 +29,7 @@ def list_keys(request: Request, _: Admin) -> KeyList:
 @router.post("", operation_id="createKey", summary="Make a key", response_description="The new key.",
              status_code=status.HTTP_201_CREATED, responses=responses(UnauthorizedError, RequestError, TooLargeError))
 def create_key(request: Request, admin: Admin, new: NewKey) -> MadeKey:
-    """Create a key. Only this answer contains it. Once a key exists, requests without one are refused."""
+    """Create a key. Only this answer contains its text. Once a key exists, every request needs a key."""
     text, row = request.app.state.engine.keys.make(new.principal, new.scopes, new.days, new.note)
     log.info("key made", key=row["id"], principal=new.principal, scopes=row["scopes"], by=admin)
     return MadeKey(key=text, about=key_resource(row))

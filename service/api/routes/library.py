@@ -32,7 +32,7 @@ Shared = Annotated[bool, Query(description="true: the entry shared by all princi
                                            "own.")]
 READ = responses(UnauthorizedError)
 ONE = responses(UnauthorizedError, NotFoundError, RequestError)
-WRITE = responses(UnauthorizedError, RequestError, TooLargeError) | {201: {"description": "The name is new."}}
+WRITE = responses(UnauthorizedError, RequestError, TooLargeError) | {201: {"description": "The entry is new."}}
 
 
 def _library(request: Request) -> LibraryStore:

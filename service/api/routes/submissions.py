@@ -47,22 +47,23 @@ def multipart(with_program: bool) -> dict[str, Any]:
                 "setup": {"contentType": "application/json"}}
     if with_program:
         properties["program"] = {"type": "string", "format": "binary",
-                                 "description": "The NC program, for a control that machine.dialects of the setup "
-                                                "names; Siemens and Heidenhain programs are also recognized by their "
-                                                "words. Or STEP-NC, AP238 or ISO 14649, recognized by the FILE_SCHEMA "
-                                                "of its header."}
+                                 "description": "The NC program or STEP-NC file. A program with words of Siemens or "
+                                                "Heidenhain is read as such. Any other program is read for the first "
+                                                "other control in machine.dialects of the setup, or else for linuxcnc. "
+                                                "STEP-NC (AP238 or ISO 14649) is recognized by FILE_SCHEMA in its "
+                                                "header."}
         encoding["program"] = {"contentType": "text/plain, model/step, application/octet-stream"}
     required = list(properties)
     properties["stock"] = {
         "type": "string", "format": "binary",
-        "description": "The STEP file of the blank; required where the setup has stock.kind 'step', not allowed "
-                       "otherwise."}
+        "description": "The STEP file of the blank. Required if the setup has stock.kind 'step', otherwise not "
+                       "allowed."}
     encoding["stock"] = {"contentType": "model/step, application/step, application/octet-stream"}
     if with_program:
         properties["spindle_tool"] = {
             "type": "integer", "minimum": 0, "maximum": 999999, "default": 0,
-            "description": "T number of the tool in the spindle before the first line of the program, with its length "
-                           "offset on; 0: none."}
+            "description": "T number of the tool that is in the spindle before the first line of the program; its "
+                           "length offset is then active. 0: no tool."}
     properties["deadline_s"] = {
         "type": "number", "minimum": DEADLINE_S[0], "maximum": DEADLINE_S[1],
         "description": "Time limit for the whole job, in seconds from the request. A job that takes longer is stopped "
@@ -109,5 +110,5 @@ async def create_zones(request: Request, response: Response, principal: Submitte
              summary="Prove a program", responses=ACCEPTED | ERRORS, openapi_extra=multipart(True))
 async def create_verification(request: Request, response: Response, principal: Submitter,
                               key: IdempotencyKey = None) -> Job:
-    """Queue the proof of a program, which may come from another CAM system, against part and setup."""
+    """Queue the proof of a program against part and setup. The program may come from any CAM system."""
     return await _submit(request, response, "verify", principal, key)
