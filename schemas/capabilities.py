@@ -21,7 +21,7 @@ class Limits(ReportModel):
 
     body_bytes: Annotated[int, Field(description="Largest request body, bytes.")]
     job_time_s: Annotated[float, Field(description="Time limit of one attempt, s.")]
-    job_memory_bytes: int
+    job_memory_bytes: Annotated[int, Field(description="Largest memory of one job, bytes.")]
     attempts: Annotated[int, Field(description="Largest number of starts of a job whose process is lost.")]
     submissions: Annotated[str, Field(description="Largest number of submissions of one principal in a period.",
                                       examples=["120/minute"])]

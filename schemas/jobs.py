@@ -37,13 +37,14 @@ class JobSummary(ReportModel):
     reach_coverage: Annotated[float | None, Field(
         description="Proved area divided by the machinable area that some tool of the setup reaches.")] = None
     findings: Annotated[int, Field(ge=0, description="Number of findings of the proof.")] = 0
-    machining_time_s: float | None = None
+    machining_time_s: Annotated[float | None, Field(description="Simulated machining time, s.")] = None
 
 
 class JobLibraryEntry(ReportModel):
     """Version of a library entry that a job used."""
 
-    shelf: Literal["tools", "machines", "materials"]
+    shelf: Annotated[Literal["tools", "machines", "materials"], Field(
+        description="Library from which the entry comes.")]
     name: str
     version: Annotated[int, Field(ge=1)]
     shared: bool = False
@@ -55,7 +56,7 @@ class JobWebhook(ReportModel):
     url: str
     state: Annotated[Literal["pending", "delivered", "given_up"], Field(
         description="pending: not delivered yet. delivered: the receiver answered 2xx. given_up: no more attempts.")]
-    attempts: Annotated[int, Field(ge=0)] = 0
+    attempts: Annotated[int, Field(ge=0, description="Number of attempts so far.")] = 0
     next_attempt_at: Annotated[str | None, Field(description="UTC, ISO 8601; null where no attempt is planned.")] = None
     problem: Annotated[str | None, Field(description="Error of the last attempt.")] = None
 
@@ -90,9 +91,9 @@ class Job(ReportModel):
                     "them too.")]
     part_sha256: Annotated[str, Field(description="Hash of the bytes of the part.")]
     setup_sha256: Annotated[str, Field(description="Hash of the canonical setup.")]
-    stock_sha256: Annotated[str | None, Field(description="Hash of the bytes of the blank's file; null where there is "
-                                                          "none.")] = None
-    labels: dict[str, str] = {}
+    stock_sha256: Annotated[str | None, Field(
+        description="Hash of the bytes of the STEP file of the blank; null: there is none.")] = None
+    labels: Annotated[dict[str, str], Field(description="Labels of the setup.")] = {}
     created_at: Annotated[str, Field(description="UTC, ISO 8601.", examples=["2026-01-31T12:00:00Z"])]
     started_at: Annotated[str | None, Field(description="Start of the newest attempt, UTC, ISO 8601; null before the "
                                                         "first.")] = None
@@ -125,7 +126,7 @@ class JobFile(ReportModel):
     size_bytes: Annotated[int, Field(ge=0)]
     sha256: str
     media_type: str
-    href: str
+    href: Annotated[str, Field(description="Path for the download.")]
 
 
 class JobFiles(ReportModel):
@@ -151,9 +152,10 @@ class LibraryEntry(ReportModel):
     """Fields of every library entry."""
 
     name: str
-    version: Annotated[int | None, Field(ge=1, description="A setup may refer to lib:NAME@VERSION; null for built-in "
-                                                           "entries.")] = None
-    shared: Annotated[bool, Field(description="True where the entry belongs to all principals.")] = False
+    version: Annotated[int | None, Field(
+        ge=1, description="Version of the entry; a setup may refer to lib:NAME@VERSION. null for built-in "
+                          "entries.")] = None
+    shared: Annotated[bool, Field(description="true: all principals can use the entry.")] = False
     created_at: Annotated[str | None, Field(description="Time when this version was written, UTC, ISO 8601.")] = None
 
 
@@ -200,4 +202,4 @@ class Health(ReportModel):
     """Answer of /healthz and /readyz."""
 
     status: Annotated[Literal["ok", "unready"], Field(description="ok, or unready with the reason in checks.")]
-    checks: dict[str, str] = {}
+    checks: Annotated[dict[str, str], Field(description="Result of each check: ok or the error.")] = {}

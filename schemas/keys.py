@@ -14,7 +14,8 @@ KeyScope = Literal["submit", "read", "admin", "metrics"]
 class NewKey(WireModel):
     """Request for a new key."""
 
-    principal: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._@-]{0,63}$",
+    principal: Annotated[str, Field(
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9._@-]{0,63}$",
         description="Principal: the owner of the key. Jobs and library entries belong to the "
                     "principal.", examples=["mes"])]
     scopes: Annotated[list[KeyScope], Field(

@@ -56,8 +56,8 @@ class Machine(WireModel):
                                   "limit.")] = None
     coolant: Annotated[Literal["flood", "off"], Field(
         description="flood: programs and STEP-NC turn the coolant on with the spindle (M8). off: they state that the "
-                    "coolant is off (M9). The default cutting data assume flood coolant, so give a dry machine its own "
-                    "cutting data.")] = "flood"
+                    "coolant is off (M9). The default cutting data assume flood coolant, so give your own cutting data "
+                    "for a dry machine.")] = "flood"
     high_speed: Annotated[bool, Field(
         description="true: programs use an option of the control for fast contouring: G05.1 Q1 on fanuc, CYCLE832 on "
                     "siemens.")] = False
@@ -68,9 +68,9 @@ class Machine(WireModel):
                     "STAY). false: they are in the setup frame. M128 keeps the tip in both cases.")] = False
     siemens_cycle800: Annotated[str | None, Field(
         max_length=32, pattern=r"^[A-Za-z0-9_]*$",
-        description="On siemens, steps with a fixed tool axis are in a plane of CYCLE800 (direction 0: no axis moves) "
-                    "instead of the setup frame. TRAORI keeps the tip in both cases. The value is the name of the "
-                    "swivel data record, empty where the machine has only one. null: no such planes.")] = None
+        description="Name of the swivel data record on siemens, empty if the machine has only one: workingsteps with a "
+                    "fixed tool axis are in a plane of CYCLE800 (direction 0: no axis moves). null: they are in the "
+                    "setup frame. TRAORI keeps the tip in both cases.")] = None
     arcs: Annotated[bool, Field(
         description="true: programs contain arcs and helices in the XY plane, and longer straight moves. They stay "
                     "within half of quality.chordal_tolerance_mm of the planned path; the plan uses the other half. "
@@ -92,8 +92,8 @@ class Machine(WireModel):
         description="find: a 5-axis machine also uses other tool axes for areas that the accesses of the setup do not "
                     "reach. given: it uses those accesses only. No effect on a 3-axis machine.")] = "find"
     simultaneous: Annotated[bool, Field(
-        description="true: the rotary axes move while the tool cuts. false: they turn between cuts only (3+2). No "
-                    "effect on a 3-axis machine, nor on a verified program.")] = True
+        description="true: the rotary axes may move while the tool cuts. false: they turn between cuts only (3+2). No "
+                    "effect on a 3-axis machine or on a verified program.")] = True
     rotary_rate_deg_min: Annotated[Number | None, Field(
         ge=1, le=1e7, description="Highest rotary speed, deg/min. It limits feed moves, and times of rapids are "
                                   "computed with it. null: no limit; rapids are timed with 7200. Leave it null on a "

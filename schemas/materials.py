@@ -30,8 +30,9 @@ class FeedPoint(WireModel):
 class Material(WireModel):
     """A workpiece material with its cutting data."""
 
-    name: Annotated[str, Field(min_length=1, max_length=64, description="Name, as programs state it.",
-                               examples=["Ti-6Al-4V"])]
+    name: Annotated[str, Field(
+        min_length=1, max_length=64, description="Name of the material; programs state it in their "
+                                                 "header.", examples=["Ti-6Al-4V"])]
     cutting_speed_m_min: Annotated[Number, Field(
         ge=0.1, le=5000, description="Cutting speed at the full diameter, m/min.")]
     feed_per_tooth: Annotated[list[FeedPoint], Field(

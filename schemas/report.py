@@ -29,7 +29,10 @@ class Inputs(ReportModel):
 
 
 class ScallopFacts(ReportModel):
-    """Residual height over a zone, mm along the normal. p99: value that 99 % of the samples do not exceed."""
+    """Stock left above the allowance at the samples of a zone, mm along the normal.
+
+    requested: quality.scallop_height_mm. p99: value that 99 % of the samples do not exceed.
+    """
 
     requested: float
     p50: float | None = None
@@ -74,7 +77,7 @@ class ToolUse(ReportModel):
     minutes_in_cut: Annotated[float | None, Field(description="Minutes of moves that remove "
                                                               "stock, as simulated.")] = None
     metres_in_cut: Annotated[float | None, Field(description="Metres of its cutting passes, as planned.")] = None
-    life_min: float | None = None
+    life_min: Annotated[float | None, Field(description="Tool life of the setup, minutes.")] = None
     cutters: Annotated[int | None, Field(
         description="Number of cutters that the plan uses: one, and one more for each stop for a fresh cutter. 0: the "
                     "tool has no workingstep.")] = None
@@ -128,7 +131,9 @@ class ReportFile(ReportModel):
     """One file of the plan."""
 
     name: str
-    kind: str
+    kind: Annotated[str, Field(
+        description="program, stepnc (AP238), stepnc-arm (ISO 14649), zones, preview, deviation, machined, sheet or "
+                    "view.")]
     access: str | None = None
     dialect: str | None = None
     sha256: str
@@ -160,7 +165,7 @@ class Caution(ReportModel):
     message: str
     measured: Annotated[float | None, Field(description="Measured value, in the unit named in message. limit has the "
                                                              "same unit.")] = None
-    limit: float | None = None
+    limit: Annotated[float | None, Field(description="Allowed value; null: there is none.")] = None
     remedy: str
     at_mm: Annotated[list[float] | None, Field(description="Place, setup frame, mm.")] = None
 
@@ -178,7 +183,7 @@ class Report(Zones):
     coverage: Annotated[Share | None, Field(description="Proved area divided by machinable area.")] = None
     reach_coverage: Annotated[Share | None, Field(
         description="Proved area divided by the machinable area that some tool of the setup reaches.")] = None
-    machining_time_s: float | None = None
+    machining_time_s: Annotated[float | None, Field(description="Simulated machining time, s.")] = None
     time: TimeSpent | None = None
     warnings: Annotated[list[Caution], Field(
         description="Warnings. part.warnings has the same as plain sentences.")] = []
@@ -194,9 +199,9 @@ class AskedFaces(ReportModel):
     """The faces that have to be within tolerance wherever the tools of the program can touch them."""
 
     by: Annotated[Literal["setup", "program", "nothing"], Field(
-        description="setup: operations.faces names them. program: the program works on them, which means that it "
-                    "removes stock along the normals of a fifth of their area or more; if no face has as much, all "
-                    "faces from which it removes stock. nothing: operations.finishing is false.")]
+        description="setup: operations.faces names them. program: the program works on them: it removes stock along "
+                    "the normals of a fifth of their area or more. If no face has that much, they are all faces from "
+                    "which it removes stock. nothing: operations.finishing is false.")]
     faces: Annotated[list[str], Field(examples=[["F3", "F12"]])]
 
 

@@ -202,8 +202,9 @@ class Operations(WireModel):
                     "angles from the normal of faces that are not level, so that the tool centre does not rub. Where "
                     "the tilted tool would collide, its axis turns evenly to the nearest free axis, up to 45 degrees "
                     "away. The tool stays upright on level faces and where no axis is free. Flank milling and "
-                    "curvature-matched passes are used instead if they are faster and cut as little upright. Without "
-                    "angles (the default) tools are tilted for these two strategies only.")] = Lean()
+                    "curvature-matched passes come first where they are faster and the tool is not upright along more "
+                    "of the cut. Without angles (the default) tools are tilted for these two strategies "
+                    "only.")] = Lean()
     walls_in_turn: Annotated[bool, Field(
         description="true: on a 3-axis machine with one access, a wall that is more than 10 times as high as thick is "
                     "finished on both sides in alternating bands of depth. It is a finding if more than 10 times its "

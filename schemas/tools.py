@@ -42,8 +42,8 @@ class Tool(WireModel):
     id: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}$", description="Id of the tool.",
                              examples=["T1"])]
     number: Annotated[Count | None, Field(
-        ge=1, le=99999, description="T and H word of the program. Default: the digits of the id where they are unique, "
-                                    "otherwise the position in the list.")] = None
+        ge=1, le=99999, description="Tool number in programs, in T and H words. Default: the digits of the id if they "
+                                    "are unique, otherwise the position in the list.")] = None
     kind: Annotated[ToolKind, Field(description="Shape of the cutting end. tapered_ball and barrel are not available "
                                                 "yet.")]
     diameter_mm: Annotated[Length, Field(ge=0.01, description="Diameter of the cutting part, mm, from 0.01.")]
@@ -83,11 +83,11 @@ class Tool(WireModel):
         gt=0, le=1e6, description="Tool life, in minutes of cutting. The program stops for a fresh cutter between two "
                                   "passes before this time is used up. null: tool life is not counted.")] = None
     spindle_rpm: Annotated[Number | None, Field(
-        ge=1, le=1e6, description="Spindle speed of all its steps, 1/min, at most max_rpm and machine.max_rpm. null: "
-                                  "computed from the material.")] = None
+        ge=1, le=1e6, description="Spindle speed of all workingsteps of the tool, 1/min, at most max_rpm and "
+                                  "machine.max_rpm. null: computed from the material.")] = None
     feed_mm_min: Annotated[Number | None, Field(
-        ge=0.1, le=1e6, description="Cutting feed of all its steps, mm/min, at most machine.max_feed_mm_min. null: "
-                                    "computed from material, flutes and speed.")] = None
+        ge=0.1, le=1e6, description="Cutting feed of all workingsteps of the tool, mm/min, at most "
+                                    "machine.max_feed_mm_min. null: computed from material, flutes and speed.")] = None
     plunge_feed_mm_min: Annotated[Number | None, Field(
         ge=0.1, le=1e6, description="Downward feed into stock, mm/min: the feed of a plunge, and the downward part of "
                                     "the feed on ramps and helices. At most machine.max_feed_mm_min. null: 0.3 of the "

@@ -60,11 +60,11 @@ class AccessFacts(ReportModel):
 class Rejection(ReportModel):
     """A strategy or tool that was considered and rejected."""
 
-    reason: str
+    reason: Annotated[str, Field(description="Why it was rejected, in words.")]
     strategy: str | None = None
     tool: str | None = None
-    value: Any = None
-    limit: Any = None
+    value: Annotated[Any, Field(description="Value that decided, in the unit named in reason.")] = None
+    limit: Annotated[Any, Field(description="Value of the choice that was made instead, or the allowed value.")] = None
 
 
 class SideProfile(ReportModel):
@@ -104,11 +104,11 @@ class ZoneFacts(ReportModel):
     profile: Annotated[str | None, Field(description="Profile type C1 to C10 of the most complex side; null: straight, "
                                                      "or no wall.")] = None
     level: Annotated[Level | None, Field(
-        description="Complexity of the profile (not of the height); null: no wall.")] = None
+        description="Complexity of the profile; null: no wall. The form level is something else.")] = None
     profiles: Annotated[list[SideProfile], Field(description="Profiles of the wall sides in this zone.")] = []
     open: Annotated[bool | None, Field(
-        description="true: over nearly all of the zone the tool can leave the part sideways at the level of its "
-                    "passes. false: walls or connections close the zone.")] = None
+        description="true: from nearly all of the zone the tool can leave the part sideways, at the height of the "
+                    "pass. false: walls or connections are in the way.")] = None
     region: Annotated[str | None, Field(
         description="Region of the part: a channel (H), wall (W) or connection (C), with 'over', 'under' or a piece "
                     "number; or top, floor, "
@@ -130,7 +130,9 @@ class ZoneFacts(ReportModel):
     cutting_plane_mm: Annotated[float | None, Field(
         description="Height along the axis, mm, below which the tool is not used.")] = None
     area_mm2: float | None = None
-    strategy: str | None = None
+    strategy: Annotated[str | None, Field(
+        description="Strategy that finishes the zone. In zones.json, and where no pass is planned, it is the usual one "
+                    "of the form.")] = None
     rejected: Annotated[list[Rejection], Field(
         description="Tools and strategies that were considered and rejected.")] = []
 
@@ -151,7 +153,9 @@ class CuttingPlane(ReportModel):
     z_mm: Annotated[float, Field(description="Height along the access direction, mm.")]
     region: str
     tool: Annotated[str | None, Field(description="Id of the tool; null: every tool of the access.")] = None
-    reason: str
+    reason: Annotated[str, Field(
+        description="neck: shank or holder would collide below. neck, moved above a connection. between A1 and A2: the "
+                    "two accesses share the region.")]
 
 
 class Place(ReportModel):
@@ -217,7 +221,7 @@ class Proposal(ReportModel):
     emptied_mm2: Annotated[float, Field(description="Area of the remainder that the proposed tools cut, mm2.")]
     stays_mm2: Annotated[dict[str, float], Field(
         description="Area by reason, mm2. undercut, fixture, sharp corner, pass: as in remainder. slender: only a neck "
-                    "longer than 20 diameters reaches it. too little: the area is not worth a tool.")]
+                    "longer than 20 diameters reaches it. too little: the area is too small to justify a tool.")]
 
 
 class Zones(ReportModel):
