@@ -32,10 +32,10 @@ class Machine(WireModel):
                     "and then Rx(A) or Ry(B), as LinuxCNC's xyzac-trt does. A head turns the tool by Rx(A) or Ry(B) "
                     "and then Rz(C).")] = None
     iso_axes: Annotated[list[Literal["A", "B", "C"]], Field(
-        max_length=2, description="Letters of the table axes that follow ISO 841: at a positive angle the tool turns "
-                                  "right-handed as seen from the table, so the table itself turns left-handed. Any "
-                                  "other table axis turns the table right-handed, as in LinuxCNC. This holds for "
-                                  "planned programs, verified programs and rotary_deg.")] = []
+        max_length=2, description="Letters of the table axes that follow ISO 841. At a positive angle of such an axis "
+                                  "the tool turns right-handed as seen from the table, so the table itself turns "
+                                  "left-handed. Any other table axis turns the table right-handed, as in LinuxCNC. "
+                                  "This holds for planned programs, verified programs and rotary_deg.")] = []
     tcp: Annotated[bool, Field(
         description="true: the control keeps the tool tip during rotary moves. false: programs contain positions of "
                     "the linear joints, and pivots_mm is required. No effect on a 3-axis machine. Verified programs "
@@ -68,9 +68,9 @@ class Machine(WireModel):
                     "STAY). false: they are in the setup frame. M128 keeps the tip in both cases.")] = False
     siemens_cycle800: Annotated[str | None, Field(
         max_length=32, pattern=r"^[A-Za-z0-9_]*$",
-        description="Name of the swivel data record on siemens, empty if the machine has only one: workingsteps with a "
-                    "fixed tool axis are in a plane of CYCLE800 (direction 0: no axis moves). null: they are in the "
-                    "setup frame. TRAORI keeps the tip in both cases.")] = None
+        description="On siemens: name of the swivel data record, empty if the machine has only one. Workingsteps with "
+                    "a fixed tool axis are then in a plane of CYCLE800 (direction 0: no axis moves). null: they are in "
+                    "the setup frame. TRAORI keeps the tip in both cases.")] = None
     arcs: Annotated[bool, Field(
         description="true: programs contain arcs and helices in the XY plane, and longer straight moves. They stay "
                     "within half of quality.chordal_tolerance_mm of the planned path; the plan uses the other half. "
@@ -99,12 +99,14 @@ class Machine(WireModel):
                                   "computed with it. null: no limit; rapids are timed with 7200. Leave it null on a "
                                   "3-axis machine.")] = None
     pivots_mm: Annotated[list[Triple] | None, Field(
-        min_length=1, max_length=2,
-        description="Pivots of the rotary axes, mm, in the frame of the program with both axes at 0. table-table: a "
-                    "point on the tilting axis and one on the turning axis. head-table: [0, 0, distance from the "
-                    "spindle face up to the swivel] and a point on the turning axis. head-head: only [0, 0, distance]. "
-                    "null: the travel of the linear axes is not checked, and programs that turn the axes away from 0 "
-                    "without tool centre point control are refused. Leave it null on a 3-axis machine.")] = None
+        min_length=1, max_length=2, description="Pivots of the rotary axes, mm, in the frame of the program with both "
+                                                "axes at 0. table-table: a point on the tilting axis and one on the "
+                                                "turning axis. head-table: [0, 0, distance from the spindle face up to "
+                                                "the swivel] and a point on the turning axis. head-head: only [0, 0, "
+                                                "distance]. null: the travel of the linear axes is not checked. A "
+                                                "program that turns the axes away from 0 without tool centre point "
+                                                "control then gives an error. Leave it null on a 3-axis "
+                                                "machine.")] = None
     max_rpm: Annotated[Number | None, Field(
         ge=1, le=1e6, description="Highest spindle speed, 1/min. null: at most 18000 in plans; in verified programs "
                                   "only the limits of the tools apply.")] = None

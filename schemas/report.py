@@ -159,8 +159,8 @@ class Caution(ReportModel):
                     "support: thin walls are finished without support; measured is the free height in multiples of the "
                     "thickness. tool_life: a tool needs more than one cutter, or one workingstep outlasts a cutter. "
                     "center_cutting: a tool that does not cut to its centre ramps into stock. upright: a zone should "
-                    "be cut with a tilted tool, but the tool is upright along half of the cut or more; measured is the "
-                    "length cut upright, mm.")]
+                    "be cut with a tilted tool, but the tool is upright along more than half of the cut, or all of it. "
+                    "Then measured is the length cut upright, mm.")]
     subjects: Annotated[list[str], Field(description="Ids of tools, workingsteps, zones or walls.")]
     message: str
     measured: Annotated[float | None, Field(description="Measured value, in the unit named in message. limit has the "

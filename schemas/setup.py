@@ -66,9 +66,9 @@ class Access(WireModel):
     id: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9]{0,15}$", description="Id of the access.")] = "A1"
     direction: Annotated[Triple, Field(
         description="Tool axis, from tool tip to spindle; any length above zero. On a 3-axis machine each access has "
-                    "its own program in its own frame: Z is this direction, and X is the X axis of the setup frame "
-                    "projected perpendicular to Z. On a 5-axis machine one program in the setup frame serves all "
-                    "accesses.")] = [0.0, 0.0, 1.0]
+                    "its own program in its own frame. Z of this frame is this direction; its X is the X axis of the "
+                    "setup frame, projected perpendicular to Z. On a 5-axis machine one program in the setup frame "
+                    "serves all accesses.")] = [0.0, 0.0, 1.0]
     work_offset: Annotated[str, Field(pattern=r"^G5(4|5|6|7|8|9(\.[123])?)$", description="Work offset, G54 to G59, "
                                       "G59.1 to G59.3.")] = "G54"
 
@@ -104,7 +104,7 @@ class Stock(WireModel):
         description="Corners of a box blank in the setup frame, mm; null: the bounding box of the part, enlarged by "
                     "margin_mm.")] = None
     cylinder_mm: Annotated[Cylinder | None, Field(
-        description="A cylinder blank along Z of the setup frame, mm; null: around the bounding box of the part, "
+        description="A cylinder blank along Z of the setup frame, mm. null: around the bounding box of the part, "
                     "enlarged by margin_mm at the side and on top.")] = None
     step_file: Annotated[str | None, Field(
         min_length=1, max_length=1000, pattern=r"^[^\x00-\x1f\x7f]*$",
@@ -154,8 +154,8 @@ class Quality(WireModel):
     chordal_tolerance_mm: Annotated[Number, Field(
         ge=1e-4, le=1, description="Largest distance from path to surface along a pass, mm; from 0.0001.")] = 0.002
     gouge_tolerance_mm: Annotated[Number, Field(
-        ge=1e-3, le=1, description="Deepest cut into the part that is not a finding, mm; at least 0.001, since the "
-                                   "mesh of the part must be finer than this tolerance.")] = 0.01
+        ge=1e-3, le=1, description="Deepest cut into the part that is not a finding, mm. At least 0.001, since the "
+                                   "mesh of the part must be finer.")] = 0.01
     stock_allowance_mm: Annotated[Number, Field(
         ge=0, le=50, description="Material left on the part on purpose, mm.")] = 0.0
     coverage_min: Annotated[Number, Field(
@@ -198,19 +198,19 @@ class Operations(WireModel):
     pattern: Annotated[Literal["auto", "zigzag", "one_way", "spiral"], Field(
         description="Pattern of passes on shallow areas. auto: zigzag or spiral, whichever is shorter.")] = "auto"
     lean: Annotated[Lean, Field(
-        description="On a 5-axis machine with machine.simultaneous: ball and bull-nose tools are tilted by these "
-                    "angles from the normal of faces that are not level, so that the tool centre does not rub. Where "
-                    "the tilted tool would collide, its axis turns evenly to the nearest free axis, up to 45 degrees "
-                    "away. The tool stays upright on level faces and where no axis is free. Flank milling and "
-                    "curvature-matched passes come first where they are faster and the tool is not upright along more "
-                    "of the cut. Without angles (the default) tools are tilted for these two strategies "
+        description="Lead and tilt of ball and bull-nose tools, so that the tool centre does not rub. On a 5-axis "
+                    "machine with machine.simultaneous the tool is tilted by these angles from the normal of faces "
+                    "that are not level. Where it would collide, its axis turns evenly to the nearest free axis, up to "
+                    "45 degrees away. The tool stays upright on level faces and where no axis is free. Flank milling "
+                    "and curvature-matched passes come first where they are faster and the tool is not upright along "
+                    "more of the cut. Without angles (the default) tools are tilted for these two strategies "
                     "only.")] = Lean()
     walls_in_turn: Annotated[bool, Field(
-        description="true: on a 3-axis machine with one access, a wall that is more than 10 times as high as thick is "
-                    "finished on both sides in alternating bands of depth. It is a finding if more than 10 times its "
-                    "thickness stands unsupported where it is finished. On a 5-axis machine or with several accesses "
-                    "there are no bands, and this is a warning. false: no bands; you support such walls by other "
-                    "means, and the report has a warning.")] = True
+        description="true: on a 3-axis machine with one access, both sides of a thin wall are finished in alternating "
+                    "bands of depth. A thin wall is more than 10 times as high as thick. It is a finding if more than "
+                    "10 times its thickness stands unsupported where it is finished. On a 5-axis machine or with "
+                    "several accesses there are no bands, and this is a warning. false: no bands; you support such "
+                    "walls by other means, and the report has a warning.")] = True
 
     @model_validator(mode="after")
     def _check(self) -> Operations:

@@ -179,11 +179,11 @@ class Remainder(ReportModel):
                     "gap, corner: only a thinner or sharper cutter fits. sharp corner: no rotating tool fits. "
                     "not_in_program: only in a verification; the program does not work on the face.")]
     would_need: Annotated[dict[str, Any], Field(
-        description="The tool that would reach the area, in available sizes: kind, diameter_mm, corner_radius_mm, "
-                    "neck_length_mm, shank_diameter_mm, stickout_mm, like (the tool of the setup with the same holder) "
-                    "and share (of the area that it reaches). Or kind 'other access', 'other clamping' or 'other "
-                    "process'; the last has slenderness. With several accesses also access. Empty if no tool is needed "
-                    "or none would reach the area.")] = {}
+        description="The tool that would reach the area, in available sizes. It has kind, diameter_mm, "
+                    "corner_radius_mm, neck_length_mm, shank_diameter_mm and stickout_mm. like: the tool of the setup "
+                    "with the same holder. share: share of the area that it reaches. Or kind is 'other access', 'other "
+                    "clamping' or 'other process'; the last has slenderness. access: only with several accesses. Empty "
+                    "if no tool is needed or none would reach the area.")] = {}
     tool_at_hand: Annotated[str | None, Field(description="Reason pass: the tool of the setup that touches the area. "
                                                           "Reason fixture: the tool that would touch it without "
                                                           "fixtures.")] = None
