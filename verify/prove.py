@@ -57,10 +57,10 @@ from verify.surface.guard_points import (
     closer_points,
     closer_seeds,
     convex_edges,
-    gouge_depths,
     guard_notes,
     guard_samples,
 )
+from verify.surface.remains import Rays, Remains, depths_both_ways
 from verify.surface.removal import residual_on_normals
 from verify.surface.sample_scores import RAY_ERROR, face_proofs, proved_samples, zone_proofs
 from verify.surface.wall_support import supported
@@ -194,7 +194,7 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
     initial = stock_on_normals(points, normals, part.mesh.bounds, setup, reach)
     residual, mover = residual_on_normals(points, normals, initial, moves, tools, threads=threads,
                                           progress=lambda f: tell(0.1 + 0.7 * f))
-    left_out = 0
+    left_out, even = 0, len(points)
     near = np.flatnonzero((residual < -CLOSER_SHARE * setup.gouge_tolerance) & (mover >= 0))
     if len(near):
         tree = TriangleTree(part.mesh)
@@ -207,8 +207,9 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
         residual, mover = np.concatenate([residual, left]), np.concatenate([mover, by])
     deep = np.flatnonzero((residual < -setup.gouge_tolerance) & (mover >= 0))
     if len(deep):
-        residual[deep] = -gouge_depths(tree, points[deep], normals[deep], -residual[deep],
-                                       lambda f: tell(0.9 + 0.1 * f))
+        rays = Rays(points, normals, residual)
+        residual[deep] = -depths_both_ways(Remains(tree, moves, tools, threads), rays, deep, even,
+                                           setup.gouge_tolerance, lambda f: tell(0.9 + 0.1 * f))
     deep = deep[residual[deep] < -setup.gouge_tolerance - RAY_ERROR]
     out = _Cuts()
     out.notes = guard_notes(part.mesh, left_out)

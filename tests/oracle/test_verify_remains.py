@@ -1,0 +1,139 @@
+"""Distance of the surface that is gone to what is left: closed forms, and a dense cloud of what is left."""
+
+import math
+
+import numpy as np
+import pytest
+
+from geometry.mesh_queries.bvh import TriangleTree
+from tests.hand_parts import ball, blocks, prism, terraces, tool
+from verify.kernels.remains import CLOSE, SHARE
+from verify.moves import Moves
+from verify.surface.remains import Remains
+from verify.tool_axes import ToolAxes
+
+FLAT = tool(8.0, 0.0)
+FAR = 0.6
+
+
+def path(*tips, axes=None):
+    """Feed moves of tool 0 through tips."""
+    at = np.array(tips, float)
+    n = len(at) - 1
+    return Moves(at[:-1].copy(), at[1:].copy(), np.ones(n, bool), np.zeros(n, np.int32), axes)
+
+
+def agrees(found, true):
+    return true - 1e-9 <= found <= true * (1.0 + SHARE) + CLOSE
+
+
+@pytest.mark.parametrize("wide", [0.02, 0.1, 0.5, 1.0])
+def test_a_rib_that_is_gone_is_as_deep_as_it_was_high(wide):
+    mesh = terraces([0, 20, 20 + wide, 40 + wide], [0, 30], [[0.0, 4.0, 0.0]], -5.0)
+    left = Remains(TriangleTree(mesh), path((20, -10, 0), (20, 40, 0)), [FLAT])
+    top = np.array([[20 + 0.3 * wide, 15.0, 4.0], [20, 15.0, 2.5]])
+    assert left.gone(top, 0.5 * wide).all()
+    found = left.depths(top, np.full(2, 6.0))
+    assert agrees(found[0], 4.0)
+    assert 2.5 <= found[1] <= found[0]  # of a cell, the farthest is exact
+
+
+@pytest.mark.parametrize("short", [0.05, 0.7])
+@pytest.mark.parametrize("degrees", [3.6, 30.0])
+def test_an_edge_is_as_deep_as_it_was_shortened(degrees, short):
+    back, half = 12.0, math.radians(0.5 * degrees)
+    y = back * math.tan(half)
+    part = prism([(0.0, 0.0), (back, -y), (back, y)], [(0, 1, 2)], 6.0)
+    # the side of the flat stands at x = short and takes the edge away; the edge runs along Y at x = 0, z = 0
+    left = Remains(TriangleTree(part.mesh), path((short - 4.0, -20, -8.0), (short - 4.0, 20, -8.0)), [FLAT])
+    edge = np.array([[0.0, 1.0, 0.0]])
+    assert agrees(left.depths(edge, np.full(1, 3.0 * short))[0], short)
+
+
+def test_a_floor_that_is_drilled_through_is_gone_as_far_as_the_rim():
+    mesh = terraces([0, 40], [0, 40], [[0.05]], 0.0)
+    left = Remains(TriangleTree(mesh), path((20, 20, 5), (20, 20, -1)), [FLAT])
+    places = np.array([[20, 20, 0.05], [21.5, 20, 0.05], [25, 20, 0.05]])
+    assert left.gone(places, 0.03).tolist() == [True, True, False]
+    found = left.distances(places, np.full(3, 6.0))
+    assert agrees(found[0], 4.0) and agrees(found[1], 2.5) and found[2] <= CLOSE
+
+
+def test_a_finished_face_is_not_gone_and_no_search_is_lost_on_it():
+    # the flat cuts exactly along the floor and the side of the rib
+    mesh = terraces([0, 20, 21, 40], [0, 30], [[0.0, 4.0, 0.0]], -5.0)
+    left = Remains(TriangleTree(mesh), path((16, -10, 0), (16, 40, 0), (25, 40, 0), (25, -10, 0)), [FLAT])
+    x, z = np.meshgrid(np.linspace(20, 21, 9), np.linspace(0.1, 4, 9))
+    assert not left.gone(np.column_stack([x.ravel(), np.full(81, 15.0), z.ravel()]), 0.01).any()
+
+
+def test_where_nothing_is_left_the_bound_is_told():
+    mesh = terraces([0, 2], [0, 2], [[1.0]], 0.0)
+    left = Remains(TriangleTree(mesh), path((1, 1, -1), (1, 1.001, -1)), [FLAT])
+    assert left.depths(np.array([[1.0, 1.0, 1.0]]), np.full(1, 3.0))[0] == 3.0
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2, 3))])
+def test_distances_are_those_of_a_dense_cloud(seed):
+    rng = np.random.default_rng(seed)
+    mesh, body = blocks(seed), [ball(3.0), tool(4.0, 0.0), tool(4.0, 1.0), ball(2.0)][seed]
+    low, high = mesh.bounds
+    tips = rng.uniform(low, high + [0, 0, 2.0], (7, 3))
+    axes = None
+    if seed >= 2:  # axes that lean and turn
+        lean = rng.normal([0, 0, 3.0], 1.0, (7, 3))
+        lean /= np.linalg.norm(lean, axis=1)[:, None]
+        axes = ToolAxes.between(lean[:-1].copy(), lean[1:].copy())
+    moves = path(*tips, axes=axes)
+    left = Remains(TriangleTree(mesh), moves, [body])
+    at = rng.integers(0, len(mesh.faces), 8)
+    w = rng.dirichlet([1, 1, 1], 8)
+    places = np.einsum("ij,ijk->ik", w, mesh.triangles[at])
+    found = left.distances(places, np.full(8, FAR))
+    step = 0.06
+    grid = np.stack(np.meshgrid(*(np.arange(-FAR, FAR + 1e-9, step),) * 3, indexing="ij"), -1).reshape(-1, 3)
+    grid = grid[np.einsum("ij,ij->i", grid, grid) <= FAR**2]
+    away = np.linalg.norm(grid, axis=1)
+    order = np.argsort(away)
+    for place, value in zip(places, found, strict=True):
+        cloud = place + grid[order]
+        stands = of_part(mesh, cloud) & ~swept(moves, body, place, cloud)
+        true = away[order][np.argmax(stands)] if stands.any() else np.inf
+        if np.isinf(value):
+            assert true > FAR - 2.0 * step
+        else:  # a place of the cloud is no farther from what is left than its step allows
+            assert value <= true * (1.0 + SHARE) + CLOSE and value >= true - 2.0 * step
+
+
+def of_part(mesh, points):
+    """Terraces are closed from the base to the height over each place."""
+    out = np.zeros(len(points), bool)
+    up = mesh.normals[:, 2] > 0.5
+    for t in mesh.triangles[up]:
+        lo, hi = t[:, :2].min(axis=0), t[:, :2].max(axis=0)
+        out |= ((points[:, :2] >= lo) & (points[:, :2] <= hi)).all(axis=1) & (points[:, 2] <= t[0, 2]) \
+            & (points[:, 2] >= mesh.bounds[0][2])
+    return out
+
+
+def swept(moves, body, place, points):
+    """Points round a place inside the cutting part at one of the places 0.02 mm apart on its way."""
+    out, r = np.zeros(len(points), bool), body.corner_radius
+    near = math.hypot(body.radius, body.flute_length) + FAR
+    for m in range(len(moves)):
+        way = moves.end[m] - moves.start[m]
+        for s in np.linspace(0.0, 1.0, int(np.linalg.norm(way) / 0.02) + 2):
+            tip = moves.start[m] + s * way
+            axis = np.array([0.0, 0.0, 1.0])
+            if moves.axes is not None:
+                u, w, a = moves.axes.axis[m], moves.axes.about[m], moves.axes.angle[m] * s
+                axis = u * math.cos(a) + np.cross(w, u) * math.sin(a)
+            if np.linalg.norm(place - tip) > near:
+                continue
+            q = points - tip
+            h = q @ axis
+            rho = np.sqrt(np.maximum(np.einsum("ij,ij->i", q, q) - h * h, 0.0))
+            low = np.maximum(r - h, 0.0)
+            wide = body.radius - r + np.sqrt(np.maximum(r * r - low * low, 0.0))
+            out |= (h >= 0.0) & (h <= body.flute_length) & (rho <= wide) & (low <= r)
+    return out

@@ -1,0 +1,184 @@
+"""Depth of gouges from the surface that is gone to the material that is left.
+
+A gouge is measured both ways. ``verify.surface.guard_points.gouge_depths`` takes the removed places and their distance
+from the surface. That is never more than half the thickness of a rib, a floor or an edge, however much of it is gone.
+Here the places of the surface whose material is gone are taken, with their distance from what is left. The larger of
+the two is the Hausdorff distance between the part and what is left of it [Hausdorff1914].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from geometry.mesh import F64
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.tool_body import ToolBody
+from verify.kernels.remains import CLOSE, SHARE, distances_left
+from verify.material.point_tree import curve_keys
+from verify.material.tiles import run_tiles
+from verify.moves import BOW, Moves, Progress, cutter_table
+from verify.progress import Report, silent
+from verify.surface.guard_points import gouge_depths
+from verify.tool_axes import ToolAxes
+
+WHOLE = 0.99  # of the way along a ray: a gouge that deep is measured by its ray
+BATCH = 64  # places of one call: near each other, so that few moves have to be looked through
+CELL = 5.0  # mm: of the places in such a cell only those are measured that may be the farthest
+APART = 0.05  # mm
+
+
+class Remains:
+    """What a program leaves of a part.
+
+    tree    : TriangleTree of the part, setup frame
+    moves   : Moves; tools : the tools their ``tool`` column refers to
+    threads : the result has the same bytes for any number
+    """
+
+    def __init__(self, tree: TriangleTree, moves: Moves, tools: Sequence[ToolBody], threads: int = 2) -> None:
+        self.tree, self.moves, self.threads = tree, moves, threads
+        self.cutters = cutter_table(tools)
+        self.reach = np.hypot(self.cutters[:, 0], self.cutters[:, 2])
+        axes = ToolAxes.upright(len(moves)) if moves.axes is None else moves.axes
+        self.axes = axes.arrays(BOW)
+        self.feeds = np.flatnonzero(moves.feed)
+
+    def distances(self, points: F64, within: F64, enough: float = 0.0, progress: Progress | None = None) -> F64:
+        """Distance of places to what is left of the part.
+
+        points : (n, 3) float64, mm, setup frame
+        within : (n,) float64, mm: inf is returned where nothing is left as near as that
+        enough : mm; what is nearer need not be measured any better
+
+        Returns (n,) float64, mm, too large by 1e-4 mm or 1 % at most. Films thinner than 1e-4 mm or 3 % of
+        their distance count as gone.
+        """
+        out = np.full(len(points), np.inf)
+        order = np.argsort(curve_keys(points), kind="stable")
+        a, b = self.moves.start[self.feeds], self.moves.end[self.feeds]
+        middle, half = 0.5 * (a + b), 0.5 * np.linalg.norm(b - a, axis=1) + self.reach[self.moves.tool[self.feeds]]
+        arrays, normals = self.moves.arrays, self.tree.mesh.normals
+
+        def job(rows: NDArray[np.int64]) -> Callable[[], object]:
+            def work() -> None:
+                low, high = points[rows].min(axis=0), points[rows].max(axis=0)
+                far = half + BOW + np.sqrt(3.0) * float(within[rows].max())
+                chosen = self.feeds[((middle > low - far[:, None]) & (middle < high + far[:, None])).all(axis=1)]
+                found = np.empty(len(rows))
+                distances_left(np.ascontiguousarray(points[rows]), within[rows], self.tree.arrays, normals, arrays,
+                               self.axes, self.cutters, self.reach, chosen, enough, found)
+                out[rows] = found
+            return work
+
+        run_tiles([job(order[i:i + BATCH]) for i in range(0, len(order), BATCH)], self.threads, progress)
+        return out
+
+    def gone(self, points: F64, tolerance: float, progress: Progress | None = None) -> NDArray[np.bool_]:
+        """(n,) bool: places with nothing left of the part as near as ``tolerance`` mm.
+
+        points : (n, 3) float64, mm, setup frame
+        """
+        return np.isinf(self.distances(points, np.full(len(points), tolerance), tolerance, progress))
+
+    def depths(self, points: F64, bound: F64, progress: Progress | None = None) -> F64:
+        """Distance of places to what is left, measured for the farthest of each cell of 5 mm.
+
+        points : (n, 3) float64, mm, setup frame
+        bound  : (n,) float64, mm, what the distance cannot exceed; see ``bounds``
+
+        Returns (n,) float64, mm. The farthest of a cell is right within 2 %. Others of a cell may have their bound, or
+        the distance of the farthest where that is less: the distance changes by no more than the way between places.
+        """
+        _, group = np.unique(np.floor(points / CELL).astype(np.int64), axis=0, return_inverse=True)
+        group, bound = group.reshape(-1), bound.copy()
+        known, most = np.zeros(len(points), np.bool_), np.zeros(group.max(initial=-1) + 1)
+        while (rows := np.flatnonzero(~known & (bound > most[group] * (1.0 + 2.0 * SHARE) + CLOSE))).size:
+            rows = rows[np.lexsort((rows, -bound[rows], group[rows]))]
+            rows = rows[np.unique(group[rows], return_index=True)[1]]
+            found = np.minimum(self.distances(points[rows], bound[rows] * (1.0 + SHARE) + CLOSE), bound[rows])
+            known[rows], bound[rows] = True, found
+            np.maximum.at(most, group[rows], found)
+            at = np.full(len(most), -1)
+            at[group[rows]] = np.arange(len(rows))
+            other = np.flatnonzero(~known & (at[group] >= 0))
+            measured = at[group[other]]
+            away = np.linalg.norm(points[other] - points[rows[measured]], axis=1)
+            bound[other] = np.minimum(bound[other], found[measured] + away)
+            if progress is not None:
+                progress(float(known.mean()))
+        return np.minimum(bound, most[group])
+
+
+def bounds(points: F64, left: F64, largest: float) -> F64:
+    """Distances of places to the nearest of places that are left of the part: what ``Remains.depths`` starts from.
+
+    points  : (n, 3) float64, mm, setup frame
+    left    : (m, 3) float64, mm, setup frame; m may be 0
+    largest : mm, returned where m is 0
+
+    Returns (n,) float64, mm.
+    """
+    if len(left) == 0:
+        return np.full(len(points), largest)
+    return np.minimum(np.asarray(cKDTree(left).query(points)[0], dtype=np.float64), largest)
+
+
+class Rays(NamedTuple):
+    """Places of the surface and what the program left on their normals, setup frame.
+
+    points, normals : (n, 3) float64, mm and unit, normals out of the material
+    residual        : (n,) float64, mm, negative where the part is cut
+    """
+
+    points: F64
+    normals: F64
+    residual: F64
+
+
+def depths_both_ways(left: Remains, rays: Rays, deep: NDArray[np.int64], even: int, tolerance: float,
+                     tell: Report = silent) -> F64:
+    """Depth of gouges: removed places to the surface, or surface that is gone to what is left [Hausdorff1914].
+
+    left      : Remains
+    rays      : Rays
+    deep      : (k,) int64, index, the rays on which the part is cut, in rising order
+    even      : count of rays that lie evenly over the part. Those after them are close round places that are cut. They
+                are asked for the second way only where none of the others in their cell is gone, one in 0.05 mm
+    tolerance : mm; where something is left as near as that, only the first way counts
+    tell      : called with the share done, 0 to 1; an exception from it ends the work
+
+    Returns (k,) float64, mm: the larger of the two, as exact as ``gouge_depths`` and ``Remains.depths``.
+    """
+    points, along = rays.points[deep], -rays.residual[deep]
+    depth = gouge_depths(left.tree, points, rays.normals[deep], along, lambda f: tell(0.3 * f))
+    whole = depth >= WHOLE * along  # what is left begins at the end of the ray
+    if whole.all():
+        return depth
+    ends = np.ones(len(rays.points), np.bool_)
+    ends[deep[~whole]] = False
+    there = (rays.points + np.minimum(rays.residual, 0.0)[:, None] * rays.normals)[ends]
+    size = float(np.linalg.norm(np.diff(left.tree.mesh.bounds, axis=0)))
+
+    def second(rows: NDArray[np.int64], first: float, last: float) -> NDArray[np.int64]:
+        bound = bounds(points[rows], there, size)
+        rows, bound = rows[bound > tolerance], bound[bound > tolerance]
+        gone = left.gone(points[rows], tolerance, lambda f: tell(first + 0.5 * (last - first) * f))
+        rows, bound = rows[gone], bound[gone]
+        away = left.depths(points[rows], bound, lambda f: tell(0.5 * (first + last) + 0.5 * (last - first) * f))
+        depth[rows] = np.maximum(depth[rows], away)
+        return rows
+
+    found = second(np.flatnonzero(~whole & (deep < even)), 0.3, 0.7)
+    rows = np.flatnonzero(~whole & (deep >= even))
+    if len(rows):
+        cells = np.floor(points / CELL).astype(np.int64)
+        known = {tuple(c) for c in np.unique(cells[found], axis=0).tolist()}
+        rows = rows[[tuple(c) not in known for c in cells[rows].tolist()]]
+        rows = rows[np.sort(np.unique(np.floor(points[rows] / APART).astype(np.int64), axis=0, return_index=True)[1])]
+        second(rows, 0.7, 1.0)
+    return depth
