@@ -85,9 +85,9 @@ class Machine(WireModel):
                                                 "first. null: no limit. Leave it null on a 3-axis machine.")] = None
     table_z_mm: Annotated[BoundedNumber | None, Field(
         description="Height of the table, or of the fixture under the part, mm, in the setup frame with the rotary "
-                    "axes at 0. Tools stay clearance_mm.rapid above it. If the spindle nose is wider than the holder, "
-                    "add it as the last segment of tools[].holder. null: tilted tools stay above the bottom of the "
-                    "blank. Leave it null on a 3-axis machine.")] = None
+                    "axes at 0. Tools stay clearance_mm.rapid above it; on a 3-axis machine a tool that cuts may come "
+                    "down to it. If the spindle nose is wider than the holder, add it as the last segment of "
+                    "tools[].holder. null: tilted tools stay above the bottom of the blank.")] = None
     orientations: Annotated[Literal["find", "given"], Field(
         description="find: a 5-axis machine also uses other tool axes for areas that the accesses of the setup do not "
                     "reach. given: it uses those accesses only. No effect on a 3-axis machine.")] = "find"
@@ -145,7 +145,7 @@ class Machine(WireModel):
             if self.iso_axes:
                 raise ValueError("machine.iso_axes belongs to a 5-axis machine; leave it empty, "
                                  "or set machine.kind '5-axis'")
-            for name in ("kinematics", "table_z_mm", "rotary_deg", "rotary_rate_deg_min", "pivots_mm"):
+            for name in ("kinematics", "rotary_deg", "rotary_rate_deg_min", "pivots_mm"):
                 if getattr(self, name) is not None:
                     raise ValueError(f"machine.{name} belongs to a 5-axis machine; leave it null, "
                                      "or set machine.kind '5-axis'")

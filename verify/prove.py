@@ -17,7 +17,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.tool_body import ToolBody
 from verify.blank.blank import stock_on_normals
-from verify.checks.program_sequence import FramedProgram, Given, check_numbers, moves_of, read_all, slides_of
+from verify.checks.program_sequence import FramedProgram, Given, check_numbers, counted, moves_of, read_all, slides_of
 from verify.checks.repeated_passes import repeat_findings
 from verify.checks.table_clearance import table_findings
 from verify.findings import (
@@ -257,7 +257,7 @@ def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, readings: Seque
     read = [r.program for r in readings]
     took = np.concatenate([minutes_of(p, setup) for p in read]) if read else np.zeros(0)
     cut_length = np.linalg.norm(moves.end - moves.start, axis=1)[run.cut]
-    known = np.isin(np.concatenate([p.tool for p in read]), source.tool) if read else np.zeros(0, np.bool_)
+    known = counted(readings, np.unique(source.tool).tolist())
     minutes = took[known][run.cut]
     used = source.tool[run.cut]
     proved = proved_samples(cuts.residual, setup)

@@ -66,7 +66,7 @@ def proof_setup(job: JobPart, view: View | ProofFrame, *, foreign: bool = False)
     inputs = job.inputs
     c, q, machine = inputs.clearances, inputs.quality, inputs.machine
     # the height of the table is known in the setup frame only, so a proof in an oblique frame leaves the table out
-    tabled = (inputs.turns and np.array_equal(view.rotation, np.eye(3))
+    tabled = ((inputs.turns or machine.table_z_mm is not None) and np.array_equal(view.rotation, np.eye(3))
               and not (foreign and machine.table_z_mm is None))
     cylinder, upwards = job.blank.proof_cylinder(view.rotation)
     return ProofSetup(

@@ -92,10 +92,11 @@ def _low_stops(p: Program, bounds: F64, setup: ProofSetup) -> Iterator[Finding]:
     """Stops at which part, blank or fixtures reach higher along the tool axis than the tip."""
     for stop in p.stops:
         axis = np.array(stop.axis)
-        top = _top_along(axis, bounds, setup)
+        top = _top_along(axis, bounds, setup) + (setup.clearance_rapid if stop.room else 0.0)
         at = float(np.where(axis != 0.0, np.array(stop.tip) * axis, 0.0).sum())
         if at < top - 1e-6:
-            along = f"Z{at:.3f}, below the top of stock and fixtures (Z{top:.3f})" if stop.axis[2] == 1.0 else \
+            what = "the top of stock and fixtures" + (" and the rapid clearance" if stop.room else "")
+            along = f"Z{at:.3f}, below {what} (Z{top:.3f})" if stop.axis[2] == 1.0 else \
                 f"{at:.3f} mm along its axis, where stock and fixtures reach {top:.3f} mm"
             yield Finding(FindingKind.PROGRAM, p.name, stop.line, None, None, None, top - at, top,
                           f"{stop.event} with T{stop.tool} at {along}: retract the tool first")
@@ -103,8 +104,8 @@ def _low_stops(p: Program, bounds: F64, setup: ProofSetup) -> Iterator[Finding]:
 
 def limit_findings(read: Sequence[Program], setup: ProofSetup) -> list[Finding]:
     """Findings of exceeded limits: travel, angles, rates, feed, spindle speed; one per program and limit."""
-    return [found for p in read for found in (*_travel(p, setup), *_angles(p, setup), *_rates(p, setup),
-                                              *_feeds(p, setup), *_speeds(p, setup))]
+    return [found for p in read for found in (*_travel(p, setup), *_places(p, setup), *_angles(p, setup),
+                                              *_rates(p, setup), *_feeds(p, setup), *_speeds(p, setup))]
 
 
 def joints_of(p: Program, setup: ProofSetup) -> tuple[F64, F64] | None:
@@ -155,6 +156,19 @@ def _travel(p: Program, setup: ProofSetup) -> Iterator[Finding]:
             yield _finding(FindingKind.LIMIT, p, far, span - limit, limit,
                            f"{subject} over {span:.3f} mm in {'XYZ'[axis]}, from {ends}{more}; the travel of the "
                            f"machine is {limit:g} mm")
+
+
+def _places(p: Program, setup: ProofSetup) -> Iterator[Finding]:
+    """Coordinates of the machine (G53) that lie farther from its zero than its whole travel."""
+    if setup.travel is None:
+        return
+    for axis, limit in enumerate(np.asarray(setup.travel, dtype=np.float64).tolist()):
+        beyond = [(abs(value) - limit, line, value) for line, k, value in p.places if k == axis]
+        over, line, value = max(beyond, default=(0.0, 0, 0.0), key=lambda b: b[0])
+        if over > 1e-6:
+            yield Finding(FindingKind.LIMIT, p.name, line, None, None, None, over, limit,
+                          f"{'XYZ'[axis]}{value:g} in coordinates of the machine (G53) is {over:.3f} mm beyond its "
+                          f"travel of {limit:g} mm", sum(b[0] > 1e-6 for b in beyond))
 
 
 def _angles(p: Program, setup: ProofSetup) -> Iterator[Finding]:

@@ -5,7 +5,7 @@ Arrays are float64, mm or dimensionless for directions.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +27,7 @@ from verify.program_reading import read_one
 from verify.progress import Report, StageProgress
 from verify.tool_axes import ToolAxes
 
+SAME = 1e-9  # mm: a move that is no longer moves nothing
 Given = NcProgram | tuple[str, str]
 
 
@@ -125,13 +126,13 @@ def _box_round(box: F64, turn: F64) -> F64:
 
 
 def moves_of(read: Sequence[FramedProgram], tools: Sequence[ToolBody]) -> tuple[Moves, Source]:
-    """Moves of all programs, one after the other. Moves without a tool are left out; the reader remarks them.
+    """Moves of all programs, one after the other. Moves without a tool, and of no length, are left out.
 
     tools : of the moves; ``Moves.tool`` is the place in this sequence
     """
     programs = [r.program for r in read]
     row = {t.number: i for i, t in enumerate(tools)}
-    known = _known(read, tools)
+    known = counted(read, row)
     number = np.concatenate([np.zeros(0, np.int32), *(p.tool for p in programs)])[known]
     kind = np.concatenate([np.zeros(0, np.int8), *(p.kind for p in programs)])[known]
     line = np.concatenate([np.zeros(0, np.int32), *(p.line for p in programs)])[known]
@@ -162,13 +163,24 @@ def slides_of(read: Sequence[FramedProgram], tools: Sequence[ToolBody], setup: P
         if setup.kinematics is not None and r.program.poses is not None:
             rows = setup.kinematics.slides(r.program.poses.start_turn)
         out.append(r.here(rows))
-    return np.concatenate(out)[_known(read, tools)]
+    return np.concatenate(out)[counted(read, [t.number for t in tools])]
 
 
-def _known(read: Sequence[FramedProgram], tools: Sequence[ToolBody]) -> NDArray[np.bool_]:
-    """(m,) bool: moves with one of the tools in the spindle."""
-    number = np.concatenate([np.zeros(0, np.int32), *(r.program.tool for r in read)])
-    return np.isin(number, [t.number for t in tools])
+def counted(read: Sequence[FramedProgram], numbers: Collection[int]) -> NDArray[np.bool_]:
+    """Which moves of programs the proof counts: those with a tool of these T numbers that have a length or turn.
+
+    A move of no length from a known place, as that of G28 with the place where the tool is, moves nothing.
+
+    Returns (m,) bool.
+    """
+    out = [np.zeros(0, np.bool_)]
+    for p in (r.program for r in read):
+        still = np.asarray((np.abs(p.end - p.start) <= SAME).all(axis=1))
+        if p.poses is not None:
+            still &= (p.poses.start_turn == p.poses.end_turn).all(axis=1)
+        still[p.unknown[:, 0]] = False
+        out.append(np.isin(p.tool, list(numbers)) & ~still)
+    return np.concatenate(out)
 
 
 def _axes(r: FramedProgram, at_start: bool) -> F64:

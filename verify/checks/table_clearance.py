@@ -16,7 +16,9 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
+from verify.kernels.clash import ASIDE
 from verify.model import Finding, FindingKind, ProofSetup
+from verify.program.move_kinds import FEED
 from verify.program.program import Program
 from verify.tool_bodies import Bodies
 
@@ -29,27 +31,31 @@ def table_findings(read: Sequence[Program], tools: Sequence[ToolBody], setup: Pr
     """One finding for each program whose tools come nearer to the table than the rapid clearance.
 
     An assumed table height (``setup.table_known`` false) is checked for tilted tools only: upright tools pass beside
-    the part as on a machine of three axes.
+    the part. On a machine of three axes a tool that cuts may come down to the table.
     """
-    if setup.table is None or setup.kinematics is None:
+    if setup.table is None or (setup.kinematics is None and not setup.table_known):
         return []
-    return [f for p in read for f in _of(p, tools, setup, setup.table + setup.clearance_rapid)]
+    return [f for p in read for f in _of(p, tools, setup, setup.table)]
 
 
-def _of(p: Program, tools: Sequence[ToolBody], setup: ProofSetup, limit: float) -> Iterator[Finding]:
+def _of(p: Program, tools: Sequence[ToolBody], setup: ProofSetup, table: float) -> Iterator[Finding]:
     if p.poses is None and not setup.table_known:
         return
     low = lowest_places(p, tools, setup, leaning=not setup.table_known)
-    bad = np.flatnonzero(low < limit - ROUNDING)
+    way = p.end - p.start
+    lifts = (way[:, 2] > 0.0) & (np.hypot(way[:, 0], way[:, 1]) <= ASIDE)  # it leaves where it stands
+    room = np.where(((p.kind == FEED) | lifts) & (setup.kinematics is None), 0.0, setup.clearance_rapid)
+    short = table + room - low
+    bad = np.flatnonzero(short > ROUNDING)
     if not len(bad):
         return
-    m = int(bad[np.argmin(low[bad])])
+    m = int(bad[np.argmax(short[bad])])
     floor = "the table" if setup.table_known else "the bottom of the blank (the height of the table is not given)"
     at = p.end[m]
+    stay = f"must stay {room[m]:g} mm above" if room[m] else "must not come below"
     yield Finding(FindingKind.COLLISION, p.name, int(p.line[m]), None, None, (float(at[0]), float(at[1]), float(at[2])),
-                  float(limit - low[m]), float(limit),
-                  f"T{p.tool[m]} comes down to Z{low[m]:.3f}; it must stay {setup.clearance_rapid:g} mm above {floor} "
-                  f"at Z{setup.table:.3f}", len(bad))
+                  float(short[m]), float(table + room[m]),
+                  f"T{p.tool[m]} comes down to Z{low[m]:.3f}; it {stay} {floor} at Z{table:.3f}", len(bad))
 
 
 def lowest_places(p: Program, tools: Sequence[ToolBody], setup: ProofSetup, *, leaning: bool) -> F64:

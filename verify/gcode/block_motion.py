@@ -26,6 +26,7 @@ from verify.program.move_log import MAX_MOVES_A_BLOCK
 from verify.program.program import NAN
 from verify.program.turn_subdivision import TIP
 
+WAY_HOME = "a move of X or Y to a fixed place of the machine"
 _EXITS = {74: HoleExit.FEED_TO_CLEAR, 84: HoleExit.FEED_TO_CLEAR, 85: HoleExit.FEED_TO_CLEAR, 89: HoleExit.FEED}
 
 
@@ -110,6 +111,7 @@ class BlockMotion(FrameWords):
             self.log.remark("machine_height", f"G53 Z{axes[2]:g} goes to a height that the proof does not know; only "
                             "Z0 (home) counts as above everything", self.log.line)
         named = [a is not None for a in axes]
+        self.log.places.extend((self.log.line, k, a * s.scale) for k, a in enumerate(axes) if a is not None)
         if s.relative and (any(named) or turn is not None):
             self.log.remark("machine_relative", "G53 in incremental coordinates (G91), which controls read "
                             "differently", self.log.line)
@@ -136,9 +138,12 @@ class BlockMotion(FrameWords):
         if not any(named):
             return None if turn is None else self._line_to(list(s.position), RAPID, NAN, turn)
         if not math.isnan(s.position[2]):
-            if named[0] or named[1]:
-                self.log.remark("machine_way", f"X or Y moves to a fixed place of the machine from Z{s.position[2]:g}; "
-                                "the proof does not know that path: send Z home first", self.log.line)
+            if (named[0] or named[1]) and s.tilted:
+                self.log.remark("machine_way", f"X or Y moves to a fixed place of the machine from Z{s.position[2]:g} "
+                                "with a rotary axis off 0; the proof does not know that path: send Z home first",
+                                self.log.line)
+            elif named[0] or named[1]:
+                self.stop(WAY_HOME, room=True)
             if turn is not None and turn != s.turn:
                 self.log.remark("machine_turn", "a rotary axis turns during a move to a fixed place of the machine "
                                 f"from Z{s.position[2]:g}; the proof does not know that path: send Z home first",

@@ -303,6 +303,9 @@ class ContourMotion(Origins):
         level = target[2] == target[2] and was[2] != target[2]
         if kind == RAPID and s.offset is None and s.tool > 0 and level:
             self.log.remark("rapid_offset", f"Z moves with the length offset off (no G43 H{s.tool})", s.tool)
+        if kind == RAPID and s.offset not in (None, s.tool) and s.tool > 0 and level and not target[2] > was[2]:
+            self.log.remark("rapid_stale", f"Z comes down in a rapid with length offset H{s.offset} and tool T{s.tool}",
+                            (s.offset, s.tool))
         known = not any(math.isnan(v) for v in target)
         if s.parked and level and not known:
             self.log.remark("parked", "Z comes down at an X or Y of machine coordinates: program X and Y first",

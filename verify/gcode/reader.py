@@ -53,7 +53,10 @@ class Reader(BlockMotion):
             blocks = translated_blocks(lines, self.control, self)
         elif has_flow(text):
             blocks = Flow(lines, self).blocks()
-        percents = self._scan(_reported(blocks, len(lines), report))
+        seen = bytearray(len(lines) + 2)
+        percents = self._scan(_reported(blocks, len(lines), report), seen)
+        if self.s.ended:
+            self._name_unread(lines, seen)
         self._finish()
         self.stop("end of the program")
         self.pause("end of the program", self.s.tool)
@@ -74,7 +77,7 @@ class Reader(BlockMotion):
                        np.array(log.unknown, np.int64).reshape(-1, 2), tuple(log.stops), self.assumed, log.blend,
                        log.turned.minutes(np.linalg.norm(end - start, axis=1), feed),
                        log.turned.poses(len(table), self.machine), tuple(log.notes), speed, coolant, log.changes,
-                       dialect, log.unbounded, tuple(log.pauses), log.leaves)
+                       dialect, log.unbounded, tuple(log.pauses), log.leaves, tuple(log.places))
 
     def served(self, key: int | str) -> float:
         """A parameter that the control serves (``verify.gcode.flow.system_parameters``)."""
@@ -99,12 +102,25 @@ class Reader(BlockMotion):
         except BlockError as problem:
             self.log.error(str(problem), remedy=problem.remedy)
 
-    def _scan(self, blocks: Iterable[tuple[int, str]]) -> int:
-        """Run blocks with their lines; the fast path serves plain straight moves in the plain state only."""
+    def _name_unread(self, lines: list[str], seen: bytearray) -> None:
+        """Note the lines behind the end of the program that did not run."""
+        end = self.log.line
+        rest = [k for k in range(end + 1, len(lines) + 1)
+                if not seen[k] and (text := lines[k - 1].split("(")[0].split(";")[0].strip()) and text != "%"]
+        if rest:
+            self.log.note(f"line {end} ends the program; {len(rest)} lines from {rest[0]} to {rest[-1]} stand behind "
+                          "it and are not read")
+
+    def _scan(self, blocks: Iterable[tuple[int, str]], seen: bytearray) -> int:
+        """Run blocks with their lines; the fast path serves plain straight moves in the plain state only.
+
+        seen : (lines + 2,) set to 1 at the number of each line that ran
+        """
         s, log, fast, rows, full = self.s, self.log, straight(self.rotary), self.log.rows, Log.full
         percents = 0
         plain = begun = False
         for number, raw in blocks:
+            seen[number] = 1
             if plain and (m := fast(raw)):
                 g, x, y, z, *turns, f = m.groups()
                 if g is not None:

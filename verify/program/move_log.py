@@ -26,7 +26,7 @@ class Log:
 
     name : of the program
     line : 1-based number of the current line
-    speeds, unknown, stops, blend, leaves, changes, unbounded, pauses : as in ``Program``
+    speeds, unknown, stops, blend, leaves, changes, unbounded, pauses, places : as in ``Program``
     rows : latest moves as (start x, y, z, end x, y, z, kind, feed, tool, line), mm and mm/min; call ``flush`` at 65 536
     """
 
@@ -48,6 +48,7 @@ class Log:
         self.stops: list[StopPoint] = []
         self.blend = self.leaves = 0.0
         self.changes = 0
+        self.places: list[tuple[int, int, float]] = []
         self.unbounded = False
         self.pauses: list[Pause] = []
         self.turned = TurnLog()

@@ -27,9 +27,10 @@ class Remark:
 
 @dataclass(frozen=True)
 class StopPoint:
-    """Place where the program stops for a tool change or ends: line, event, tool in the spindle, its tip and axis.
+    """Place where the program stops for a tool change, ends or goes home: line, event, tool, its tip and axis.
 
     tip, axis : (3,) mm and unit, tip to spindle, setup frame; X and Y of the tip may be nan where the axis is +Z
+    room      : whether the tool goes on from there in a rapid, and has to keep its clearance
     """
 
     line: int
@@ -37,6 +38,7 @@ class StopPoint:
     tool: int
     tip: tuple[float, float, float]
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    room: bool = False
 
 
 @dataclass(frozen=True)
@@ -95,9 +97,10 @@ class Program:
     line    : (m,) int32, 1-based line of the source
     dwell   : s of G4 and drilling dwells
     speeds  : by T number, the highest S it turned at, 1/min, and the line
-    stops   : tool changes and the end, where their height is known
+    stops   : tool changes, the end, and ways to a fixed place of the machine, where their height is known
     assumed : words that the first move needs and the program has not stated before it
     blend   : mm, largest rounding of a corner that G64 P allows
+    places  : coordinates of the machine (G53) by line: line, axis 0 to 2, and mm
     leaves  : mm, largest deviation from the path that G64 allows: ``blend`` and the tolerance Q of dropped points
     lines   : number of lines read
     remarks : words and blocks that should not be run
@@ -136,6 +139,7 @@ class Program:
     unbounded: bool = False
     pauses: tuple[Pause, ...] = ()
     leaves: float = 0.0
+    places: tuple[tuple[int, int, float], ...] = ()
 
     def __len__(self) -> int:
         return len(self.start)

@@ -140,9 +140,8 @@ def test_remarks_name_what_should_not_run(body, word):
     ("G1 Z1 F100\nS0\nZ2\n", 9, ("S0",)), ("M5 G1 Z1 F100\n", 7, ("no M3",)), ("G2 I5 S0 F100\n", 7, ("S0",)),
     ("G81 X1 Y1 Z-1 R1 S0 F100\nG80\n", 7, ("S0",)), ("T2 M6\nG43 H2 Z5\nG1 Z1 F100\n", 9, ("no M3",)),
     ("S-5\n", 7, ("S-5",)),
-    # machine coordinates: only home is above everything, and only from home may X and Y go to the machine's places
-    ("G53 G0 Z-200\n", 7, ("G53 Z-200",)), ("G53 G0 X0 Y0 Z0\n", 7, ("Z10", "home first")),
-    ("G53 G0 X5\n", 7, ("home first",)), ("G28\n", 7, ("home first",)),
+    # machine coordinates: only home is above everything
+    ("G53 G0 Z-200\n", 7, ("G53 Z-200",)),
     ("G53 G0 Z0\nG53 G0 X0 Y0\nG0 Z5\nX1 Y1\n", 9, ("program X and Y",)), ("G91 G53 G0 Z0\nG90\n", 7, ("G91",)),
     ("G53 G0 Z0\nG1 X5 F100\n", 8, ("not stated",)),
     # unit
@@ -158,6 +157,11 @@ def test_remarks_name_what_should_not_run(body, word):
 ])
 def test_what_a_machine_might_do_otherwise_is_named_on_its_line(body, line, words):
     assert [r for r in read(body).remarks if r.line == line and all(w in r.message for w in words)], read(body).remarks
+
+
+@pytest.mark.parametrize("body", ["G53 G0 X0 Y0 Z0\n", "G53 G0 X5\n", "G28\n"])
+def test_x_and_y_go_to_places_of_the_machine_from_a_known_height(body):
+    assert [(s.line, s.tip[2], s.room) for s in read(body).stops if "fixed place" in s.event] == [(7, 10.0, True)]
 
 
 @pytest.mark.parametrize("body", [

@@ -20,7 +20,7 @@ def test_a_lift_of_rounded_coordinates_is_straight(decimals):
 def test_what_goes_aside_down_or_turns_is_no_lift():
     aside = np.cross(AXIS, [0.0, 0.0, 1.0])
     aside /= np.linalg.norm(aside)
-    assert not is_lift(0.0, AXIS, START, START + 15.0 * AXIS + 0.003 * aside)
+    assert not is_lift(0.0, AXIS, START, START + 15.0 * AXIS + 0.006 * aside)
     assert not is_lift(0.0, AXIS, START, START - 0.5 * AXIS)
     assert not is_lift(0.01, AXIS, START, START + 15.0 * AXIS)
 
