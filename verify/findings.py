@@ -133,14 +133,30 @@ def gouge_findings(points: F64, face: I32, depth: F64, area: F64, mover: I32, so
     area   : (n,) float64, mm²
     mover  : (n,) int32, index, the move that cut deepest
     """
+    return _cut_findings(FindingKind.GOUGE, "cuts {:.4f} mm into the part", points, face, depth, area, mover, source,
+                         tolerance)
+
+
+def allowance_findings(points: F64, face: I32, depth: F64, area: F64, mover: I32, source: Source, allowance: float,
+                       tolerance: float) -> list[Finding]:
+    """Findings of cuts that go into the stock allowance; arguments as those of ``gouge_findings``.
+
+    depth : (n,) float64, mm, how deep the cut goes under the allowance; allowance, tolerance : mm
+    """
+    text = f"cuts {{:.4f}} mm into the stock allowance of {allowance:g} mm"
+    return _cut_findings(FindingKind.ALLOWANCE, text, points, face, depth, area, mover, source, tolerance)
+
+
+def _cut_findings(kind: FindingKind, text: str, points: F64, face: I32, depth: F64, area: F64, mover: I32,
+                  source: Source, tolerance: float) -> list[Finding]:
     out = []
     groups = chains(source.program[mover], source.line[mover], points, face)
     for rows in worst_of(groups, depth):
         r = rows[0]
         m = mover[r]
-        out.append(Finding(FindingKind.GOUGE, source.names[source.program[m]], int(source.line[m]), None,
-                           f"F{face[r]}", _point(points[r]), float(depth[r]), tolerance,
-                           f"T{source.tool[m]} cuts {depth[r]:.4f} mm into the part{_span(source.line[mover[rows]])}",
+        out.append(Finding(kind, source.names[source.program[m]], int(source.line[m]), None, f"F{face[r]}",
+                           _point(points[r]), float(depth[r]), tolerance,
+                           f"T{source.tool[m]} {text.format(depth[r])}{_span(source.line[mover[rows]])}",
                            len(rows), float(area[rows].sum())))
     return out
 

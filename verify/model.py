@@ -32,6 +32,7 @@ class FindingKind(StrEnum):
 
     COLLISION = "collision"
     GOUGE = "gouge"
+    ALLOWANCE = "allowance"
     RAPID = "rapid"
     PLUNGE = "plunge"
     RUBBING = "rubbing"

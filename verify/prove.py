@@ -22,6 +22,7 @@ from verify.checks.repeated_passes import repeat_findings
 from verify.checks.table_clearance import table_findings
 from verify.findings import (
     Source,
+    allowance_findings,
     contact_findings,
     gouge_findings,
     ordered,
@@ -136,7 +137,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
         cutting = Cutting(TriangleTree(part.mesh), setup, moves, tools, threads)
         work, left = work_done(asked, Measured(scored.samples, cuts.residual, cuts.mover, cuts.reach,
                                                error_bound([p.program for p in framed])), cutting, run.cut, source)
-        findings += [*left, *deep_findings(scored.samples, cuts.residual, cuts.mover, cutting, source)]
+        findings += [*cuts.allowance, *left, *deep_findings(scored.samples, cuts.residual, cuts.mover, cutting, source)]
     notes = [f"{run.lost} contacts are not listed: the tables are full"] if run.lost else []
     notes.extend(cuts.notes)
     notes.extend(f"T{t.number} is so thin that a plunge may stay unseen: the stock is sampled every "
@@ -173,6 +174,7 @@ class _Cuts:
     residual: F64
     mover: I32
     gouges: list[Finding]
+    allowance: list[Finding]
     gouge_max: float
     guard: F64
     edge: F64
@@ -218,6 +220,12 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
     out.gouge_max = max(float(-residual.min(initial=0.0)), 0.0)
     out.gouges = gouge_findings(points[deep], face[deep], -residual[deep], area[deep], mover[deep], source,
                                 setup.gouge_tolerance)
+    on_faces = np.arange(len(residual)) < len(s) + len(guard)  # the stock on an edge belongs to two faces
+    depth = setup.stock_allowance - residual
+    into = np.flatnonzero(on_faces & (residual >= -setup.gouge_tolerance) & (mover >= 0)
+                          & (depth > setup.gouge_tolerance + RAY_ERROR))
+    out.allowance = allowance_findings(points[into], face[into], depth[into], area[into], mover[into], source,
+                                       setup.stock_allowance, setup.gouge_tolerance)
     return out
 
 

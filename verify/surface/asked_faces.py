@@ -21,6 +21,7 @@ from verify.blank.blank import stock_bounds, stock_on_normals
 from verify.model import ProofSetup
 from verify.moves import Moves
 from verify.surface.removal import residual_on_normals
+from verify.surface.sample_scores import proved_samples
 
 WORKED_SHARE = 0.2  # of the area of a face, along whose normals feed moves remove stock
 MAX_ASKED = 400  # samples of a face that are followed to the end of the stock; their share is known to 2 %
@@ -76,10 +77,59 @@ class Cutting:
         return np.where((mover >= 0) | outside, np.maximum(left, 0.0), np.inf), mover
 
 
+@dataclass(frozen=True, eq=False)
+class FinishedPlanes:
+    """Planes of the part that a run of feed moves finishes.
+
+    run   : (m,) int64, index, run of each move: moves without a rapid between them
+    width : mm, how far from a plane a place counts as in it
+    keys  : run, normal in thousandths and distance from the origin in widths of every finished sample
+    """
+
+    run: INT
+    width: float
+    keys: frozenset[tuple[int, ...]]
+
+    @classmethod
+    def of(cls, samples: SurfaceSamples, residual: F64, mover: I32, cutting: Cutting) -> FinishedPlanes:
+        """The planes on which samples are within tolerance; arguments as those of ``worked_faces``."""
+        setup, run = cutting.setup, np.cumsum(~cutting.moves.feed)
+        width = max(setup.scallop_height, setup.gouge_tolerance)
+        rows = np.flatnonzero((mover >= 0) & proved_samples(residual, setup))
+        keys = _plane_keys(run[mover[rows]], samples.points[rows], samples.normals[rows], width)
+        return cls(run, width, frozenset(map(tuple, np.unique(keys, axis=0).tolist())))
+
+    def holds(self, points: F64, normals: F64, height: F64, mover: I32) -> BOOL:
+        """Whether what a move leaves above a place lies in a plane that its run finishes.
+
+        points, normals : (n, 3) float64, mm and unit, samples of the part
+        height : (n,) float64, mm of stock on each normal; mover : (n,) int32, index, -1 where no move left it
+
+        Returns (n,) bool; false where the height is within the width itself.
+        """
+        out = np.zeros(len(points), np.bool_)
+        rows = np.flatnonzero((mover >= 0) & (height > self.width) & np.isfinite(height))
+        if not self.keys or not len(rows):
+            return out
+        ends = points[rows] + height[rows, None] * normals[rows]
+        keys, of = np.unique(_plane_keys(self.run[mover[rows]], ends, normals[rows], self.width), axis=0,
+                             return_inverse=True)
+        known = np.array([any((*k[:4], k[4] + d) in self.keys for d in (-1, 0, 1)) for k in map(tuple, keys.tolist())])
+        out[rows] = known[of.reshape(-1)]
+        return out
+
+
+def _plane_keys(run: INT, points: F64, normals: F64, width: float) -> INT:
+    """(n, 5) int64: run, normal in thousandths, and distance of the plane from the origin in widths."""
+    away = np.floor(np.einsum("ij,ij->i", points, normals) / width).astype(np.int64)
+    return np.column_stack([run, np.round(1000.0 * normals).astype(np.int64), away])
+
+
 def worked_faces(samples: SurfaceSamples, residual: F64, mover: I32, reach: float, cutting: Cutting) -> tuple[int, ...]:
     """Faces along whose normals feed moves remove stock on a fifth of the area or more, whatever they leave.
 
-    Where no face reaches a fifth, all faces that stock is removed from.
+    Stock that moves take off on their way over a face while they finish another one does not count: facing the top of a
+    plate is no work on the floors of its pockets. Where no face reaches a fifth, all faces that stock is removed from.
 
     samples  : SurfaceSamples, n of them
     residual : (n,) float64, mm of stock on their normals after all moves, not above ``reach``
@@ -92,8 +142,10 @@ def worked_faces(samples: SurfaceSamples, residual: F64, mover: I32, reach: floa
     Where more than ``reach`` stands, the ray is followed to the end of the stock or to the part. At most ``MAX_ASKED``
     samples of a face are: the error of the share is 2 % (one standard deviation).
     """
-    cut = mover >= 0
-    unknown = ~cut & (residual >= reach * (1.0 - 1e-9))
+    planes = FinishedPlanes.of(samples, residual, mover, cutting)
+    touched = mover >= 0
+    cut = touched & ~planes.holds(samples.points, samples.normals, residual, mover)
+    unknown = ~touched & (residual >= reach * (1.0 - 1e-9))
     numbers, place = np.unique(samples.face, return_inverse=True)
     total, sure, more = (np.bincount(place, weights=samples.area * of, minlength=len(numbers))
                          for of in (np.ones(len(cut)), cut, unknown))
@@ -102,9 +154,11 @@ def worked_faces(samples: SurfaceSamples, residual: F64, mover: I32, reach: floa
     rows = [thinned(np.flatnonzero(unknown & (place == k)), MAX_ASKED) for k in np.flatnonzero(open_)]
     if rows:
         chosen = np.concatenate(rows)
-        _, by = cutting.way_through_stock(samples.points[chosen], samples.normals[chosen], cutting.farthest, OFF_FACETS)
+        points, normals = samples.points[chosen], samples.normals[chosen]
+        left, by = cutting.way_through_stock(points, normals, cutting.farthest, OFF_FACETS)
+        counts = (by >= 0) & ~planes.holds(points, normals, left, by)
         ends = np.cumsum([len(r) for r in rows])
-        for k, mine in zip(np.flatnonzero(open_), np.split(by >= 0, ends[:-1]), strict=True):
+        for k, mine in zip(np.flatnonzero(open_), np.split(counts, ends[:-1]), strict=True):
             worked[k] = sure[k] + more[k] * float(mine.mean()) >= WORKED_SHARE * total[k]
             more[k] *= float(mine.mean())
     if not worked.any():

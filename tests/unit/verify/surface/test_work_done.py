@@ -127,3 +127,32 @@ def test_rows_are_thinned_evenly():
     rows = np.arange(1000)
     assert np.array_equal(thinned(rows, 1000), rows) and len(thinned(rows, 7)) == 7
     assert np.diff(thinned(rows, 10)).tolist() == [100] * 9
+
+
+def faced(*heights):
+    """Rows over the whole top at some heights, 0 being the top, each a run of its own."""
+    rows = [f"X{24 * (1 if k % 2 else -1)} Y{y}\nX{24 * (-1 if k % 2 else 1)}" for k, y in enumerate(range(-16, 18, 3))]
+    body = [f"G0 Z20\nX-24 Y-20\nG1 Z{z} F300\n" + "\n".join(rows) for z in heights]
+    head = ["%", "G21 G90 G17 G94 G40 G49 G54", "T1 M6", "S8000 M3", "G0 G43 H1 Z20"]
+    return [*head, *"\n".join(body).split("\n"), "G0 Z20", "M5", "M30", "%"]
+
+
+def test_facing_the_top_is_no_work_on_the_floor_of_the_pocket():
+    proof = run(faced(0.25, 0.0))
+    assert proof.work.faces == (TOP,) and not of(proof)
+
+
+def test_facing_too_high_is_work_on_all_that_lies_under_it():
+    proof = run(faced(0.25))
+    assert set(proof.work.faces) == {TOP, FLOOR}
+    high = {f.face: f.depth for f in of(proof)}
+    assert high[f"F{TOP}"] == pytest.approx(0.25, abs=0.005)
+
+
+@pytest.mark.parametrize("allowance", [0.3, 0.05])
+def test_a_cut_to_size_goes_into_the_allowance(allowance):
+    proof = run(faced(0.25, 0.0), setup=replace(SETUP, stock_allowance=allowance))
+    found = of(proof, FindingKind.ALLOWANCE)
+    assert found and max(f.depth for f in found) == pytest.approx(allowance, abs=1e-4)
+    assert {f.face for f in found} == {f"F{TOP}"}
+    assert not of(run(faced(0.3), setup=replace(SETUP, stock_allowance=0.3)), FindingKind.ALLOWANCE)
