@@ -2,8 +2,9 @@
 
 Numba checks for a compiled function only whether its own file has changed, not the files of other kernels it uses. So
 an update can leave old machine code inlined in a new kernel. Here the name of a module's folder holds the digest of
-``geometry.kernels.sources``: an edit recompiles all that depends on it, and nothing else. The digest contains no path
-and no time, so that every checkout with the same sources uses the same machine code.
+``geometry.kernels.sources``: an edit recompiles all that depends on it, and nothing else. An edit of a docstring
+recompiles nothing. The digest contains no path and no time, so that every checkout with the same sources uses the same
+machine code.
 
 Every ``kernels`` package imports this before its first kernel, since numba finds the folder when it decorates a
 function. The processor and its features are part of numba's own key: several machines may share a folder.
@@ -81,10 +82,10 @@ def module_folder(name: str, running_as: str, given: str) -> Path | None:
 class KernelLocator(caching._CacheLocator):  # type: ignore[misc]
     """Tells numba where the machine code of a function of the project is stored, and when it is out of date."""
 
-    def __init__(self, py_func: Any, py_file: str, folder: Path) -> None:
+    def __init__(self, py_func: Any, py_file: str, folder: Path, line: int) -> None:
         self._py_file = py_file
         self._folder = folder
-        self._line = py_func.__code__.co_firstlineno
+        self._line = line
 
     @classmethod
     def from_function(cls, py_func: Any, py_file: str) -> KernelLocator | None:
@@ -99,7 +100,8 @@ class KernelLocator(caching._CacheLocator):  # type: ignore[misc]
         if name is None:
             return None
         folder = module_folder(name, py_func.__module__, str(config.CACHE_DIR))
-        return cls(py_func, py_file, folder) if folder is not None else None
+        line = sources().line_of_code(name, py_func.__code__.co_firstlineno)
+        return cls(py_func, py_file, folder, line) if folder is not None else None
 
     def get_cache_path(self) -> str:
         """The module's folder."""
@@ -110,7 +112,7 @@ class KernelLocator(caching._CacheLocator):  # type: ignore[misc]
         return self._folder.name
 
     def get_disambiguator(self) -> str:
-        """Line of the function, since one module may hold two functions of one name."""
+        """Line of the function without the docstrings before it: one module may hold two functions of one name."""
         return str(self._line)
 
 

@@ -3,6 +3,7 @@
 Machine code holds whatever was inlined into it: kernels and constants of other modules, and the bodies that modules
 register for the stubs of ``geometry.kernels.revolved``. So a module depends on itself, on every project module it
 imports, on every module that registers a body for one of its stubs, and on all that these depend on in turn.
+Docstrings are left out: no machine code depends on them.
 
 Files are read, never imported. Import statements are found by line and parsed one by one, since parsing whole modules
 takes a third of a second in every process.
@@ -40,7 +41,13 @@ LONGEST = 60
 
 _IMPORT = re.compile(r"^[ \t]*(?:from[ \t]+[.\w]+[ \t]+import\b|import[ \t]+\w)", re.M)
 _COMPILES = re.compile(r"^[ \t]*@(?:numba\.)?njit\b|^\w+ = njit\(", re.M)
+_DOCSTRING = re.compile(r'(?:\A|(?<=:)[ \t]*(?:#[^\n]*)?\n)\s*[rR]?"""(?:[^"\\]|\\.|"(?!""))*"""', re.S)
 _REGISTERS = re.compile(rf"\b(?:{'|'.join(REGISTERS)})\(")
+
+
+def without_docstrings(source: str) -> str:
+    """A source without the docstrings in triple double quotes of its module, classes and functions."""
+    return _DOCSTRING.sub("", source)
 
 
 def toolchain() -> str:
@@ -74,6 +81,7 @@ class Sources:
         self._imports: dict[str, dict[str, str]] = {}
         self._registering: dict[str, set[str]] | None = None
         self._digests: dict[str, str] = {}
+        self._lines: dict[str, list[tuple[int, int]]] = {}
 
     def name_of(self, path: Path) -> str | None:
         """Dotted name of a project module by its file; None for any other file."""
@@ -114,7 +122,7 @@ class Sources:
         return found
 
     def digest(self, name: str) -> str:
-        """First 16 hex digits of a SHA-256 over the toolchain and over names and contents of all dependencies.
+        """First 16 hex digits of a SHA-256 over the toolchain and over names and code of all dependencies.
 
         Raises
         ------
@@ -124,11 +132,25 @@ class Sources:
         if name not in self._digests:
             digest = hashlib.sha256(toolchain().encode())
             for other in sorted(self.dependencies(name)):
-                content = self._text(other).encode()
+                content = without_docstrings(self._text(other)).encode()
                 digest.update(f"\n{other} {len(content)}\n".encode())
                 digest.update(content)
             self._digests[name] = digest.hexdigest()[:16]
         return self._digests[name]
+
+    def line_of_code(self, name: str, line: int) -> int:
+        """Place of a line of a module among those that the digest takes in; docstrings do not move it.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            The module has no file.
+        """
+        if name not in self._lines:
+            text = self._text(name)
+            self._lines[name] = [(text.count("\n", 0, m.end()) + 1, m.group().count("\n"))
+                                 for m in _DOCSTRING.finditer(text)]
+        return line - sum(lines for last, lines in self._lines[name] if last < line)
 
     def compiled(self) -> list[str]:
         """Every module that holds compiled functions, by name."""

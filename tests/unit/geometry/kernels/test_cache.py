@@ -84,6 +84,30 @@ def test_an_edit_compiles_what_depends_on_it_and_nothing_else(tree, tmp_path):
     assert last[0] == "4.0 8.0" and _hits(last) == ["1", "0"]  # what it was before is still there
 
 
+def test_an_edit_of_a_docstring_compiles_nothing(tree, tmp_path):
+    inner = tree / "verify" / "kernels" / "inner.py"
+    code = ("from verify.kernels.inner import inner\n"
+            "print(inner(1.0), inner.__doc__ is None, sum(inner.stats.cache_hits.values()))")
+    plain = inner.read_text()
+    bodies = plain, plain.replace("(x):", '(x):\n    """Adds."""'), plain.replace("(x):", '(x):\n    r"""Adds\n\n1."""')
+    texts = [f'"""{doc}"""\n{body}' for body in bodies for doc in ("A module.", "A\n\nlonger one.\n")][:5]
+    seen = []
+    for text in texts:
+        inner.write_text(text)
+        seen += _run(tree, tmp_path, code=code)
+    assert seen == ["2.0 True 0", "2.0 True 1", "2.0 False 1", "2.0 False 1", "2.0 False 1"]
+
+
+def test_two_functions_of_one_name_have_files_of_their_own_whatever_is_written_on_them(tree, tmp_path):
+    inner = tree / "verify" / "kernels" / "inner.py"
+    one = "@njit(cache=True)\ndef inner(x):\n    {doc}\n    return x + {addend}\n"
+    code = "from verify.kernels.inner import first, inner\nprint(first(1.0), inner(1.0))"
+    for doc in ('"""Adds."""', '"""Adds\n    one or\n    two.\n    """'):
+        inner.write_text("from numba import njit\n\n\n" + one.format(doc=doc, addend=1.0) + "first = inner\n"
+                         + one.format(doc=doc, addend=2.0))
+        assert _run(tree, tmp_path, code=code) == ["2.0 3.0"]
+
+
 @pytest.mark.slow
 def test_without_our_locator_numba_answers_with_the_machine_code_of_before(tree, tmp_path):
     (tree / "verify" / "kernels" / "__init__.py").write_text("")

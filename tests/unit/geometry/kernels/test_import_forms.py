@@ -1,6 +1,7 @@
 """The sources of kernels use only the forms of import and of registering that ``geometry.kernels.sources`` finds.
 
-A form that it overlooks would leave stale machine code after an edit, in silence.
+A form that it overlooks would leave stale machine code after an edit, in silence. So would a string that it takes for a
+docstring.
 """
 
 from __future__ import annotations
@@ -10,7 +11,8 @@ import functools
 
 import pytest
 
-from geometry.kernels.sources import PACKAGES, REGISTERS, Sources, import_statements
+from geometry.kernels.sources import _DOCSTRING as DOCSTRING
+from geometry.kernels.sources import PACKAGES, REGISTERS, Sources, import_statements, without_docstrings
 
 SOURCES = Sources()
 
@@ -53,3 +55,27 @@ def test_bodies_are_registered_in_folders_of_kernels_that_are_searched():
                                   "import geometry.kernels as k", "revolved.for_shape(revolved.radius_of, 1)"])
 def test_forms_that_are_not_found_are_named(text):
     assert overlooked(text)
+
+
+def stray(text: str) -> list[str]:
+    """What the digest leaves out of a source text though it is no docstring of its module, a class or a function."""
+    docstrings = {(at.body[0].lineno, at.body[0].end_lineno) for at in ast.walk(ast.parse(text))
+                  if isinstance(at, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(at) is not None}
+    out = []
+    for match in DOCSTRING.finditer(text):
+        first = text.count("\n", 0, match.start() + match.group().index('"""')) + 1
+        if (first, text.count("\n", 0, match.end()) + 1) not in docstrings:
+            out.append(match.group())
+    return out
+
+
+def test_docstrings_alone_are_left_out_of_the_digest():
+    assert {name: found for name in read() if (found := stray(SOURCES._text(name)))} == {}
+
+
+def test_strings_that_are_values_stay():
+    assert stray('TABLE = {"a":\n    """value""", "b": 1}\n')  # so such a form would be noticed
+    kept = 'x = """value"""\n"""Of x."""\ny = f(\n    """value""")\n'
+    assert without_docstrings(kept) == kept
+    noted = 'def f():  # note\n    r"""A "word".\n\n    """\n    return 1\n'
+    assert without_docstrings(noted) == "def f():\n    return 1\n"
