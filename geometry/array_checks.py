@@ -12,13 +12,13 @@ from geometry.mesh import F64
 def finite_points(values: ArrayLike, width: int, name: str) -> F64:
     """Points in the form that every kernel takes.
 
-    values : numbers of shape (n, width), mm; nothing at all counts as n = 0
+    values : (n, width) float64 or what numpy makes it of, mm or dimensionless; nothing at all counts as n = 0
     width  : int, columns
     name   : str, the caller's name for them
 
     Returns
     -------
-    (n, width) float64, C-contiguous
+    (n, width) float64, mm or dimensionless as given, C-contiguous
 
     Raises
     ------

@@ -46,8 +46,13 @@ def run_limited(command: Sequence[str], request: bytes, *, time_limit: float, me
     stop         : once set, the child is ended as if its time were over
 
     Returns bytes the child wrote before it exited with 0.
-    Raises the typed error the child described (exit code 3), or ResourceError with code ``<name>_timeout``,
-    ``<name>_memory`` or ``<name>_crashed``.
+
+    Raises
+    ------
+    CamError
+        The typed error that the child described (exit code 3).
+    ResourceError
+        Code ``<name>_timeout``, ``<name>_memory`` or ``<name>_crashed``.
     """
     with tempfile.TemporaryDirectory(prefix="zonemill-") as folder:
         result = Path(folder, "result")

@@ -22,6 +22,11 @@ class TriangleMesh:
                zeros where the mesh has no B-rep
     corner_normals : (m, 3, 3) float64, unit outward normals of the exact surface at the corners of every triangle, on
                its own face; NaN where the surface has none. None for a mesh without B-rep
+
+    Raises
+    ------
+    ValueError
+        An array has another shape, or a face refers to a vertex that does not exist.
     """
 
     vertices: F64
@@ -51,7 +56,7 @@ class TriangleMesh:
 
     @cached_property
     def triangles(self) -> F64:
-        """(m, 3, 3) float64, mm: corner points of each triangle."""
+        """(m, 3, 3) float64, mm, frame of the mesh: corner points of each triangle."""
         return np.ascontiguousarray(self.vertices[self.faces])
 
     @cached_property
@@ -66,13 +71,13 @@ class TriangleMesh:
 
     @cached_property
     def normals(self) -> F64:
-        """(m, 3) float64 unit outward normals; zero rows for triangles without area."""
+        """(m, 3) float64, dimensionless, frame of the mesh: unit outward normals; zero for triangles without area."""
         length = 2.0 * self.areas
         return np.asarray(self._cross / np.where(length > 0, length, 1.0)[:, None])
 
     @cached_property
     def bounds(self) -> F64:
-        """(2, 3) float64, mm: lower and upper corner of the bounding box."""
+        """(2, 3) float64, mm, frame of the mesh: lower and upper corner of the bounding box."""
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
     @cached_property
@@ -82,7 +87,10 @@ class TriangleMesh:
         return float(np.einsum("ij,ij->i", t[:, 0], np.cross(t[:, 1], t[:, 2])).sum() / 6.0)
 
     def transformed(self, matrix: F64) -> TriangleMesh:
-        """The mesh moved by a rigid (4, 4) matrix."""
+        """The mesh moved rigidly.
+
+        matrix : (4, 4) float64, a rotation, dimensionless, and a shift, mm, to another frame
+        """
         m = np.asarray(matrix, dtype=np.float64)
         normals = None if self.corner_normals is None else self.corner_normals @ m[:3, :3].T
         return TriangleMesh(self.vertices @ m[:3, :3].T + m[:3, 3], self.faces, self.face_ids, normals)

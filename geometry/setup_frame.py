@@ -49,7 +49,7 @@ class SetupFrame:
 
     @cached_property
     def inverse(self) -> F64:
-        """(4, 4) float64 rigid matrix, setup frame -> STEP coordinates (mm); its columns are the axes."""
+        """(4, 4) float64, dimensionless but for the shift in mm: setup frame -> STEP coordinates; columns are axes."""
         z = np.array(self.z_axis) / np.linalg.norm(self.z_axis)
         x = np.array(self.x_axis) / np.linalg.norm(self.x_axis)
         x = x - (x @ z) * z
@@ -60,7 +60,7 @@ class SetupFrame:
 
     @cached_property
     def matrix(self) -> F64:
-        """(4, 4) float64 rigid matrix, STEP coordinates (mm) -> setup frame."""
+        """(4, 4) float64, dimensionless but for the shift in mm: rigid, from STEP coordinates to the setup frame."""
         rotation = self.inverse[:3, :3].T
         out = np.eye(4)
         out[:3, :3] = rotation

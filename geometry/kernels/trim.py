@@ -74,7 +74,8 @@ def count_division(corners: I64, sides: I64, parts: I64, length: F64, first: I64
     sides         : (t, 3) int64, index of the edges
     parts, first  : (e,) int64, parts of each edge (count) and index of its first inner node
     length        : (e,) float64, mm, of each edge
-    data          : (n, 8) float64, node rows in the frame of the part, edge nodes included
+    data          : (n, 8) float64, mm and, for the parameters, as the surface has them: node rows in the frame of the
+                    part, edge nodes included
     pitch         : mm
 
     Returns (t,) inner nodes and (t,) facets, int64, count.
@@ -103,7 +104,12 @@ def divide(corners: I64, sides: I64, parts: I64, length: F64, first: I64, data: 
            facet_at: I64, out: I64) -> None:
     """Fill in the inner nodes (rows of ``data`` from node_at[t] on) and the small facets (``out`` from facet_at[t]).
 
-    corners, sides, parts, length, first, data, pitch : as in ``count_division``, data in the frame of the part
+    corners           : (t, 3) int64, index of the nodes
+    sides             : (t, 3) int64, index of the edges
+    parts, first      : (e,) int64, parts of each edge (count) and index of its first inner node
+    length            : (e,) float64, mm, of each edge
+    data              : (n, 8) float64, mm, node rows as in ``count_division``; the inner nodes are filled in
+    pitch             : mm
     node_at, facet_at : (t,) int64, index of the first inner node and the first small facet of each facet
     out               : (q, 3) int64, index of the nodes of the small facets
 

@@ -15,10 +15,10 @@ def point_of_mesh_in_box(mesh: TriangleMesh, lower: F64, upper: F64) -> F64 | No
     A closed mesh bounds the solid. All points are in the frame of the mesh.
 
     mesh         : TriangleMesh, closed, normals outwards, mm
-    lower, upper : (3,) float64, mm, corners of the box
+    lower, upper : (3,) float64, mm, corners of the box in the frame of the mesh
 
-    Returns (3,) float64, mm: on the surface where the surface enters the box, else the middle of a box that lies
-    wholly inside the solid. Exact for the mesh, however thin the box is.
+    Returns (3,) float64, mm, frame of the mesh: on the surface where the surface enters the box, else the middle of a
+    box that lies wholly inside the solid. Exact for the mesh, however thin the box is.
     """
     triangles = mesh.triangles
     near = np.flatnonzero(((triangles.min(axis=1) <= upper) & (triangles.max(axis=1) >= lower)).all(axis=1))

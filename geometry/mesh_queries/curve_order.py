@@ -23,7 +23,7 @@ NEAR = 8.0  # steps between successive queries, in spacings of as many on a latt
 def along_curve(xy: F64, triangles: int) -> NDArray[np.intp] | None:
     """Order of points along a Morton curve [Morton1966], None where sorting does not pay.
 
-    xy        : (n, 2) float64, mm, in plan, finite
+    xy        : (n, 2) float64, mm, finite, x and y in the frame of the mesh
     triangles : int, count of the triangles of the mesh
 
     Returns (n,) intp, index of each point in the new order.
@@ -43,9 +43,10 @@ def in_order(call: Callable[[F64, NDArray[np.generic]], None], points: F64, tria
              out: NDArray[np.generic]) -> None:
     """Answer queries in the order of the curve: ``call(points, out)`` fills one row of out for each point.
 
+    call      : takes (n, 2) float64 or wider, mm, frame of the mesh, and one like ``out``, (n,) of any dtype and unit
     points    : (n, 2) float64 or wider, mm, frame of the mesh, x and y first
     triangles : int, count of the triangles of the mesh
-    out       : (n,) array to fill, of the dtype and unit that ``call`` writes
+    out       : (n,) of any dtype and unit that ``call`` writes, filled here
     """
     order = along_curve(points[:, :2], triangles)
     if order is None:

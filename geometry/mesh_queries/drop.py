@@ -48,7 +48,7 @@ def drop_tips(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: f
     xy            : (n, 2) float64, mm, places of the axis in the frame of the mesh
     radius        : float, mm, >= 0; 0 gives the height of the mesh itself
     corner_radius : float, mm, 0 <= corner_radius <= radius
-    out           : (n,) float64 to write into, new when None
+    out           : (n,) float64, mm, to write into; new when None
 
     Returns
     -------
@@ -79,12 +79,17 @@ def drop_tips(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: f
 
 
 def drop_contacts(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: float) -> DropContacts:
-    """``drop_tips`` with the triangle and the point that hold each tip up; parameters and errors as there.
+    """``drop_tips`` with the triangle and the point that hold each tip up; parameters as there.
 
     xy : (n, 2) float64, mm, places of the axis in the frame of the mesh
 
     Where several triangles share the contact (an edge, a vertex), the result names one of them, always the same
     one for the same mesh.
+
+    Raises
+    ------
+    GeometryError
+        As ``drop_tips``.
     """
     points = finite_points(xy, 2, "xy")
     _check_radii(radius, corner_radius)
@@ -97,12 +102,17 @@ def drop_contacts(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radiu
 def blocked_many(tree: TriangleTree, tips: ArrayLike, radius: float, corner_radius: float) -> NDArray[np.bool_]:
     """Whether the body enters the mesh with its tip at each point.
 
-    tips : (n, 3) float64, mm, frame of the mesh; the other parameters and the errors are those of ``drop_tips``
+    tips : (n, 3) float64, mm, frame of the mesh; the other parameters are those of ``drop_tips``
 
     Returns
     -------
     (n,) bool
         True where the lowest free tip is more than 1e-9 mm above the given one.
+
+    Raises
+    ------
+    GeometryError
+        As ``drop_tips``.
     """
     points = finite_points(tips, 3, "tips")
     _check_radii(radius, corner_radius)

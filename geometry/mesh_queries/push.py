@@ -69,10 +69,15 @@ def push_stops(tree: TriangleTree, tips: ArrayLike, direction: ArrayLike, outlin
 
 
 def push_contacts(tree: TriangleTree, tips: ArrayLike, direction: ArrayLike, outline: Outline) -> PushContacts:
-    """``push_stops`` with the triangle and the point that end each way; parameters and errors as there.
+    """``push_stops`` with the triangle and the point that end each way; parameters as there.
 
     tips      : (n, 3) float64, mm, frame of the mesh
     direction : (2,) float64, dimensionless, frame of the mesh
+
+    Raises
+    ------
+    GeometryError
+        As ``push_stops``.
     """
     points, (dx, dy) = finite_points(tips, 3, "tips"), _unit(direction)
     n = len(points)

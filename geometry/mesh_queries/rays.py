@@ -19,15 +19,15 @@ def first_hits(tree: TriangleTree, origins: ArrayLike, directions: ArrayLike, t_
 
     tree       : TriangleTree
     origins    : (n, 3) float64, mm, frame of the mesh
-    directions : (n, 3) float64, or (3,) for all rays, frame of the mesh; not zero. t counts in their lengths: mm for
-                 unit vectors
+    directions : (n, 3) float64, dimensionless, or (3,) for all rays, frame of the mesh; not zero. t counts in their
+                 lengths
     t_min      : float, nearer hits do not count (an offset for rays that start on the mesh)
     t_max      : float, farther hits do not count
 
     Returns
     -------
-    t        : (n,) float64, inf where nothing is met
-    triangle : (n,) int32, -1 where nothing is met
+    t        : (n,) float64, mm for unit vectors; inf where nothing is met
+    triangle : (n,) int32, index; -1 where nothing is met
 
     Raises
     ------

@@ -208,7 +208,7 @@ def heights(table: F64, rho: F64) -> F64:
     table : (k, 9) float64, mm, rows of the body for the kernels, in the plane of the half section
     rho   : float64 of any shape such as (n,), mm, radii within those of the body
 
-    Returns float64 of the shape of rho, mm.
+    Returns (n,) float64, mm, or the other shape of rho.
     """
     k = np.minimum(np.searchsorted(table[:, 1], rho), len(table) - 1)
     s = table[k]

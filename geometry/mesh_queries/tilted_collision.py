@@ -26,7 +26,7 @@ def axis_frames(axes: ArrayLike) -> F64:
 
     Returns
     -------
-    (d, 3, 3) float64
+    (d, 3, 3) float64, dimensionless
         Rotations from the frame of the part to that of the axis; ``frames[j] @ p`` turns a point. +Z gives the
         identity, other axes the least turn from there; -Z turns about X.
 
@@ -58,10 +58,10 @@ def blocked_along(tree: TriangleTree, frames: ArrayLike, which: ArrayLike, tips:
     """Whether a tool enters the mesh, each time along its own axis.
 
     tree   : TriangleTree in the frame of the part
-    frames : (d, 3, 3) float64, dimensionless, rotations as of ``axis_frames``
-    which  : (n,) int, index of the frame each tip is given in
+    frames : (d, 3, 3) float64, dimensionless, rotations from the frame of the part as of ``axis_frames``
+    which  : (n,) int64, index of the frame each tip is given in
     tips   : (n, 3) float64, mm, in that frame, whose z is the tool axis
-    bodies : (k, 3) float64, mm: radius, corner radius, height of the body's lower end above the tip
+    bodies : (k, 3) float64, mm, frame of the tool: radius, corner radius, height of the body's lower end above the tip
 
     Returns
     -------

@@ -35,7 +35,7 @@ class GridMap:
     def of(cls, grid: F64) -> GridMap:
         """The map through a grid of parameters.
 
-        grid : (m, n, 2) float64, (u, v) in the plane of the parameters, dimensionless; m and n at least 4,
+        grid : (m, n, 2) float64, dimensionless, (u, v) in the plane of the parameters; m and n at least 4,
                counterclockwise
 
         Raises
@@ -67,9 +67,11 @@ class GridMap:
         return np.column_stack([self.u.ev(y, x), self.v.ev(y, x)])
 
     def tangents(self, xi: F64, eta: F64) -> tuple[F64, F64]:
-        """Derivatives of (u, v) along xi and along eta, each (p, 2) float64, dimensionless, parameters of the surface.
+        """Derivatives of the parameters of the surface.
 
         xi, eta : (p,) float64, dimensionless, places of the unit square
+
+        Returns those along xi and those along eta, both (p, 2) float64, dimensionless, in the plane of (u, v).
         """
         x, y = self._within(xi, eta)
         wide, tall = (b - a for a, b in zip(self.low, self.high, strict=True))

@@ -59,7 +59,7 @@ class Joined:
         """Faces of a part as one sheet in a plane, by least squares conformal maps [Levy2002].
 
         mesh     : TriangleMesh of a part, its corners shared between faces
-        uv       : (m, 3, 2) float64, parameters on ``surfaces`` of the corners of every facet of the mesh
+        uv       : (m, 3, 2) float64, dimensionless, parameters on ``surfaces`` of the corners of every facet
         surfaces : NurbsSurface of each wanted face, by its number
 
         Raises
@@ -87,9 +87,12 @@ class Joined:
                           np.einsum("nk,nkc->nc", share, self.uv[row]))[0]
 
     def feet(self, points: F64) -> tuple[F64, F64]:
-        """Nearest places of the exact faces, (n, 3) mm, and unit normals there, (n, 3), float64, frame of the mesh.
+        """Nearest places of the exact faces with their normals.
 
         points : (n, 3) float64, mm, frame of the mesh, close to the faces
+
+        Returns places, (n, 3) float64, mm, and unit normals, (n, 3) float64, dimensionless, both in the frame of the
+        mesh.
         """
         _, row, foot = nearest(self._tree, points)
         a, b, c = (self.mesh.vertices[self.mesh.faces[row, k]] for k in range(3))

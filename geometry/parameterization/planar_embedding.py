@@ -31,7 +31,8 @@ def embedded(vertices: F64, faces: np.ndarray, sides: tuple[np.ndarray, ...]) ->
 
     vertices : (k, 2) or (k, 3) float64, mm, of a plane region or of a piece of surface, without holes; any frame
     faces    : (m, 3) int64, index, counterclockwise
-    sides    : vertices along bottom, right, top and left, each beginning where the one before ends
+    sides    : (s,) int64, index of the vertices along bottom, right, top and left, each beginning where the one
+               before ends
 
     Returns
     -------
@@ -73,7 +74,7 @@ def embedded(vertices: F64, faces: np.ndarray, sides: tuple[np.ndarray, ...]) ->
 def triangulated(sides: tuple[F64, ...], spacing: float) -> tuple[F64, np.ndarray, tuple[np.ndarray, ...]]:
     """A plane region as triangles that ``embedded`` takes.
 
-    sides   : bottom, right, top and left, (k, 2) float64, mm, each beginning where the one before ends
+    sides   : bottom, right, top and left, (k, 2) float64, mm, in one plane, each beginning where the one before ends
     spacing : mm, approximate distance between places
 
     Returns
@@ -136,7 +137,7 @@ def located(laid: F64, faces: np.ndarray, places: F64) -> tuple[np.ndarray, F64]
     Returns
     -------
     (n,) int64, index of the triangle each place lies in, or the nearest one, and (n, 3) float64, dimensionless, its
-    shares of the corners
+    barycentric coordinates
     """
     flat = TriangleMesh(np.column_stack([laid, np.zeros(len(laid))]), faces.astype(np.int32),
                         np.zeros(len(faces), np.int32))

@@ -34,7 +34,8 @@ class Quad:
     def of(cls, sides: tuple[F64, F64, F64, F64], n: int, m: int) -> Quad:
         """Sides of n and m places, evenly along their length.
 
-        sides : bottom, right, top, left as polylines (k, 2) float64, mm, each beginning where the one before ends
+        sides : bottom, right, top, left as polylines (k, 2) float64, mm, in one plane, each beginning where the one
+                before ends
 
         Raises
         ------

@@ -45,9 +45,11 @@ class Corners:
     cost: float
 
     def sides(self, border: F64) -> tuple[F64, F64, F64, F64]:
-        """Bottom, right, top and left of a border, each (k, d) float64, mm, from corner to corner.
+        """Sides of a border from corner to corner.
 
         border : (n, d) float64, mm, in the plane of the parameters or in space
+
+        Returns bottom, right, top and left, each (k, d) float64, mm.
         """
         n = len(border)
         out = []

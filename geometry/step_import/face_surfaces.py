@@ -50,8 +50,8 @@ class FaceSurface:
     def parameters(self, uv: ArrayLike) -> F64:
         """Parameters of the patch at parameters of the face.
 
-        uv : (n, 2) float64, parameters of the face as in ``Part.uv``, rad, mm or dimensionless
-        Returns (n, 2) float64, parameters for ``surface``.
+        uv : (n, 2) float64, rad, mm or dimensionless, parameters of the face as in ``Part.uv``
+        Returns (n, 2) float64, dimensionless, mm or rad, parameters for ``surface``.
 
         Notes
         -----

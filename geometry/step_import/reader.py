@@ -50,7 +50,17 @@ def read_part(path: str | os.PathLike[str], *, placement: SetupFrame | None = No
 
 
 def ask_reader(request: dict[str, Any], time_limit: float, memory_limit: float) -> bytes:
-    """Answer of ``geometry.step_import.reader_process``; limits in s and bytes, errors as in ``read_part``."""
+    """Answer of ``geometry.step_import.reader_process``; limits in s and bytes.
+
+    Raises
+    ------
+    PartError
+        The reader crashed, or ran past a limit.
+    ResourceError
+        Another process killed the reader.
+    CamError
+        The errors of ``read_part``.
+    """
     command = [sys.executable, "-m", READER_MODULE]
     try:
         return run_limited(command, json.dumps(request).encode(), time_limit=time_limit, memory_limit=memory_limit)

@@ -61,7 +61,7 @@ class SplineCurve:
 
         u          : (m,) float64, dimensionless, parameters in 0..1
         derivative : 0 for points, r for the r-th derivative
-        Returns (m, 2) float64, mm.
+        Returns (m, 2) float64, mm, frame of the control points.
         """
         u = np.asarray(u, dtype=np.float64)
         spline = BSpline(self.knots, self._wrapped, self.order - 1)
@@ -140,7 +140,7 @@ def resample(points: ArrayLike, count: int, closed: bool = False) -> F64:
 
     points : (n, 2) float64, mm, in the plane of the curve
     count  : number of points; an open polyline keeps both ends, a closed one its first point
-    Returns (count, 2) float64, mm. Raises GeometryError for a polyline without length.
+    Returns (count, 2) float64, mm, same plane. Raises GeometryError for a polyline without length.
     """
     p, s = _measured(points, closed)
     at = np.linspace(0.0, s[-1], count, endpoint=not closed)

@@ -103,7 +103,7 @@ class NurbsSurface:
 
     @property
     def domain(self) -> F64:
-        """(2, 2) float64, parameters: the least (u, v) and the greatest."""
+        """(2, 2) float64, dimensionless, parameters: the least (u, v) and the greatest."""
         (k, l), (n, m) = self.orders, self.control.shape[:2]  # noqa: E741
         return np.array([[self.knots_u[k - 1], self.knots_v[l - 1]], [self.knots_u[n], self.knots_v[m]]])
 
@@ -118,10 +118,11 @@ class NurbsSurface:
         return _divided(self._value(at, 0, 0))
 
     def derivatives(self, uv: ArrayLike) -> SurfaceDerivatives:
-        """Points with first and second derivatives [Piegl1997]; errors are those of ``points``.
+        """Points with first and second derivatives [Piegl1997].
 
         uv : (p, 2) float64, dimensionless, parameters
         Returns SurfaceDerivatives, mm by units of the parameters.
+        Raises GeometryError as ``points``.
         """
         at = self._inside(uv)
         ways = [self._value(at, i, j) for i, j in _WAYS]
@@ -144,9 +145,11 @@ class NurbsSurface:
         return self._normal(self.derivatives(uv))
 
     def points_and_normals(self, uv: ArrayLike) -> tuple[F64, F64]:
-        """Points, (p, 3) mm, and unit normals out of the material, (p, 3), float64, NaN at singular points.
+        """Points of the surface with their normals.
 
         uv : (p, 2) float64, dimensionless, parameters
+        Returns points, (p, 3) float64, mm, and unit normals out of the material, (p, 3) float64, dimensionless, NaN at
+        singular points; both in the frame of the control points.
         Raises GeometryError as ``points``.
         """
         at = self._inside(uv)
@@ -161,8 +164,9 @@ class NurbsSurface:
 
         uv : (p, 2) float64, dimensionless, parameters
 
-        Returns (p, 3) float64 E, F, G and (p, 3) float64 L, M, N, both mm; the second NaN at singular points. L is the
-        part of S_uu along the normal, so it is negative where the material is convex along u.
+        Returns E, F, G, (p, 3) float64, mm², and L, M, N, (p, 3) float64, mm, both by units of the parameters; the
+        second NaN at singular points. L is the part of S_uu along the normal, so it is negative where the material is
+        convex along u.
         """
         d = self.derivatives(uv)
         normal = self._normal(d)
@@ -171,12 +175,13 @@ class NurbsSurface:
     def heights_along(self, points: F64, start: F64, beyond: float = 0.1) -> tuple[F64, F64]:
         """Heights of chains of points over the surface; the search for each foot starts at the previous foot.
 
-        points : (m, t, 3) float64, mm, neighbours close together
+        points : (m, t, 3) float64, mm, frame of the control points, neighbours close together
         start  : (m, 2) float64, dimensionless, parameters near the foot of the first point of each chain
         beyond : share of the domain by which feet may lie outside it, where the surface goes on smoothly
 
-        Returns (m, t) float64, mm along the normal of the foot, negative inside the material, and (m, t, 2)
-        parameters of the feet. Both are right where the points are nearer than the least radius of curvature.
+        Returns (m, t) float64, mm along the normal of the foot, negative inside the material, and the parameters of
+        the feet, (m, t, 2) float64, dimensionless. Both are right where the points are nearer than the least radius
+        of curvature.
         """
         low, high = self.domain
         room = beyond * (high - low)
@@ -348,7 +353,7 @@ def open_uniform_knots(count: int, order: int) -> F64:
 
     count : control points, at least ``order``
     order : degree plus one
-    Returns (count + order,) float64, parameters.
+    Returns (count + order,) float64, dimensionless.
     """
     return np.clip(np.arange(count + order) - order + 1.0, 0.0, count - order + 1.0)
 

@@ -45,7 +45,7 @@ class FacetSheet:
         return np.asarray(0.5 * np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1))
 
     def uv_areas(self) -> F64:
-        """(t,) float64, signed, in units of the parameters."""
+        """(t,) float64, dimensionless or rad, mm or mm² as the parameters have it: signed areas in (u, v)."""
         q = self.nodes[self.corners, 3:5]
         a, b = q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]
         return np.asarray(0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]))

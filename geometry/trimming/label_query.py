@@ -38,12 +38,13 @@ def bisect(query: LabelQuery, start: F64, end: F64, face: I32, at_start: I64, at
     """Places along straight lines at which the label changes.
 
     start, end       : (k, 8) float64, node rows, mm and parameters
-    face             : (k,) int32 numbers
-    at_start, at_end : (k,) int64 labels at the ends
+    face             : (k,) int32, index, 1-based, of the face
+    at_start, at_end : (k,) int64, index of the label at either end
     tolerance        : float, mm, length of the remaining interval
     stop_at_third    : stop at a label that neither end has; otherwise it counts as the label of the end
 
-    Returns (k,) fraction of the way, (k,) bool where a third label was met, (k,) that label.
+    Returns the fraction of the way, (k,) float64, dimensionless, where a third label was met, (k,) bool, and that
+    label, (k,) int64, index.
     """
     low, high = np.zeros(len(start)), np.ones(len(start))
     length = np.linalg.norm(end[:, :3] - start[:, :3], axis=1)

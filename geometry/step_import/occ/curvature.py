@@ -57,7 +57,7 @@ def curvatures(surface: BRepAdaptor_Surface, uv: F64, reversed_face: bool) -> F6
     """Principal curvatures at surface parameters [DoCarmo1976].
 
     surface       : kernel surface of a face
-    uv            : (n, 2) float64, parameters of the surface
+    uv            : (n, 2) float64, rad, mm or dimensionless, parameters of the surface
     reversed_face : bool, the normal of the face is opposite to that of its surface
 
     Returns (n, 2) float64, 1/mm, least and greatest, positive where the material is convex; NaN where the surface

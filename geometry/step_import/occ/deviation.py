@@ -109,12 +109,12 @@ def _face_deviation(shape: Shape, surface: BRepAdaptor_Surface, face: FaceMesh, 
 
 
 def node_gaps(surface: BRepAdaptor_Surface, nodes: F64, uv: F64) -> F64:
-    """Distance of nodes from the surface point at their parameters, (n,) float64, mm: the gaps of the file's edges.
+    """Distance of nodes from the surface point at their parameters: the gaps of the file's edges.
 
     nodes : (n, 3) float64, mm, frame of the surface
-    uv    : (n, 2) float64, parameters of the surface
+    uv    : (n, 2) float64, rad, mm or dimensionless, parameters of the surface
 
-    No mesh can be nearer to the surface at these nodes.
+    Returns (n,) float64, mm. No mesh can be nearer to the surface at these nodes.
     """
     if not len(nodes):
         return np.zeros(0)
@@ -127,7 +127,7 @@ def distance_near(surface: BRepAdaptor_Surface, centre: list[float], uv: F64, en
 
     surface : kernel surface
     centre  : 3 numbers, mm
-    uv      : (2,) float64, parameters near the foot point
+    uv      : (2,) float64, rad, mm or dimensionless, parameters near the foot point
     enough  : float, mm; a bound below this is not lowered further
 
     Returns float, mm: least distance to the surface points of a few Gauss-Newton steps from ``uv``.

@@ -51,11 +51,13 @@ def extend_parameters(mesh: TriangleMesh, uv: F64, project: Callable[[int, F64, 
     """Surface parameters for the triangles that ``fill_slivers`` appended.
 
     mesh    : TriangleMesh with m triangles, mm
-    uv      : (k, 3, 2) float64, parameters of the corners of the first k triangles, k <= m
-    project : face number, point (3,) mm and a start (2,) -> parameters (2,) near the start
+    uv      : (k, 3, 2) float64, rad, mm or dimensionless, parameters of the corners of the first k triangles, k <= m
+    project : takes a face number, a point (3,) float64, mm, frame of the mesh, and a start (2,) float64, parameters;
+              gives the parameters (2,) float64 near the start
 
-    Returns (m, 3, 2) float64 parameters. A corner that lies on the face already copies its value there; of several
-    values at a seam it takes the one nearest to that of the first corner. Other corners are projected on the face.
+    Returns (m, 3, 2) float64, rad, mm or dimensionless, parameters. A corner that lies on the face already copies
+    its value there; of several values at a seam it takes the one nearest to that of the first corner. Other corners are
+    projected on the face.
     """
     extra: list[F64] = []
     for corners, face in zip(mesh.faces[len(uv):], mesh.face_ids[len(uv):], strict=True):

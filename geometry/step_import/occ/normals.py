@@ -22,7 +22,7 @@ def corner_normals(shapes: list[Shape], ids: I32, uv: F64) -> F64:
 
     shapes : kernel faces in order
     ids    : (m,) int32, index, 1-based, of the face of every triangle
-    uv     : (m, 3, 2) float64, surface parameters of the corners
+    uv     : (m, 3, 2) float64, rad, mm or dimensionless, surface parameters of the corners
 
     Returns (m, 3, 3) float64, dimensionless, out of the material, in the frame of the shapes. At a singular point every
     triangle has its own normal, that of the surface just beside the point; NaN where that does not exist either.

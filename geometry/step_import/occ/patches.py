@@ -36,9 +36,16 @@ LOOKS = 15
 
 def load_patches(path: str | Path, *, placement: SetupFrame | None = None, solid: int | None = None,
                  fuse: bool = False, faces: Iterable[int] | None = None) -> bytes:
-    """The work of ``geometry.step_import.face_surfaces.read_patches`` in this process, arguments and errors as there.
+    """The work of ``geometry.step_import.face_surfaces.read_patches`` in this process, arguments as there.
 
     Returns the bytes ``patches_from_bytes`` reads.
+
+    Raises
+    ------
+    GeometryError
+        A face does not exist.
+    StepError, PartError
+        As ``load_solid``.
     """
     shapes = faces_of(load_solid(path, solid, fuse).body)
     wanted = range(1, len(shapes) + 1) if faces is None else sorted(set(faces))

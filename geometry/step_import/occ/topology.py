@@ -48,7 +48,7 @@ def edges_of(shape: Shape) -> list[Shape]:
 
 
 def box_of(shape: Shape) -> F64:
-    """(2, 3) float64, mm: a box that holds the shape; free-form faces may leave some room in it."""
+    """(2, 3) float64, mm, frame of the shape: a box that holds it; free-form faces may leave some room in it."""
     box = Bnd_Box()
     BRepBndLib.AddOptimal_s(shape, box, False, False)
     return _corners(box)
@@ -62,7 +62,7 @@ def _corners(box: Bnd_Box) -> F64:
 
 
 def quick_box(shape: Shape) -> F64:
-    """(2, 3) float64, mm: a box from poles and knots, cheap and never too small, possibly much too large."""
+    """(2, 3) float64, mm, frame of the shape: a box from poles and knots, never too small, often too large."""
     box = Bnd_Box()
     BRepBndLib.Add_s(shape, box, False)
     return _corners(box)
