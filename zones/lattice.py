@@ -66,7 +66,7 @@ class Lattice:
         return slice(i, i + self.ny), slice(j, j + self.nx)
 
     def cells(self, xy: F64) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Row and column of the nearest node, (n,) int64, index, clipped to the lattice.
+        """Row and column of the nearest node, both (n,) int64, index, clipped to the lattice.
 
         xy : (n, 2) float64, mm, in the access frame, z ignored
         """

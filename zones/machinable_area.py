@@ -36,7 +36,7 @@ def machinable_faces(samples: SurfaceSamples, seat: Collection[int], wanted: set
 
     samples    : SurfaceSamples of all faces, in the frame of the directions
     seat       : numbers of the faces that the part stands on
-    directions : (d, 3) float64, dimensionless, from the tool tip to the spindle
+    directions : (d, 3) float64, dimensionless, from the tool tip to the spindle, frame of the samples
     """
     total = np.bincount(samples.face, weights=samples.area)
     least = np.where(np.isin(samples.face, list(seat)), STEEP, SEEN)
@@ -49,7 +49,7 @@ def machinable_faces(samples: SurfaceSamples, seat: Collection[int], wanted: set
 
 
 def forms_of(normals: F64) -> NDArray[np.object_]:
-    """Form of each sample, (n,) object array of AreaForm.
+    """Form of each sample, (n,) object, each an AreaForm.
 
     normals : (n, 3) float64, dimensionless, unit normals in the access frame, out of the material
     """

@@ -147,21 +147,21 @@ class FaceGraph:
 
     @cached_property
     def normal(self) -> F64:
-        """(n, 3) float64, dimensionless, area-weighted mean outward normal; shorter than 1 where the face bends."""
+        """(n, 3) float64, dimensionless, frame of the mesh: area-weighted mean outward normal."""
         w = self.mesh.normals * self.mesh.areas[:, None]
         total = np.column_stack([np.bincount(self.face_of, weights=w[:, k], minlength=self.n) for k in range(3)])
         return np.asarray(total / np.maximum(self.area, 1e-30)[:, None])
 
     @cached_property
     def centroid(self) -> F64:
-        """(n, 3) float64, mm."""
+        """(n, 3) float64, mm, frame of the mesh: centre of area of each face."""
         w = self.mesh.triangles.mean(axis=1) * self.mesh.areas[:, None]
         total = np.column_stack([np.bincount(self.face_of, weights=w[:, k], minlength=self.n) for k in range(3)])
         return np.asarray(total / np.maximum(self.area, 1e-30)[:, None])
 
     @cached_property
     def z_range(self) -> F64:
-        """(n, 2) float64, mm: lowest and highest point of each face."""
+        """(n, 2) float64, mm, heights in the frame of the mesh: lowest and highest point of each face."""
         z = self.mesh.triangles[:, :, 2]
         out = np.column_stack([np.full(self.n, np.inf), np.full(self.n, -np.inf)])
         np.minimum.at(out[:, 0], self.face_of, z.min(axis=1))
@@ -219,7 +219,7 @@ class FaceGraph:
 
         face  : 0-based
         nodes : (k,) int64, index of vertices of triangles of that face
-        Returns (k, 3) float64, dimensionless; NaN where the face has no triangle at the vertex.
+        Returns (k, 3) float64, dimensionless, frame of the mesh; NaN where the face has no triangle at the vertex.
         """
         keys, total = self._corner_normals
         key = nodes.astype(np.int64) * self.n + face
@@ -351,7 +351,8 @@ def cast(tree: TriangleTree, origins: F64, directions: F64, skin: float) -> tupl
     origins, directions : (n, 3) float64, mm and dimensionless, in the frame of the mesh
     skin                : mm, nearer hits are the surface itself
 
-    Returns (n,) float64 distances from the origins (inf where nothing is hit) and (n,) int triangles (-1 there).
+    Returns distances from the origins, (n,) float64, mm, inf where nothing is hit, and triangles, (n,) int64, index,
+    -1 there.
     """
     if len(origins) == 0:
         return np.zeros(0), np.zeros(0, np.int64)

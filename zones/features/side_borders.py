@@ -71,17 +71,19 @@ class SideBorder:
         return BorderPlaces(piece, (2.0 * within + 1.0) * half, half)
 
     def points(self, at: BorderPlaces, inset: float) -> F64:
-        """(k, 3) float64, mm: the places, moved by a share of a triangle into the side."""
+        """(k, 3) float64, mm, frame of the mesh: the places, moved by a share of a triangle into the side."""
         a, b = self.ends[at.piece, 0], self.ends[at.piece, 1]
         p = a + at.t[:, None] * (b - a)
         return np.asarray(p + inset * (self.middle[at.piece] - p))
 
     def least(self, rays: Rays, at: BorderPlaces, length: F64, inset: float) -> tuple[float, F64, F64] | None:
-        """The shortest ray at the border: its length (mm), start and foot, (3,) each; None where there is none.
+        """The shortest ray at the border; None where there is none.
 
         at     : BorderPlaces of the first look
         length : (k,) float64, mm, lengths of the rays there, inf for no ray
         inset  : share of a triangle by which places are moved into the side
+
+        Returns the length (mm), and start and foot, both (3,) float64, mm, frame of the mesh.
         """
         best: tuple[float, F64, F64] | None = None
         keep = CLOSER

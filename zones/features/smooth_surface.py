@@ -28,7 +28,8 @@ class SmoothSurface:
     """Places and normals of the exact surface on chosen triangles of a mesh, in the frame of the mesh.
 
     mesh      : TriangleMesh
-    uv        : (m, 3, 2) float64, surface parameters of the corners of its triangles; None: facets as they are
+    uv        : (m, 3, 2) float64, rad, mm or dimensionless, surface parameters of the corners of its triangles; None:
+                facets as they are
     triangles : (k,) int64, index of triangles of whole faces
     tolerance : mm, largest distance of the facets from the surface
     """
@@ -51,9 +52,10 @@ class SmoothSurface:
     def at(self, points: F64, triangles: np.ndarray) -> tuple[F64, F64]:
         """Places on the exact surface next to points of triangles, and outward unit normals there.
 
-        points    : (n, 3) float64, mm, on the triangles
+        points    : (n, 3) float64, mm, on the triangles, frame of the mesh
         triangles : (n,) int64, index
-        Returns (n, 3) and (n, 3) float64; the points and facet normals where no patch exists or it is rejected.
+        Returns places, (n, 3) float64, mm, and normals, (n, 3) float64, dimensionless, frame of the mesh: the points
+        and facet normals where no patch exists or it is rejected.
         """
         place, normal = points.copy(), self.mesh.normals[triangles].copy()
         known = np.flatnonzero(self.row[triangles] >= 0)

@@ -248,9 +248,11 @@ def runs_of(names: Sequence[str], closed: bool) -> list[list[int]]:
 
 
 def spread(points: F64, closed: bool, pitch: float) -> tuple[F64, F64]:
-    """Evenly spaced points along a polyline and the unit normals to its left, (k, 2) float64 each.
+    """Evenly spaced points along a polyline and the unit normals to its left.
 
     points : (n, 2) float64, mm, in plan of the first access's frame; the last joins the first where ``closed``
+
+    Returns points, (k, 2) float64, mm, and normals, (k, 2) float64, dimensionless, in the same frame.
     """
     line = np.vstack([points, points[:1]]) if closed else points
     step = np.diff(line, axis=0)

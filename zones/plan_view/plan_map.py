@@ -52,7 +52,7 @@ class PlanMap:
         """Map of areas, and of lines that cut cells in two without naming either side [DeBerg2008, chapter 6].
 
         areas : PlanArea, mm
-        lines : polylines (k, 2) float64, mm
+        lines : polylines (k, 2) float64, mm, in plan
         grid  : mm, grid step of the borders; thinner areas may vanish
         seed  : of the random order of insertion; changes the time, never the cells
         """
@@ -71,8 +71,8 @@ class PlanMap:
     def of_cover(name: str, border: F64, grid: float = 1e-3, seed: int = 0) -> PlanMap:
         """Map of one area with the largest possible cells.
 
-        border : (k, 2, 2) float64, mm, directed borders that form closed lines (``zones.plan_view.plan_cover``); the
-                 area is where they wind counter-clockwise
+        border : (k, 2, 2) float64, mm, in plan, directed borders that form closed lines
+                 (``zones.plan_view.plan_cover``); the area is where they wind counter-clockwise
         """
         made = TrapezoidMap.of(border, grid, seed)
         faces = made.faces()
@@ -88,12 +88,12 @@ class PlanMap:
         return shapely.union_all([self.map.outline(self.faces, k) for k in cells.tolist()])
 
     def cell_at(self, xy: ArrayLike) -> NDArray[np.int64]:
-        """(n,) int64, index of the cell at each place, ``OUTSIDE`` beyond the box. xy : (n, 2) float64, mm."""
+        """(n,) int64, index of the cell at each place, ``OUTSIDE`` beyond the box. xy : (n, 2) float64, mm, in plan."""
         at = self.map.locate(xy)
         return np.where(at >= 0, self.faces.of_trapezoid[at], OUTSIDE)
 
     def over_at(self, xy: ArrayLike) -> NDArray[np.bool_]:
-        """(n, areas) bool: areas that cover each place. xy : (n, 2) float64, mm."""
+        """(n, areas) bool: areas that cover each place. xy : (n, 2) float64, mm, in plan."""
         cell = self.cell_at(xy)
         return np.where((cell >= 0)[:, None], self.over[cell], False)
 

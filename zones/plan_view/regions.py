@@ -93,7 +93,7 @@ class Labels:
 
     @property
     def names(self) -> NDArray[np.object_]:
-        """(n,) object array, name of the region of each point."""
+        """(n,) object, str: name of the region of each point."""
         return np.array([r.name for r in self.regions], dtype=object)[self.code] if len(self.code) else \
             np.zeros(0, dtype=object)
 
@@ -125,7 +125,8 @@ class RegionLocator:
 
         points, normals : (n, 3) float64 in the access frame, mm and dimensionless
         face            : (n,) int32, index, face numbers
-        first           : the same points and normals in the frame of the first access; None where that is this one
+        first           : the same points and normals, both (n, 3) float64, mm and dimensionless, in the frame of the
+                          first access; None where that is this one
         """
         there = (points, normals) if first is None else first
         bases, base = self.bases, self.table[face]

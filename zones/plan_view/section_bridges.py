@@ -24,8 +24,8 @@ def bridge(before: F64, after: F64, reach: float) -> F64:
 
     Returns
     -------
-    (k, 2) float64
-        mm, without both ends; no point where the ends lie in line or where the bridge is the chord. The error on a
+    (k, 2) float64, mm, in plan
+        Without both ends; no point where the ends lie in line or where the bridge is the chord. The error on a
         circle bridged over 90 degrees is 0.03 % of the chord and 0.1 degrees, besides the error of the nodes.
     """
     p, q = before[-1], after[0]
@@ -49,7 +49,7 @@ def direction(points: F64, reach: float) -> F64:
     points : (n, 2) float64, mm, in plan of the access frame, two or more
     reach  : mm; at least three nodes count, where there are three
 
-    Returns (2,) float64, dimensionless.
+    Returns (2,) float64, dimensionless, in plan.
     """
     length = np.linalg.norm(np.diff(points, axis=0), axis=1)
     s = np.cumsum(length)

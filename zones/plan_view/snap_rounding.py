@@ -118,6 +118,7 @@ def finite_pairs(values: ArrayLike, shape: str) -> F64:
 
     values : (n, 2) or (n, 2, 2) float64, mm or grid steps, in plan
     shape  : "(n, 2)" for points or "(n, 2, 2)" for segments
+    Returns (n, 2) or (n, 2, 2) float64, mm or grid steps as given, in plan.
     Raises InputError (bad_segments, not_finite; the subjects are the rows).
     """
     try:
@@ -156,8 +157,11 @@ def crossing_pixel(s: list[list[int]], t: list[list[int]]) -> tuple[int, int] | 
 
 
 def runs_through(segments: I64, pixels: I64) -> NDArray[np.bool_]:
-    """Whether segment k runs through pixel k, exactly: segments (n, 2, 2), pixels (n, 2) int64, unit one
-    grid step. Returns (n,).
+    """Whether segment k runs through pixel k, exactly.
+
+    segments : (n, 2, 2) int64, index of the grid
+    pixels   : (n, 2) int64, index of the grid
+    Returns (n,) bool.
 
     Doubled coordinates make the corners whole; products stay below 2^56.
     """

@@ -94,7 +94,8 @@ class TrapezoidMap:
         grid     : mm, step of the grid of the arrangement
         seed     : of the order of insertion; changes the time, never the map
         margin   : mm, > 0, of the box round the segments, rounded up to the grid
-        Raises InputError (bad_segments, not_finite, bad_grid, bad_margin, out_of_bounds), GeometryError (not_noded).
+        Raises InputError (bad_segments, not_finite, bad_grid, bad_margin, out_of_bounds), GeometryError (not_noded),
+        InternalError (broken_map).
 
         >>> TrapezoidMap.of([[[0, 0], [4, 0]], [[4, 0], [0, 3]], [[0, 3], [0, 0]]]).faces().areas.round(6).tolist()
         [24.0, 6.0]
@@ -111,7 +112,8 @@ class TrapezoidMap:
     def of_noding(noding: Noding, seed: int = 0, margin: float = 1.0) -> TrapezoidMap:
         """Map of pieces that meet only at their ends, which the construction checks exactly [DeBerg2008, chapter 6].
 
-        Raises GeometryError (not_noded, with the numbers of two pieces), InputError (bad_margin, out_of_bounds).
+        Raises GeometryError (not_noded, with the numbers of two pieces), InputError (bad_margin, out_of_bounds),
+        InternalError (broken_map).
         """
         made = _built(noding, seed, margin)
         if isinstance(made, TrapezoidMap):
@@ -139,7 +141,10 @@ class TrapezoidMap:
         return np.stack([np.stack(r, axis=-1) for r in rows], axis=1) * self.noding.grid
 
     def locate(self, points: ArrayLike) -> I64:
-        """(k,) int64, index of the trapezoid of each point; see ``look_up``. points : (k, 2) float64, mm, in plan."""
+        """(k,) int64, index of the trapezoid of each point; see ``look_up``.
+
+        points : (k, 2) float64, mm, in plan
+        """
         return self.look_up(points)[0]
 
     def look_up(self, points: ArrayLike) -> tuple[I64, I64]:
@@ -148,9 +153,9 @@ class TrapezoidMap:
         points : (k, 2) float64, mm, in plan
 
         Points are rounded to 1/256 of the grid step. A point on a piece belongs above it; on a vertical piece, or
-        under or over a point of the map, right of it. Returns two (k,) int64: the trapezoid, -1 outside the box
-        (and on its right and top side), and the count of visited inner nodes. Raises InputError (bad_segments,
-        not_finite).
+        under or over a point of the map, right of it. Returns the trapezoid, (k,) int64, index, -1 outside the
+        box (and on its right and top side), and the visited inner nodes, (k,) int64, count.
+        Raises InputError (bad_segments, not_finite).
         """
         steps = finite_pairs(points, "(n, 2)") / self.noding.grid
         far = float(kernel.LIMIT)

@@ -25,6 +25,7 @@ FREE, MINE, OTHER = 0, 1, 2
 class Pieces:
     """One wall cut at one height: arrays of pieces in walking order, the void on their left.
 
+    owner  : (f,) int64, index of the wall of each face, -1 for a free face
     a, b   : (p, 2) float64, mm, ends
     way    : (p, 2) float64, unit direction
     length : (p,) float64, mm

@@ -22,8 +22,9 @@ def access_rotation(direction: ArrayLike) -> F64:
     """Rotation into the frame of an access direction.
 
     direction : (3,) float64, dimensionless, tool tip to spindle, in the setup frame; any length but zero
-    Returns (3, 3) float64. Its rows are the axes of the access frame in the setup frame: z is the direction, x the
-    component of the setup's X square to it (of its Y where the direction runs along X). The origin does not move.
+    Returns (3, 3) float64, dimensionless. Its rows are the axes of the access frame in the setup frame: z is the
+    direction, x the component of the setup's X square to it (of its Y where the direction runs along X). The origin
+    does not move.
 
     >>> access_rotation([0, 0, -1]).tolist()
     [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]
@@ -39,7 +40,7 @@ def access_rotation(direction: ArrayLike) -> F64:
 def turned(part: Part, rotation: F64) -> Part:
     """The part in another frame with the same origin: points p (mm) become ``rotation @ p``.
 
-    rotation : (3, 3) float64, dimensionless
+    rotation : (3, 3) float64, dimensionless, its rows the axes of the new frame
     """
     if np.array_equal(rotation, np.eye(3)):
         return part
@@ -51,7 +52,10 @@ def turned(part: Part, rotation: F64) -> Part:
 
 
 def turned_samples(samples: SurfaceSamples, rotation: F64) -> SurfaceSamples:
-    """The samples (mm) in another frame with the same origin. rotation : (3, 3) float64, dimensionless."""
+    """The samples (mm) in another frame with the same origin.
+
+    rotation : (3, 3) float64, dimensionless, its rows the axes of the new frame
+    """
     if np.array_equal(rotation, np.eye(3)):
         return samples
     return replace(samples, points=np.ascontiguousarray(samples.points @ rotation.T),
@@ -100,9 +104,19 @@ class View:
         return bool(np.array_equal(self.rotation, self.first))
 
     def into(self, vectors: F64) -> F64:
-        """Points (mm) or directions, (n, 3), of the setup frame in the access frame. vectors : (n, 3) float64."""
+        """Points or directions of the setup frame in the access frame.
+
+        vectors : (n, 3) float64, mm or dimensionless, setup frame
+
+        Returns (n, 3) float64, mm or dimensionless, access frame.
+        """
         return np.asarray(vectors @ self.rotation.T)
 
     def back(self, vectors: F64) -> F64:
-        """Points (mm) or directions, (n, 3), of the access frame in the setup frame. vectors : (n, 3) float64."""
+        """Points or directions of the access frame in the setup frame.
+
+        vectors : (n, 3) float64, mm or dimensionless, access frame
+
+        Returns (n, 3) float64, mm or dimensionless, setup frame.
+        """
         return np.asarray(vectors @ self.rotation)

@@ -66,8 +66,8 @@ def directions_over_hemisphere(count: int, *, whole: bool = False) -> F64:
 def assembly(tool: ToolBody, clear: Clearances, allowance: float) -> F64:
     """Cutting part, shank and holder in the form of ``geometry.mesh_queries.tilted_collision``, tool frame.
 
-    Returns (k, 3) float64, mm: radius, corner radius, height above the tip, all grown by the allowance. Bodies above
-    one that is as wide are left out.
+    Returns (k, 3) float64, mm, tool frame: radius, corner radius, height above the tip, all grown by the allowance.
+    Bodies above one that is as wide are left out.
     """
     rows = [(tool.radius + allowance, max(tool.corner_radius + allowance, 0.0), -allowance)]
     for d in sorted(discs_of(tool, clear), key=lambda d: (d.height, -d.radius)):
@@ -85,12 +85,12 @@ def approach(tree: TriangleTree, tool: ToolBody, clear: Clearances, points: Arra
     tool       : ToolBody
     clear      : Clearances
     points     : (n, 3) float64, mm, on the surface, frame of the tree
-    normals    : (n, 3) float64, dimensionless, out of the material
-    directions : (d, 3) float64, tool axes from the tip to the spindle
+    normals    : (n, 3) float64, dimensionless, out of the material, frame of the tree
+    directions : (d, 3) float64, dimensionless, tool axes from the tip to the spindle, frame of the tree
     lift       : mm, distance along the normal within which a touch counts
     allowance  : mm, material to leave on the part: the assembly is grown by it on all sides
-    tips       : (n, 3) float64, mm, from ``zones.reach.tip_field.touchable``: tips that touch the samples along the
-                 first direction, tried as well
+    tips       : (n, 3) float64, mm, frame of the tree, from ``zones.reach.tip_field.touchable``: tips that touch the
+                 samples along the first direction, tried as well
 
     Returns
     -------
@@ -167,7 +167,8 @@ def zone_cone(reachable: NDArray[np.bool_], area: F64, directions: ArrayLike, sh
 
     reachable  : (n, d) bool, from ``approach``
     area       : (n,) float64, mm², of each sample
-    directions : (d, 3) float64, frame of the samples; where none points down, axes that point down do not reach
+    directions : (d, 3) float64, dimensionless, frame of the samples; where none points down, axes that point down do
+                  not reach
     share      : least share of the area that an axis must reach
     holds_first : take the largest cone that contains the first direction, or that direction alone where it has no room
 

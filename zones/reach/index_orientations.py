@@ -70,15 +70,21 @@ def orientations(samples: SurfaceSamples, coverage: AxisCoverage, allowed: Calla
 
     samples : SurfaceSamples that remain, setup frame
     coverage : AxisCoverage of the tools
-    allowed : (d, 3) axes -> (d,) bool, axes that the machine can turn to
-    even    : axes (d, 3) near one (3,) at which the rotary axes stand at whole multiples of some degrees
-    known   : (k, 3) float64, dimensionless, axes in use, from which these samples remain
+    allowed : takes axes, (d, 3) float64, dimensionless, setup frame; gives (d,) bool, those the machine can turn to
+    even    : takes an axis, (3,) float64, dimensionless, setup frame, and some degrees; gives the axes near it, (d, 3)
+              float64, dimensionless, setup frame, at which the rotary axes stand at whole multiples of them
+    known   : (k, 3) float64, dimensionless, setup frame, axes in use, from which these samples remain
     worth   : mm², least area that an axis must win
 
     Returns
     -------
-    (k, 3) float64
-        Dimensionless, tip to spindle, setup frame, k at most 6; the axis that wins most first.
+    (k, 3) float64, dimensionless, setup frame
+        From the tip to the spindle, k at most 6; the axis that wins most first.
+
+    Raises
+    ------
+    InternalError
+        The choice among the axes has no solution.
 
     Notes
     -----

@@ -66,7 +66,7 @@ class TipField:
     tree   : TriangleTree of the obstacles (part and fixture boxes) in the access frame
     tool   : ToolBody
     clear  : Clearances
-    bounds : (2, 3) float64, mm, region of interest in plan
+    bounds : (2, 3) float64, mm, access frame, region of interest in plan
     step   : mm, spacing of the planning lattice
     allowance : mm, material to leave on the part: the cutting part is grown by it on all sides
     cusp   : mm, height that passes may leave above the allowance: shank and holder stay higher by it
@@ -110,13 +110,18 @@ class TipField:
         return disc.radius + self.allowance + diagonals * LOOKUP_STEP * math.sqrt(2.0)
 
     def disc_limit(self, disc: Disc, height: F64) -> F64:
-        """Tip limit for a disc, (n,) or (ny, nx) float64, mm. height : the same shape, mm, of the disc's underside."""
+        """Tip limit for a disc.
+
+        height : (n,) or (ny, nx) float64, mm, least height of the underside of the disc
+
+        Returns (n,) or (ny, nx) float64, mm, as ``height``.
+        """
         return np.asarray(height + self.allowance + self.cusp - disc.height)
 
     def window(self, lower: F64, upper: F64, step: float) -> TipField:
         """The same tool and obstacles on a lattice of another step.
 
-        lower, upper : (2,) float64, mm, corners in plan; step : mm
+        lower, upper : (2,) float64, mm, in plan, corners;  step : mm
         """
         out = copy.copy(self)
         out.lattice = Lattice.over(np.array([lower, upper]), 0.0, step)
@@ -156,10 +161,12 @@ class TipField:
         return self._height
 
     def rim(self, xy: F64, z: float, reach: float) -> F64:
-        """(k, 2) mm: nodes near xy where the cutting part is free at tip height z, next to a node where it is not.
+        """Nodes near xy where the cutting part is free at tip height z, next to a node where it is not.
 
-        xy : (n, 2) float64, mm; near is within ``reach`` mm along x and along y. Only the lattice around xy is
+        xy : (n, 2) float64, mm, in plan; near is within ``reach`` mm along x and along y. Only the lattice around xy is
              searched.
+
+        Returns (k, 2) float64, mm, in plan.
         """
         lat, half = self.lattice, int(math.ceil(reach / self.lattice.step))
         i, j = lat.cells(xy)
@@ -193,19 +200,28 @@ class TipField:
         return self._off[1]
 
     def tips(self, xy: F64) -> F64:
-        """Tip limit of the whole assembly, (n,) float64, mm; exact for the cutting part. xy : (n, 2) float64, mm."""
+        """Tip limit of the whole assembly, (n,) float64, mm; exact for the cutting part.
+
+        xy : (n, 2) float64, mm, in plan
+        """
         xy = np.ascontiguousarray(xy, dtype=np.float64)
         out = drop_tips(self.tree, xy, self.grown_radius, self.grown_corner) + self.allowance
         return np.asarray(np.maximum(out, noncut_lookup(self.noncut, self.coarse.frame, xy)))
 
     def blocked_by_cutter(self, tips: F64) -> NDArray[np.bool_]:
-        """(n,) bool: the cutting part enters the obstacles at tips. tips : (n, 3) float64, mm."""
+        """(n,) bool: the cutting part enters the obstacles at tips.
+
+        tips : (n, 3) float64, mm, access frame
+        """
         lowered = np.array(tips, dtype=np.float64)
         lowered[:, 2] -= self.allowance
         return blocked_many(self.tree, lowered, self.grown_radius, self.grown_corner)
 
     def blocked_by_body(self, tips: F64) -> NDArray[np.bool_]:
-        """(n,) bool: shank or holder come nearer than their clearance at tips. tips : (n, 3) float64, mm."""
+        """(n,) bool: shank or holder come nearer than their clearance at tips.
+
+        tips : (n, 3) float64, mm, access frame
+        """
         return np.asarray(noncut_blocked(self.noncut, self.coarse.frame, np.ascontiguousarray(tips)))
 
 
@@ -217,7 +233,7 @@ def contact_tips(tool: ToolBody, points: F64, normals: F64, lift: float) -> F64:
 
     points, normals : (n, 3) float64, mm and dimensionless, out of the material, access frame
     lift            : mm, offset of the contact along the normal
-    Returns (n, 3) float64 tips, mm. The contact lies on the torus of the corner: axis at
+    Returns (n, 3) float64, mm, access frame: tips. The contact lies on the torus of the corner: axis at
     p + r n + (R - r) n_xy/|n_xy|, tip at its height r (n_z - 1) + p_z. The whole bottom of a flat or bull end touches a
     level facet; there the axis is over the point.
     """
@@ -280,8 +296,8 @@ def touchable(field: TipField, points: F64, normals: F64, lift: float,
     -------
     by_cutter  : (n,) bool, the cutting part alone touches the sample
     by_tool    : (n,) bool, shank and holder stay clear as well
-    tips       : (n, 3) float64, mm, the admissible tip; else a tip at which the cutting part alone touches; else the
-                 first tried tip
+    tips       : (n, 3) float64, mm, access frame, the admissible tip; else a tip at which the cutting part alone
+                 touches; else the first tried tip
     """
     tips = contact_tips(field.tool, points, normals, lift + field.allowance)
     by_cutter, by_tool = np.zeros(len(points), np.bool_), np.zeros(len(points), np.bool_)

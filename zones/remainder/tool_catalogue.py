@@ -33,9 +33,11 @@ NOSE_STEP = 0.8  # mm, grid of the heights that holders must clear
 
 
 def catalogue(lengths: F64) -> F64:
-    """Lengths on sale, (k,) float64, mm, none below the given ones: steps of 1 mm up to 20 mm, of 5 mm above.
+    """Lengths on sale, none below the given ones: steps of 1 mm up to 20 mm, of 5 mm above.
 
     lengths : (k,) float64, mm
+
+    Returns (k,) float64, mm.
     """
     step = np.where(lengths <= 20.0, 1.0, 5.0)
     return np.asarray(step * np.ceil(lengths / step - 1e-9))
@@ -66,7 +68,7 @@ class Lengths:
     """Required lengths of necks and stickouts over obstacles.
 
     tree      : TriangleTree of part and fixtures, access frame
-    bounds    : (2, 3) float64, mm, of the part
+    bounds    : (2, 3) float64, mm, access frame, of the part
     clear     : Clearances
     allowance : mm, material left on the part; cusp : mm, height that passes may leave above that
     widest    : mm, diameter of the stoutest possible cutter
@@ -79,9 +81,11 @@ class Lengths:
         self._heights: dict[float, F64] = {}
 
     def at(self, body: ToolBody, tips: F64, floor: tuple[float, float] = (0.0, 0.0)) -> F64:
-        """Neck length and stickout that a tool needs, (k, 2) float64, mm, in catalogue steps, at least ``floor``.
+        """Neck length and stickout that a tool needs, in catalogue steps, at least ``floor``.
 
         tips : (k, 3) float64, mm, access frame
+
+        Returns (k, 2) float64, mm, along the axis of the tool frame.
 
         The visible length of a shank is at least its diameter. The search covers one cell of the shank and holder grid
         more than needed, so that the tool also passes that grid wherever its nodes lie.

@@ -92,6 +92,11 @@ def propose(samples: SurfaceSamples, requirement: ToolRequirement) -> ToolPropos
     samples     : SurfaceSamples of the remainder, mm, access frame
     requirement : ToolRequirement of the access
 
+    Raises
+    ------
+    InternalError
+        The choice among the tools has no solution.
+
     Notes
     -----
     Of more than 2000 samples, 2000 are drawn with a fixed seed and represent the rest.

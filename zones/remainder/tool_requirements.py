@@ -77,7 +77,7 @@ class ToolRequirement:
         return over_the_part(self.view.fields, self.view.tree, self.view.part.bounds, self.clear)
 
     def touched_by(self, samples: SurfaceSamples, fields: Mapping[str, TipField]) -> NDArray[np.object_]:
-        """(n,) object array: id of the stoutest whole tool that touches and can finish each sample, '' where none."""
+        """(n,) object, str: id of the stoutest whole tool that touches and can finish each sample, '' where none."""
         out = np.full(len(samples), "", dtype=object)
         for t in sorted(fields, key=lambda t: (-fields[t].tool.diameter, t)):
             left = np.flatnonzero(out == "")
@@ -92,9 +92,11 @@ class ToolRequirement:
         return like if cutter.at_hand else sold(like, cutter.diameter, cutter.corner)
 
     def need(self, cutter: CuttingPart, tips: F64) -> F64:
-        """Neck length and stickout that the tool needs, (k, 2) float64, mm.
+        """Neck length and stickout that the tool needs.
 
         tips : (k, 3) float64, mm, access frame, tips at which its cutting part fits
+
+        Returns (k, 2) float64, mm, along the axis of the tool frame.
 
         A tool at hand keeps at least its own lengths, so that its replacement loses nothing. The flutes of a tool to
         buy cover its whole corner.
@@ -106,7 +108,10 @@ class ToolRequirement:
         return self.lengths.at(body, tips, (body.neck_length, body.stickout) if cutter.at_hand else (own, own))
 
     def touches(self, cutter: CuttingPart, samples: SurfaceSamples) -> tuple[NDArray[np.int64], F64]:
-        """Samples that the cutting part alone touches and can finish: (k,) int64, index, and tips (k, 3), mm."""
+        """Samples that the cutting part alone touches and can finish, with tips.
+
+        Returns samples, (k,) int64, index, and tips, (k, 3) float64, mm, access frame.
+        """
         body = self.body(cutter)
         rows = np.flatnonzero(able(body, samples.normals, self.cusp))
         bare = replace(body, shank_diameter=body.diameter, holder=())

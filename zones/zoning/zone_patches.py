@@ -79,7 +79,8 @@ def _constant(label: int) -> Callable[[F64, F64, I32], NDArray[np.int64]]:
 class Nearest:
     """Label function: the owner of the nearest sample of the same face, form and cell; of the face where there is none.
 
-    view  : the first access; owner : (n,) int64, label of each of its samples
+    view  : the first access
+    owner : (n,) int64, index of the label of each of its samples
     """
 
     def __init__(self, view: View, owner: NDArray[np.int64]) -> None:

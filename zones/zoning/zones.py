@@ -83,7 +83,7 @@ class ZoneArea:
     def below_plane(self, names: NDArray[np.object_], heights: F64) -> NDArray[np.bool_]:
         """(n,) bool: samples below the cutting plane of their cell.
 
-        names   : (n,) object array, names of the cells
+        names   : (n,) object, str, names of the cells
         heights : (n,) float64, mm, of the samples, access frame
         """
         limit = np.array([self.planes.get(n, -np.inf) for n in names]) if self.planes else -np.inf
