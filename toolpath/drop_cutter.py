@@ -93,7 +93,7 @@ def push_cutter(mesh: TriangleMesh | TriangleTree, cutter: Cutter, tips: ArrayLi
     mesh      : TriangleMesh, or a TriangleTree over it for repeated use
     cutter    : Cutter, upright (+z)
     tips      : (n, 3) float64, mm, frame of the mesh, a point on the path of each tip
-    direction : (2,) float64, dimensionless, of any length above 0
+    direction : (2,) float64, dimensionless, frame of the mesh, of any length above 0
 
     Returns
     -------
@@ -127,7 +127,7 @@ def push_contacts(mesh: TriangleMesh | TriangleTree, cutter: Cutter, tips: Array
     mesh      : TriangleMesh, or a TriangleTree over it for repeated use
     cutter    : Cutter, upright (+z)
     tips      : (n, 3) float64, mm, frame of the mesh, a point on the path of each tip
-    direction : (2,) float64, dimensionless, of any length above 0
+    direction : (2,) float64, dimensionless, frame of the mesh, of any length above 0
 
     Raises
     ------

@@ -40,10 +40,12 @@ class Line:
 
 
 def thinned(points: F64, tolerance: float) -> F64:
-    """A polyline with points left out while the rest stays within a tolerance of it [Douglas1973], (m, 3) float64, mm.
+    """A polyline with points left out while the rest stays within a tolerance of it [Douglas1973].
 
     points    : (n, 3) float64, mm, access frame
     tolerance : mm
+
+    Returns (m, 3) float64, mm, access frame.
     """
     points = np.ascontiguousarray(points)
     keep = np.zeros(len(points), np.bool_)
@@ -62,9 +64,11 @@ def place_keys(points: F64) -> list[bytes]:
 
 
 def dense(points: F64, spacing: float) -> F64:
-    """A polyline with points added, at most ``spacing`` mm apart along it, (m, 3) float64, mm.
+    """A polyline with points added, at most ``spacing`` mm apart along it.
 
     points : (n, 3) float64, mm, access frame
+
+    Returns (m, 3) float64, mm, access frame.
     """
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     more = np.unique(np.concatenate([s, np.linspace(0.0, s[-1], int(s[-1] / spacing) + 2)]))
@@ -115,10 +119,12 @@ def pieces_where(line: Line, wanted: NDArray[np.bool_], extend: float, join: flo
 
 
 def stretch(points: F64, s: F64, low: float, high: float) -> F64:
-    """A polyline from ``low`` to ``high`` mm along it, (m, 3) float64, mm.
+    """A polyline from ``low`` to ``high`` mm along it.
 
     points : (n, 3) float64, mm, access frame
     s      : (n,) float64, mm, distance of its points along it
+
+    Returns (m, 3) float64, mm, access frame.
     """
     inner = points[(s > low) & (s < high)]
     ends = np.array([[np.interp(t, s, points[:, c]) for c in range(3)] for t in (low, high)])

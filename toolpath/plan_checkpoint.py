@@ -34,9 +34,9 @@ class PackedLines:
 
     @classmethod
     def of(cls, lines: Sequence[F64]) -> PackedLines:
-        """Joins lines, each (n, 3) float64, mm, access frame, tips.
+        """Joins lines.
 
-        lines : sequence of arrays
+        lines : each (n, 3) float64, mm, access frame, tips
         """
         return cls(np.concatenate([np.zeros((0, 3)), *lines]), np.array([len(line) for line in lines], np.int64))
 

@@ -40,11 +40,12 @@ def places_along(tips: F64, axes: F64, reach: float, spacing: float) -> F64:
 
 
 def between(tips: F64, axes: F64, places: F64) -> tuple[F64, F64]:
-    """Tips and axes, both (m, 3) float64, at fractional poses: tips straight between poses, axes evenly on the great
-    circle [Shoemake1985].
+    """Tips and axes at fractional poses: tips straight between poses, axes evenly on the great circle [Shoemake1985].
 
     tips, axes : (n, 3) float64, mm and unit, access frame
     places     : (m,) float64, index of poses with fractions, as ``places_along`` gives them
+
+    Returns both as (m, 3) float64, mm and unit, access frame.
     """
     k = np.clip(places.astype(np.int64), 0, max(len(tips) - 2, 0))
     share = (places - k)[:, None]

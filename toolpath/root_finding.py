@@ -15,14 +15,15 @@ ROUNDS = 60
 def roots(f: Callable[[F64, NDArray[np.int64]], F64], a: F64, b: F64, at_a: F64, at_b: F64, tolerance: float) -> F64:
     """Places where functions change sign between a and b, by the Illinois rule [Dowell1971].
 
-    f          : values at places (k,) of the functions with index (k,) int64; may be infinite
-    a, b       : (n,) float64, ends of the brackets, dimensionless or any unit
-    at_a, at_b : (n,) float64, values there, of different signs or zero
+    f          : takes places, (k,) float64, mm, rad or dimensionless, and which functions, (k,) int64, index; gives
+                 their values, (k,) float64, which may be infinite
+    a, b       : (n,) float64, mm, rad or dimensionless, ends of the brackets
+    at_a, at_b : (n,) float64, mm, rad or dimensionless, values there, of different signs or zero
     tolerance  : a bracket this narrow, or a value this small, ends the search
 
     Returns
     -------
-    (n,) float64
+    (n,) float64, mm, rad or dimensionless as ``a``
         By false position. The value at the end that stays is halved, so that both ends move. A bracket with an infinite
         value is halved.
     """

@@ -28,7 +28,7 @@ OUTWARDS = 12  # steps along a normal in search of the envelope
 class Envelope:
     """The lower envelope of a cutter along polylines.
 
-    paths  : sequence of (n, 3) float64, mm, tips; the cutter goes straight from one to the next
+    paths  : sequence of (n, 3) float64, mm, access frame, tips; the cutter goes straight from one to the next
     cutter : Cutter, upright (+z), endless upwards
     """
 

@@ -48,7 +48,7 @@ class Pace:
 
 
 def paced(points: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> list[tuple[bool, F64, float]]:
-    """A pass in stretches: whether each is in air, its points, (m, 3) float64, mm, and its feed, mm/min.
+    """A pass in stretches: whether each is in air, its points, (m, 3) float64, mm, access frame, and its feed, mm/min.
 
     Where the stock map shows nothing along the whole pass, the pass removes what the map does not show. Where moves in
     air are no faster than those in stock, the pass stays whole. A pass with a feed for hidden stock has no stretch in

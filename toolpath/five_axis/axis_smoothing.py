@@ -156,7 +156,7 @@ def fan(axis: F64, half: float) -> F64:
     axis : (n, 3) float64, dimensionless, unit, access frame
     half : rad, half the opening of the fan
 
-    Returns (n, d, 3) float64, dimensionless, unit.
+    Returns (n, d, 3) float64, dimensionless, unit, access frame.
     """
     rows = [np.array([[0.0, 0.0, 1.0]])]
     for k in range(1, int(half / FAN + 1e-9) + 1):

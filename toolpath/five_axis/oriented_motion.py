@@ -179,7 +179,7 @@ def lowest(tips: F64, axes: F64, tool: ToolBody, discs: Sequence[Disc], up: F64)
     """Lowest point of a tool along ``up``, with shank and holder grown by their clearance, (n,) float64, mm.
 
     tips, axes : (n, 3) float64, mm and unit, access frame, tilted less than 90 degrees off ``up``
-    up         : (3,) float64, unit
+    up         : (3,) float64, unit, access frame
     """
     rise = axes @ up
     lean = np.sqrt(np.maximum(1.0 - rise * rise, 0.0))

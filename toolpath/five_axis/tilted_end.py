@@ -58,8 +58,8 @@ class PassContacts:
     def on(cls, surface: NurbsSurface, uv: F64, along: F64) -> PassContacts:
         """Contacts at parameters of a surface.
 
-        uv    : (m, 2) float64, parameters of the surface
-        along : (m, 2) float64, direction of the feed in the parameters, of any length
+        uv    : (m, 2) float64, dimensionless, parameters of the surface
+        along : (m, 2) float64, dimensionless, direction of the feed in the parameters, of any length
         """
         d, normal = surface.derivatives(uv), surface.normals(uv)
         way = d.u * along[:, :1] + d.v * along[:, 1:]
@@ -136,13 +136,14 @@ class Nose:
 
 
 def strip_edges(high: F64, feet: F64, height: float) -> F64:
-    """Places where the nose begins to stand higher than a height, going from the contact, (2, m, 2) float64,
-    parameters.
+    """Places where the nose begins to stand higher than a height, going from the contact.
 
     Where it does not on its front half, the place where it is widest.
 
     high, feet : (2, m, angles) and (2, m, angles, 2) float64, mm and parameters, as ``Nose.heights`` gives them
     height     : mm
+
+    Returns (2, m, 2) float64, dimensionless, parameters of the surface.
     """
     high, feet = high[:, :, :high.shape[2] // 2 + 1], feet[:, :, :high.shape[2] // 2 + 1]  # widest a quarter round
     over = high > height

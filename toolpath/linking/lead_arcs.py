@@ -36,14 +36,14 @@ def arc_onto(start: F64, ahead: F64, off: F64, radius: float, chord: float) -> F
     """A quarter of a circle onto the beginning of a pass.
 
     start  : (3,) float64, mm, access frame, beginning of the pass
-    ahead  : (3,) float64, unit, along the pass there
-    off    : (3,) float64, unit, square to that, away from the wall
+    ahead  : (3,) float64, unit, access frame, along the pass there
+    off    : (3,) float64, unit, access frame, square to that, away from the wall
     radius : mm
     chord  : mm, largest distance of its chords from it
 
     Returns
     -------
-    (n, 3) float64, mm, from off the wall to ``start``
+    (n, 3) float64, mm, access frame, from off the wall to ``start``
     """
     most = 2.0 * math.acos(max(1.0 - chord / radius, 0.0))
     a = np.linspace(0.5 * math.pi, 0.0, max(4, math.ceil(0.5 * math.pi / most)) + 1)[:, None]
@@ -57,13 +57,13 @@ def arcs_along(field: TipField, at: F64, way: F64, length: float, chord: float) 
 
     field  : TipField; where a wall is beside the end, arcs lead off it, else to both sides
     at     : (3,) float64, mm, access frame, the end
-    way    : (3,) float64, mm, along the pass there, away from the arc
+    way    : (3,) float64, mm, access frame, along the pass there, away from the arc
     length : mm, of the pass
     chord  : mm, largest distance of chords from an arc
 
     Yields
     ------
-    (n, 3) float64, mm, ending at ``at``; none where the pass goes up or down
+    (n, 3) float64, mm, access frame, ending at ``at``; none where the pass goes up or down
     """
     run = float(np.hypot(*way[:2]))
     if run < LEVEL_SHARE * float(np.linalg.norm(way)) or run <= 0.0:

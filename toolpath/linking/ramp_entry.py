@@ -33,7 +33,7 @@ def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: floa
 
     Returns
     -------
-    (m, 3) float64, mm, or None
+    (m, 3) float64, mm, access frame, or None
         The way and after it the whole pass; None where the pass is too short for a ramp.
 
     Notes

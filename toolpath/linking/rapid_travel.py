@@ -216,7 +216,7 @@ class Travel:
         return float(self.stock.overlap(points, self.field.tool, lower_bound=0.0).max()) <= AIR_TOLERANCE
 
     def parts(self, way: F64, *, seen: bool) -> Iterator[tuple[bool, F64]]:
-        """A way in stretches, (m, 3) float64, mm, each with whether it may be taken at the feed of links.
+        """A way in stretches, each with whether it may be taken at the feed of links.
 
         A stretch may where no stock wider than a step of the lattice touches it, wherever that stands between the
         nodes. A stretch shorter than a share of the diameter does not count.
@@ -224,6 +224,8 @@ class Travel:
         way  : (n, 3) float64, mm, access frame
         seen : also where the lattice shows no stock, from some distance behind the beginning to some before the first
                stock
+
+        Yields stretches with their points, (m, 3) float64, mm, access frame.
         """
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
         if s[-1] <= 1e-9:

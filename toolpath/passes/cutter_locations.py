@@ -33,11 +33,11 @@ def tips(contact: F64, normal: F64, tool: ToolBody, axis: F64 | None = None, sid
     """Tips of a ball, bull nose or flat that touches places of a surface [Sarkar2015, eq. 3.34].
 
     contact, normal : (n, 3) float64, mm and unit, access frame
-    axis            : (n, 3) or (3,) float64, unit; +Z where None
-    side            : (n, 3) float64, unit, across the axis: from the contact to the axis of a tool on a level place,
-                      where the normal does not define it (``sides``)
+    axis            : (n, 3) or (3,) float64, unit, access frame; +Z where None
+    side            : (n, 3) float64, unit, access frame, across the axis: from the contact to the axis of a tool on a
+                      level place, where the normal does not define it (``sides``)
 
-    Returns (n, 3) float64, mm; nan where a bull nose or a flat stands on a level place and ``side`` is None.
+    Returns (n, 3) float64, mm, access frame; nan where a bull nose or a flat stands on a level place without ``side``.
     """
     u = np.broadcast_to(np.array([0.0, 0.0, 1.0]) if axis is None else np.asarray(axis, np.float64), contact.shape)
     r, a = min(tool.corner_radius, tool.radius), tool.radius - min(tool.corner_radius, tool.radius)
@@ -52,14 +52,15 @@ def tips(contact: F64, normal: F64, tool: ToolBody, axis: F64 | None = None, sid
 
 
 def sides(profile: PassProfile, way: F64, axis: F64 | None = None) -> F64:
-    """Directions from the contact to the axis of a bull nose or a flat, at level places of a pass, (n, 3) float64,
-    unit.
+    """Directions from the contact to the axis of a bull nose or a flat, at level places of a pass.
 
     At a level place any point under the flat end may touch. The tool keeps the side of the nearest place of the pass
     that is not level; on a pass that is level throughout it is on the left.
 
     way  : (n,) float64, mm, distances along the pass
     axis : (n, 3) float64, unit, access frame, at those places; +Z where None
+
+    Returns (n, 3) float64, unit, access frame.
     """
     u = np.broadcast_to(np.array([0.0, 0.0, 1.0]) if axis is None else axis, (len(way), 3))
     contact, normal = contacts(profile, way)
@@ -99,8 +100,11 @@ def chorded(ways: F64, at: Callable[[F64], F64], tolerance: float) -> F64:
     """Distances along a pass with more between them, until the places half way and at quarters lie near the chords.
 
     ways      : (n,) float64, mm
-    at        : places (n, 3) float64, mm, access frame, at distances along the pass
+    at        : takes distances along the pass, (n,) float64, mm; gives the places there, (n, 3) float64, mm, access
+                frame
     tolerance : mm
+
+    Returns (m,) float64, mm, those of ``ways`` among them.
 
     A tip that keeps to chords of its path puts the tool no farther than that from its place. A ball does not need it,
     since its steps are measured on its swept volume. The chord crosses jumps, from one side of a level crest to the

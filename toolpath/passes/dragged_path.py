@@ -36,7 +36,7 @@ def follow(limit: Limit, way: F64, step: float, tolerance: float) -> tuple[F64, 
 
     Returns
     -------
-    points : (n, 3) float64, mm, on the limit, the corners of the way among them
+    points : (n, 3) float64, mm, access frame, on the limit, the corners of the way among them
     broken : (n - 1,) bool: no move from point k to k + 1
     """
     corners = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
@@ -71,7 +71,7 @@ def follow(limit: Limit, way: F64, step: float, tolerance: float) -> tuple[F64, 
 
 
 def pieces(limit: Limit, way: F64, step: float, tolerance: float) -> list[F64]:
-    """``follow`` in unbroken pieces, each (n, 3) float64, mm, thinned, within the tolerance in all.
+    """``follow`` in unbroken pieces, each (n, 3) float64, mm, access frame, thinned, within the tolerance in all.
 
     way : (m, 2) float64, mm, access frame, polyline in plan
 

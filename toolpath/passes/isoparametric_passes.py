@@ -111,14 +111,14 @@ class IsoSurface:
         return np.abs(inner) / np.sqrt(size), curvature
 
     def tangents(self, xi: F64, eta: F64) -> tuple[F64, F64]:
-        """Derivatives of (u, v) along xi and along eta, both (p, 2) float64, parameters of the surface.
+        """Derivatives of (u, v) along xi and along eta, both (p, 2) float64, dimensionless, parameters of the surface.
 
         xi, eta : (p,) float64, dimensionless
         """
         return self.grid.tangents(eta, xi)[::-1] if self.turned else self.grid.tangents(xi, eta)
 
     def parameters(self, xi: F64, eta: F64) -> F64:
-        """Parameters of the surface, (p, 2) float64; beyond its border the square continues straight.
+        """Parameters of the surface, (p, 2) float64, dimensionless; beyond its border the square continues straight.
 
         xi, eta : (p,) float64, dimensionless
         """
@@ -127,7 +127,7 @@ class IsoSurface:
     def square(self, uv: F64, xi: F64, eta: F64) -> tuple[F64, F64]:
         """Place over the unit square, or beyond it, of parameters of the surface, both (p,) float64, dimensionless.
 
-        uv      : (p, 2) float64, parameters of the surface
+        uv      : (p, 2) float64, dimensionless, parameters of the surface
         xi, eta : (p,) float64, dimensionless, where Newton's iteration begins
         """
         for _ in range(FEET):

@@ -119,8 +119,8 @@ class Family(ABC):
 
     dragged, target, promise : as above
     t      : (n,) float64, mm, place of each sample's tip; ascending, and so are the arrays below
-    strips : (n,) int64, the strip across the passes that each sample lies in
-    across : (n, 2) float64, unit, the way t grows at each sample
+    strips : (n,) int64, index, the strip across the passes that each sample lies in
+    across : (n, 2) float64, unit, in plan, the way t grows at each sample
     """
 
     def __init__(self, dragged: Dragged, target: FinishTarget, promise: Promise, t: F64, strips: I64,

@@ -68,12 +68,13 @@ class Depths:
         return np.array([move in self._moves for move in zip(keys[:-1], keys[1:], strict=True)], np.bool_)
 
     def near(self, place: F64, reach: float) -> F64:
-        """Places within ``reach`` mm of a place where the tool has been, nearest first, the lowest of each cell, (n, 3)
-        float64, mm.
+        """Places within ``reach`` mm of a place where the tool has been, nearest first, the lowest of each cell.
 
         The tool can come down there again from above.
 
         place : (2,) float64, mm, access frame
+
+        Returns (n, 3) float64, mm, access frame.
         """
         lat = self._lattice
         (i0, i1), (j0, j1) = (sorted(k.tolist()) for k in lat.cells(np.array([place - reach, place + reach])))

@@ -29,7 +29,7 @@ class ResidualMap:
     """Residual material at samples, lowered pass by pass.
 
     points   : (n, 3) float64, mm, access frame
-    normals  : (n, 3) float64, unit
+    normals  : (n, 3) float64, unit, access frame
     margin   : mm, a cutter farther away does not count
     residual : (n,) float64, mm, distance to the nearest swept cutting part so far; below 0 where one entered
     """
@@ -80,8 +80,8 @@ def leaning_depths(points: F64, tips: F64, axes: F64, tool: ToolBody, margin: fl
     """Least signed distance from points to the cutting part of a tool over all poses of a pass.
 
     points     : (n, 3) float64, mm, access frame
-    tips, axes : (m, 3) float64, mm and unit, tip to spindle; neighbouring axes less than a right angle apart; a single
-                 pose is a tool that stands still
+    tips, axes : (m, 3) float64, mm and unit, access frame, tip to spindle; neighbouring axes less than a right angle
+                 apart; a single pose is a tool that stands still
     tool       : its cutting part counts: nose, and cylinder up to the end of the flutes, where a disc closes it
     margin     : mm
 

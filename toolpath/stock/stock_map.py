@@ -186,7 +186,8 @@ class StockMap:
     def left_by(self, others: Sequence[tuple[StockMap, F64]], lowest: float) -> None:
         """Lower the stock to what maps of it along other axes have left.
 
-        others : StockMaps, each with the rotation (3, 3) float64 from the frame of this one into its own
+        others : StockMaps, each with the rotation (3, 3) float64, dimensionless, from the frame of this one into its
+                 own
         lowest : mm, lower end of the blank in this frame. The part may begin higher: a lower corner of the blank still
                  stands in the way of tools along other axes
 
