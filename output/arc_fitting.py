@@ -131,7 +131,7 @@ def stretches(points: F64, count: I64, round_: BOOL, tolerance: float) -> Fitted
     """The lines and arcs that replace paths.
 
     points : (n, 3) float64, mm, frame of the step; the points of all paths, one path after the other
-    count  : (m,) int64, number of points of each path, >= 2
+    count  : (m,) int64, count of the points of each path, >= 2
     round_ : (m,) bool, whether the path may have arcs
     tolerance : float, mm, largest distance between a stretch and its path, in both directions
 

@@ -90,7 +90,7 @@ class RotaryMachine:
 
         turns : (..., 2) float64, rad or deg, of the tilting and the turning axis
 
-        Returns the same shape and unit; the function is its own inverse.
+        Returns (..., 2) float64, rad or deg as given; the function is its own inverse.
         """
         return turns if self.sense == (1, 1) else np.asarray(turns * np.array(self.sense))
 
@@ -127,8 +127,8 @@ class RotaryMachine:
 
         Returns
         -------
-        (n, 2, 2) float64
-            Rad; [:, 0] tilts to the positive side and [:, 1] to the negative one, C in (-pi, pi], 0 at the pole.
+        (n, 2, 2) float64, rad
+            [:, 0] tilts to the positive side and [:, 1] to the negative one, C in (-pi, pi], 0 at the pole.
 
         Notes
         -----
@@ -179,7 +179,8 @@ class RotaryMachine:
         turns : (n, 2) float64, rad, angles of the rotary axes
         gauge : mm, spindle face to tip; it counts where the head tilts
 
-        Returns (n, 3) float64, mm, machine coordinates. An OutputError (no_pivots) says that the machine has no pivots.
+        Returns (n, 3) float64, mm, machine coordinates.
+        Raises OutputError (no_pivots) where the machine has no pivots.
         """
         return self._places(tips, turns) - self._swing(turns, gauge)
 
@@ -191,6 +192,7 @@ class RotaryMachine:
         gauge  : mm, spindle face to tip
 
         Returns (n, 3) float64, mm, setup frame.
+        Raises OutputError (no_pivots) where the machine has no pivots.
         """
         place = joints + self._swing(turns, gauge)
         if self.turns_head:
@@ -208,8 +210,8 @@ class RotaryMachine:
 
         Returns
         -------
-        (n, 2) float64
-            Rad, within the limits; no step of C is longer than half a turn.
+        (n, 2) float64, rad
+            Within the limits; no step of C is longer than half a turn.
 
         Raises
         ------
@@ -241,7 +243,7 @@ class RotaryMachine:
 
         Returns
         -------
-        tips, turns : (m, 3) float64, mm, and (m, 2) float64, rad, m >= n, with the given points among them
+        tips, turns : (m, 3) float64, mm, setup frame, and (m, 2) float64, rad, m >= n, with the given points among them
 
         Raises
         ------
@@ -415,7 +417,7 @@ def program_limits(limits: F64, sense: tuple[int, int]) -> F64:
     limits : (2, 2) float64, rad or deg, least and greatest angle of both rotary axes
     sense  : 1 or -1 for each axis, as in ``RotaryMachine``
 
-    Returns (2, 2) float64, same unit; the function is its own inverse.
+    Returns (2, 2) float64, rad or deg as given; the function is its own inverse.
     """
     out = np.array(limits, dtype=np.float64)
     for row, sign in enumerate(sense):

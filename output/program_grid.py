@@ -55,7 +55,7 @@ def without_repeats(points: I64) -> I64:
 
     points : (n, k) int64, grid steps of 0.0001 mm
 
-    Returns (m, k) int64, 1 <= m <= n for n >= 1.
+    Returns (m, k) int64, grid steps of 0.0001 mm, 1 <= m <= n for n >= 1.
     """
     if len(points) < 2:
         return points
@@ -90,10 +90,12 @@ class GridArc:
 
 
 def pieces(points: I64, arcs: Sequence[ArcSpan]) -> Iterator[I64 | GridArc]:
-    """The blocks of a path: polylines (m, k), m >= 2, without repeats, and arcs, in order.
+    """The blocks of a path: polylines without repeats, and arcs, in order.
 
     points : (n, k) int64, grid steps of 0.0001 mm, X, Y, Z of the frame of the step first
     arcs   : stretches of rows of ``points``
+
+    Yields arcs, and polylines as (m, k) int64, grid steps of 0.0001 mm, m >= 2.
     """
     at = 0
     for arc in arcs:
@@ -149,7 +151,8 @@ def link(here: I64, start: I64, clearance: int) -> I64:
 
     here, start : (3,) int64, grid steps of 0.0001 mm, frame of the step;  clearance : int, grid steps
 
-    Returns (k, 3) int64 from ``here`` to ``start``, k <= 4, without repeats; k is 1 where they are equal.
+    Returns (k, 3) int64, grid steps of 0.0001 mm, from ``here`` to ``start``, k <= 4, without repeats; k is 1
+    where they are equal.
     """
     if (here == start).all():
         return here[None, :]
