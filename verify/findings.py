@@ -166,7 +166,7 @@ def residual_findings(points: F64, zone: I32, face: I32, excess: F64, area: F64,
     """Findings of samples outside the budget of their zone, by zone, face and 5 mm cell.
 
     points     : (n, 3) float64, mm, setup frame
-    zone, face : (n,) int32, row of ``zone_ids`` from 1, and face number
+    zone, face : (n,) int32, index, row of ``zone_ids`` from 1, and face number
     excess     : (n,) float64, mm left over the allowance, negative where the part is cut too deep
     area       : (n,) float64, mm²
     """

@@ -117,7 +117,7 @@ class BlankCylinder:
         """Distance from points inside to the surface along directions.
 
         points     : (n, 3) float64, mm, setup frame
-        directions : (n, 3) float64, unit
+        directions : (n, 3) float64, unit, setup frame
 
         Returns (n,) float64, mm.
         """
@@ -164,7 +164,7 @@ def stock_on_normals(points: F64, normals: F64, bounds: F64, setup: ProofSetup, 
     """Stock on each outward normal before the first cut, not above ``reach``.
 
     points, normals : (n, 3) float64, mm and unit, setup frame
-    bounds          : (2, 3) float64, mm, of the part
+    bounds          : (2, 3) float64, mm, setup frame, of the part
 
     Returns (n,) float64, mm: margin + uncertainty for an offset blank, else the distance out of the box, cylinder or
     mesh.

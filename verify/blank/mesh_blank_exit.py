@@ -18,7 +18,7 @@ def way_out_of_mesh(tree: TriangleTree, points: F64, directions: F64, beyond: fl
 
     tree       : TriangleTree, of a closed mesh with its normals outwards, mm
     points     : (n, 3) float64, mm, setup frame
-    directions : (n, 3) float64, unit
+    directions : (n, 3) float64, unit, setup frame
     beyond, reach : float, mm, 0 or more
 
     Returns (n,) float64, mm: 0 where a point is outside from the start.

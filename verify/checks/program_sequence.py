@@ -64,7 +64,7 @@ class FramedProgram:
 
         vectors : (n, 3) or (n, 3, 3) float64, mm or dimensionless, frame of the program
 
-        Returns the same shape, frame of the proof.
+        Returns (n, 3) or (n, 3, 3) float64, mm or dimensionless, frame of the proof.
         """
         return vectors if self.turn is None else np.asarray(vectors @ self.turn)
 

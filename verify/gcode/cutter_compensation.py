@@ -243,7 +243,10 @@ class Contour:
             self._last.waiting.append(item)
 
     def close(self) -> Iterator[Piece | object]:
-        """The last element to its end on its own normal, and what waited behind it."""
+        """The last element to its end on its own normal, and what waited behind it.
+
+        Raises CompensationError where the contour cannot be followed on that side.
+        """
         if self._last is not None:
             yield from self._settle(self._last.done)
 

@@ -69,7 +69,7 @@ class Frame:
 def about(matrix: F64, centre: Sequence[float]) -> Frame:
     """The frame with a given matrix that leaves one place where it is.
 
-    matrix : (3, 3) float64, dimensionless
+    matrix : (3, 3) float64, dimensionless, for programmed coordinates
     centre : (3,) mm, programmed coordinates
 
     A coordinate of the centre that is unknown (nan) may not count: the matrix must leave it alone.

@@ -39,7 +39,7 @@ def in_parts(moves: Moves, tools: Sequence[ToolBody]) -> tuple[Moves, NDArray[np
 def engaged_angles(bits: NDArray[np.int64], moves: Moves, tools: Sequence[ToolBody]) -> F64:
     """Engaged angle of each part of a move.
 
-    bits : (m,) int64, as ``StockPass.engaged``
+    bits : (m,) int64, dimensionless, a bit for each sector as ``StockPass.engaged``
 
     Returns (m,) float64, rad, 0 to pi.
     """

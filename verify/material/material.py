@@ -50,7 +50,7 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
     """Run all moves through the stock and past the part.
 
     mesh   : of the part, mm, setup frame
-    points : (n, 3) float64, mm, of the part; necks, shanks and holders are checked against them
+    points : (n, 3) float64, mm, setup frame, of the part; necks, shanks and holders are checked against them
     slides : (m, 3, 3) float64, dimensionless, directions of the linear axes for each move, setup frame, or None; used
              only where rapids are doglegs (``verify.material.dogleg_rapids``)
 

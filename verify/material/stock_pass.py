@@ -163,8 +163,8 @@ def tables_for(threads: int, shape: tuple[int, ...]) -> tuple[list[NDArray[np.in
 
     shape : of a table, such as (m, 4)
 
-    Returns the tables, int64, count or bits, and the queue. An operation that does not depend on order combines them,
-    so the result is the same for any assignment of jobs to threads.
+    Returns the tables, each of that shape (m, k), int64, count or bits, and the queue. An operation that does not
+    depend on order combines them, so the result is the same for any assignment of jobs to threads.
     """
     tables, spare = [np.zeros(shape, np.int64) for _ in range(max(1, threads))], Spare()
     for table in tables:

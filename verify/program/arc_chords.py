@@ -86,7 +86,7 @@ def arc_points(start: F64, end: F64, centre: F64, clockwise: bool, axes: tuple[i
 def arc_sweep(start: F64, end: F64, centre: F64, clockwise: bool, axes: tuple[int, int, int], turns: int = 1) -> float:
     """Signed angle of an arc, rad, counterclockwise positive.
 
-    start, end, centre : (3,), (3,) and (2,) float64, mm, as those of ``arc_points``
+    start, end, centre : (3,), (3,) and (2,) float64, mm, in the frame and plane of those of ``arc_points``
     clockwise, axes, turns : as those of ``arc_points``
 
     Raises
@@ -119,7 +119,7 @@ def swept_points(start: Sequence[float], end: Sequence[float], centre: tuple[flo
     sweep      : rad, signed, counterclockwise positive
     chord, max_points : as those of ``arc_points``
 
-    Returns (k, 3) float64, mm, the last row equal to ``end``.
+    Returns (k, 3) float64, mm, frame of ``start``, the last row equal to ``end``.
 
     Raises
     ------

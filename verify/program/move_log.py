@@ -135,7 +135,7 @@ class Log:
             self._too_long("the program makes too many moves", self.count + moves, MAX_MOVES, self.line)
 
     def flush(self) -> None:
-        """Pack the latest moves; refuse the program as ``room`` does where it has too many."""
+        """Pack the latest moves. Raises VerificationError as ``room`` does where the program has too many."""
         if not self.rows:
             return
         if self.count > MAX_MOVES:

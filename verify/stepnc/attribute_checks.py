@@ -197,10 +197,12 @@ class Checked:
         return self.file.of(entity)
 
     def get(self, number: int, *entities: str) -> Record:
-        """Name and values of an instance of one of some entities; ProgramError where it is of none.
+        """Name and values of an instance of one of some entities.
 
         An entity that its form writes alone is refused among the records of a complex instance, and vice versa: no
         table checks its values there.
+
+        Raises ProgramError where it is of none of them.
         """
         records = self.file.records(number)
         for record in records:
@@ -217,7 +219,7 @@ class Checked:
         return values[self._columns[len(self.file.records(number)) > 1][entity][attribute]]
 
     def ref(self, number: int, entity: str, attribute: str) -> int:
-        """The number of the instance that an attribute refers to; ProgramError where it refers to none."""
+        """The number of the instance that an attribute refers to. Raises ProgramError where it refers to none."""
         value = self.one(number, entity, attribute)
         if not isinstance(value, Ref):
             raise self.file.error(number, f", {attribute}: a reference expected, not {shown(value)}")
@@ -238,7 +240,7 @@ class Checked:
         return value if isinstance(value, float) else None
 
     def within(self, number: int, label: str, value: float, low: float, high: float) -> float:
-        """The value, which must lie from ``low`` to ``high``; ProgramError names the instance where it does not."""
+        """The value, which must lie from ``low`` to ``high``. Raises ProgramError where it does not."""
         if not low <= value <= high:  # nor where it is nan
             raise self.file.error(number, f", {label}: {low:g} to {high:g} expected, not {value:g}")
         return value
@@ -249,6 +251,7 @@ class Checked:
         scale : mm in the unit of the file
 
         Returns (4, 4) float64: a rotation, dimensionless, and an origin, mm.
+        Raises ProgramError where both directions are one.
         """
         entity = "AXIS2_PLACEMENT_3D"
         out = np.eye(4)
@@ -264,7 +267,10 @@ class Checked:
         return out
 
     def vector(self, number: int) -> F64:
-        """(3,) float64, dimensionless, frame of the file: a DIRECTION of length one."""
+        """(3,) float64, dimensionless, frame of the file: a DIRECTION of length one.
+
+        Raises ProgramError where it is not three numbers, or all are 0.
+        """
         ratios = self.one(number, "DIRECTION", "direction_ratios")
         out = np.array([v for v in ratios if isinstance(v, float)] if isinstance(ratios, list) else [])
         length = float(np.linalg.norm(out)) if len(out) and np.abs(out).max() <= LONGEST_VECTOR else 0.0
@@ -274,13 +280,14 @@ class Checked:
         return out / length
 
     def unit_axes(self, number: int, words: str, axes: F64, count: int) -> F64:
-        """Tool axes of a path made exactly unit; ProgramError where they cannot be axes.
+        """Tool axes of a path made exactly unit.
 
         words : name of the attribute, for the error
         axes  : (n, 3) float64, dimensionless, frame of the file
         count : number of points of the path
 
         Returns (n, 3) float64, dimensionless, same frame.
+        Raises ProgramError where their number is another, or one is not of length one.
         """
         if len(axes) != count:
             raise self.file.error(number, f", {words}: {count} points expected as in the path, not {len(axes)}")

@@ -36,6 +36,7 @@ def curve_points(data: Checked, number: int, scale: float = 1.0) -> tuple[F64, F
     scale : mm in the unit of the file
 
     Returns (n, 3) float64, mm, frame of the file, and (n,) float64, index, 1-based lines.
+    Raises ProgramError where segments do not join, or an arc has no such points.
     """
     entity = data.get(number, *CURVES)[0]
     if entity == "POLYLINE":

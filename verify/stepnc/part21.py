@@ -98,6 +98,8 @@ class Part21File:
     name    : of the file, for errors
     header  : values of the header by entity name
     schemas : of FILE_SCHEMA, in capitals, without the object identifiers in braces
+
+    Raises ProgramError where the text is no exchange file, is incomplete, or numbers an instance twice.
     """
 
     def __init__(self, text: str, name: str) -> None:
@@ -133,7 +135,7 @@ class Part21File:
         return self._names[number]
 
     def records(self, number: int) -> list[Record]:
-        """Names and values of an instance; ProgramError where it breaks the grammar or does not exist."""
+        """Names and values of an instance. Raises ProgramError where it breaks the grammar or does not exist."""
         if number not in self._records:
             if number not in self._spans:
                 row = self._point(number)

@@ -20,7 +20,7 @@ is_stepnc = is_exchange_file
 
 
 def read_moves(text: str, *, name: str = "program") -> CutterMoves:
-    """Tool motion of a STEP-NC file in the setup frame; errors as of ``read_stepnc``."""
+    """Tool motion of a STEP-NC file in the setup frame. Raises ProgramError, VerificationError as ``read_stepnc``."""
     return _recorder(text, name).moves()
 
 

@@ -117,7 +117,10 @@ class MotionRecorder:
         self.remarks: list[Remark] = []
 
     def take(self, cutter: CutterRecord, line: int) -> int:
-        """Change to a tool where it is not in the spindle; returns its place among the cutters."""
+        """Change to a tool where it is not in the spindle; returns its place among the cutters.
+
+        Raises VerificationError where the program has too many moves, ProgramError where its axis cannot turn so.
+        """
         place = next((k for k, c in enumerate(self.cutters) if c.instance == cutter.instance), None)
         if place is None:
             place = len(self.cutters)
@@ -128,14 +131,17 @@ class MotionRecorder:
         return place
 
     def stop(self, event: str, line: int) -> None:
-        """Record a stop of the program; afterwards the place of the tool is unknown."""
+        """Record a stop of the program; afterwards the place of the tool is unknown.
+
+        Raises VerificationError and ProgramError as ``take``.
+        """
         self._change(event, line)
 
     def over(self, point: F64, normal: F64, line: int) -> None:
         """Approach the next path over a plane.
 
         point  : (3,) float64, mm, setup frame
-        normal : (3,) float64, unit
+        normal : (3,) float64, unit, setup frame
         """
         self._over = point, normal, line
 
@@ -146,6 +152,8 @@ class MotionRecorder:
         axes  : (n, 3) float64, unit, setup frame, or None where they are Z
         feed  : mm/min; speed : 1/min, clockwise positive
         lines : (n,) float64, index, 1-based lines of the file
+
+        Raises VerificationError and ProgramError as ``take``.
         """
         stood = np.tile(UP, (len(tips), 1)) if axes is None else axes
         there = np.hstack([tips, stood])

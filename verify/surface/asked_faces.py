@@ -57,7 +57,7 @@ class Cutting:
     def way_through_stock(self, points: F64, directions: F64, most: float, start: float) -> tuple[F64, I32]:
         """Length of stock along rays up to where a move has cut it, or up to the outside of the blank.
 
-        points, directions : (n, 3) float64, mm and unit; points lie outside of the part or on it
+        points, directions : (n, 3) float64, mm and unit, setup frame; points lie outside of the part or on it
         most  : mm; stock is followed no farther
         start : mm; nearer facets of the part are no obstacle
 
@@ -181,7 +181,12 @@ def distance_aside(samples: SurfaceSamples, good: INT, rows: INT) -> F64:
 
 
 def thinned(rows: INT, most: int) -> INT:
-    """At most ``most`` of ``rows``, (n,) int64, index, evenly; all of them where there are no more."""
+    """At most ``most`` of ``rows``, evenly; all of them where there are no more.
+
+    rows : (n,) int64, index
+
+    Returns (k,) int64, index.
+    """
     if len(rows) <= most:
         return rows
     return rows[np.floor(np.arange(most) * (len(rows) / most)).astype(np.int64)]

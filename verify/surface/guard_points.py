@@ -128,7 +128,8 @@ def closer_seeds(points: F64, residual: F64, mover: I32, sure: float) -> tuple[F
     mover    : (n,) int32, index, the move that cut each
     sure     : mm; gouges deeper than this are found anyway, so the four deepest of each move suffice
 
-    Returns (k, 3) float64, mm, and the number left out: the 4500 deepest of the shallow ones and 1500 others are kept.
+    Returns (k, 3) float64, mm, setup frame, and the number left out: the 4500 deepest of the shallow ones and 1500
+    others are kept.
     """
     order = np.argsort(residual, kind="stable")
     _, first = np.unique(np.floor(points[order] / CLOSER_REACH).astype(np.int64), axis=0, return_index=True)
@@ -148,8 +149,8 @@ def closer_points(tree: TriangleTree, seeds: F64) -> tuple[F64, F64, NDArray[np.
 
     seeds : (k, 3) float64, mm, setup frame; the places cover 0.15 mm to all sides of each
 
-    Returns places on the mesh, (m, 3) float64, mm; normals of their triangles, (m, 3) float64, unit; and the
-    triangles, (m,) int64, index.
+    Returns places on the mesh, (m, 3) float64, mm; normals of their triangles, (m, 3) float64, unit; both in the setup
+    frame; and the triangles, (m,) int64, index.
     """
     if len(seeds) == 0:
         return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int64)

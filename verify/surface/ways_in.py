@@ -32,7 +32,7 @@ SHARE = 0.9  # of the samples of a face with a way: the way that so many do not 
 def ways_in(points: F64, normals: F64, cutting: Cutting) -> tuple[F64, F64]:
     """Length of ways from gouged samples through what was removed to what remains of the part.
 
-    points, normals : (n, 3) float64, mm and unit, on the surface of the part
+    points, normals : (n, 3) float64, mm and unit, setup frame, on the surface of the part
 
     Returns (n,) float64, mm, along the inward normal, and (n,) float64, mm, the shortest; inf where ways leave the
     part.

@@ -21,7 +21,7 @@ ROUNDING = 1e-6  # mm: a ray starts this far off at least
 def ways_out(points: F64, normals: F64, lift: float, most: float, cutting: Cutting) -> tuple[F64, I32]:
     """Length of the shortest way from samples through the stock to where a move has cut, or out of the blank.
 
-    points, normals : (n, 3) float64, mm and unit, on the surface of the part
+    points, normals : (n, 3) float64, mm and unit, setup frame, on the surface of the part
     lift : mm, how far off the surface along the normal the ways begin; so much stock does not count
     most : mm; longer ways are not looked for
 

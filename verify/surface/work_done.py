@@ -146,9 +146,11 @@ def _beside(cut: BOOL, source: Source) -> Finding:
 
 
 def cutting_axes(moves: Moves, used: BOOL) -> F64:
-    """Axes along which tools cut, (k, 3) float64, unit, tip to spindle, k at most 24, the most used first.
+    """Axes along which tools cut, the most used first.
 
     used : (m,) bool, the moves that count
+
+    Returns (k, 3) float64, unit, setup frame, tip to spindle, k at most 24.
 
     An axis nearer than 0.01 degrees to a more used one is the same. Where there are more than 24, that angle doubles
     until there are not.

@@ -12,7 +12,7 @@ from verify.gcode.block_words import BlockError
 
 
 def turn(axis: int, angle: float) -> F64:
-    """(3, 3) float64, dimensionless: right-handed rotation about X, Y or Z (0, 1, 2) by ``angle`` rad."""
+    """(3, 3) float64, dimensionless: right-handed rotation in one frame about X, Y or Z (0, 1, 2) by ``angle`` rad."""
     out = np.eye(3)
     i, j = (axis + 1) % 3, (axis + 2) % 3
     out[i, i] = out[j, j] = math.cos(angle)

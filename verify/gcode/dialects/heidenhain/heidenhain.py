@@ -92,7 +92,7 @@ class HeidenhainReader(HeidenhainPaths):
             yield number, raw
 
     def blocks(self, raw: str) -> list[str | tuple[int, str]]:
-        """Blocks of one line, by its keyword; BlockError where it cannot be read."""
+        """Blocks of one line, by its keyword. Raises BlockError where it cannot be read."""
         if self.is_simple and (m := _LINE.fullmatch(raw)) and not _corner_ahead(self.flow.ahead):
             return list(self._simple(m[1], m[2], [int(w[1:]) for w in m[3].split()]))
         text = block_text(raw)

@@ -49,7 +49,7 @@ class Variables:
         return self._level(name) is not None
 
     def define(self, kind: str, name: str, value: Value | dict[tuple[int, ...], Value]) -> None:
-        """A new variable of the running program."""
+        """A new variable of the running program. Raises BlockError where its type cannot hold the value."""
         self.types[-1][name] = kind
         self.frames[-1][name] = value if isinstance(value, dict) else _typed(kind, value)
 
@@ -173,7 +173,7 @@ class ValueReader:
         return value
 
     def value(self, least: int = 1) -> Value:
-        """An expression whose operators have at least this level."""
+        """An expression whose operators have at least this level. Raises BlockError where it cannot be read."""
         left = self._single()
         while (m := _OPERATOR.match(self.text, self.at)) and _LEVELS[m[1]] >= least:
             self.at = m.end()
@@ -181,7 +181,7 @@ class ValueReader:
         return left
 
     def index(self) -> tuple[int, ...]:
-        """Whole numbers in square brackets, or () where none follow."""
+        """Whole numbers in square brackets, or () where none follow. Raises BlockError for other numbers."""
         if not self.takes("["):
             return ()
         found = [_whole(self.number())]
