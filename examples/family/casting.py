@@ -57,9 +57,11 @@ def cast(
 
 def met(walls: Sequence[WallSpec], i: int, origin: F64, normal: F64, farthest: float, among: set[int] | None,
         ) -> tuple[np.ndarray, F64, np.ndarray]:
-    """The wall whose side rays meet first, the distance (inf: none), and whether that side faces them, (n,) each.
+    """The wall whose side rays meet first, the distance (inf: none), and whether that side faces them.
 
     origin, normal : (n, 3) float64, coordinates in mm, and unit vectors
+
+    Returns (n,) int64, index, (n,) float64, mm, and (n,) bool.
     """
     distance = np.full((len(walls), len(origin)), np.inf)
     faces = np.zeros((len(walls), len(origin)), bool)

@@ -52,17 +52,17 @@ class ConnectionSpec:
 
     @cached_property
     def direction(self) -> F64:
-        """Unit plan direction of the axis, (2,) float64."""
+        """Direction of the axis in plan, (2,) float64, unit."""
         d = (self.end - self.start)[:2]
         return np.asarray(d / np.linalg.norm(d))
 
     @cached_property
     def lateral(self) -> F64:
-        """Unit plan direction to the left of the axis, (2,) float64."""
+        """Direction to the left of the axis in plan, (2,) float64, unit."""
         return np.array([-self.direction[1], self.direction[0]])
 
     def plan_corners(self, side: int) -> tuple[F64, F64]:
-        """Plan ends of the profile on one side (+1 left, -1 right), two (2,) float64, mm."""
+        """Plan ends of the profile on one side (+1 left, -1 right), two (2,) float64, mm, in plan."""
         out = []
         for point, tangent in ((self.start, self.tangents[0]), (self.end, self.tangents[1])):
             t = tangent * np.sign(tangent @ self.lateral)
@@ -72,7 +72,7 @@ class ConnectionSpec:
     def axis_height(self, s: F64) -> F64:
         """Height of the axis.
 
-        s : (n,) float64, 0 at the start and 1 at the end
+        s : (n,) float64, dimensionless, 0 at the start and 1 at the end
         Returns (n,) float64, mm.  An arch follows the circle through its ends and its lifted middle.
         """
         z = self.start[2] + (self.end[2] - self.start[2]) * s
@@ -138,7 +138,7 @@ class ConnectionSpec:
 
     @property
     def point(self) -> F64:
-        """A point inside, in the middle of the span, (3,) float64, mm."""
+        """A point inside, in the middle of the span, (3,) float64, mm, part frame."""
         s = np.array([0.5 * (self.span[0] + self.span[1])])
         xy = self.start[:2] + (self.end - self.start)[:2] * s[0]
         if self.kind == "bow":

@@ -61,7 +61,7 @@ class ForkSpec:
 
     @property
     def point(self) -> F64:
-        """A point inside, (3,) float64, mm."""
+        """A point inside, (3,) float64, mm, part frame."""
         return np.array([*self.node, self.z])
 
     def solid(self) -> Any:

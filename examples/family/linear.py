@@ -42,7 +42,10 @@ def _smooth(rng: Generator, x: F64, amplitude: float, knots: int = 5) -> F64:
 
 
 def demo(rng: Generator) -> PartLayout:
-    """Three wavy walls about 55 mm long, three connections, one narrow stretch of channel."""
+    """Three wavy walls about 55 mm long, three connections, one narrow stretch of channel.
+
+    Raises LayoutError where two neighbours do not face each other.
+    """
     jitter = rng.uniform(-0.1, 0.1, 4) if rng is not None else np.zeros(4)
     x = np.linspace(-26.0, 26.0, 9)
     wave = (1.5 + jitter[0]) * np.sin(2 * np.pi * (x + 5) / 46.0)
@@ -62,7 +65,10 @@ def demo(rng: Generator) -> PartLayout:
 
 
 def narrow(rng: Generator) -> PartLayout:
-    """Two wavy walls that come within 0.8 mm of each other, joined by a bar and a web."""
+    """Two wavy walls that come within 0.8 mm of each other, joined by a bar and a web.
+
+    Raises LayoutError where two neighbours do not face each other.
+    """
     x = np.linspace(-24.0, 24.0, 9)
     wave = _smooth(rng, x, 1.6)
     z, h = 4.0, 10.0
@@ -77,7 +83,10 @@ def narrow(rng: Generator) -> PartLayout:
 
 
 def leaning_pair(rng: Generator) -> PartLayout:
-    """Two walls that lean the same way, so that one side of each is an undercut from above."""
+    """Two walls that lean the same way, so that one side of each is an undercut from above.
+
+    Raises LayoutError where two neighbours do not face each other.
+    """
     x = np.linspace(-22.0, 22.0, 8)
     wave = _smooth(rng, x, 1.5)
     lean = float(np.tan(np.radians(rng.uniform(8, 11))))
@@ -90,7 +99,10 @@ def leaning_pair(rng: Generator) -> PartLayout:
 
 
 def three_walls(rng: Generator) -> PartLayout:
-    """A straight, an arched and a wavy wall of different height; one strut rises from the floor."""
+    """A straight, an arched and a wavy wall of different height; one strut rises from the floor.
+
+    Raises LayoutError where two neighbours do not face each other.
+    """
     x = np.linspace(-25.0, 25.0, 9)
     z = 4.0
     a = WallSpec("straight", np.array([[-24.0, 0.0], [25.0, 0.0]]), z, 10.0, (2.0, 2.0))
@@ -109,7 +121,10 @@ def three_walls(rng: Generator) -> PartLayout:
 
 
 def wavy(rng: Generator) -> PartLayout:
-    """Two long wavy walls with connections at several heights, suitable for fillets."""
+    """Two long wavy walls with connections at several heights, suitable for fillets.
+
+    Raises LayoutError where two neighbours do not face each other.
+    """
     x = np.linspace(-30.0, 30.0, 11)
     wave = 2.2 * np.sin(2 * np.pi * x / float(rng.uniform(32, 40)))
     z = 5.0
@@ -131,6 +146,8 @@ def random(
     walls       : 2 to 6; drawn when None
     connections : 0 to 6; drawn when None (fewer where no room is left)
     gap         : mm, range of the least gap of each channel
+
+    Raises LayoutError where two neighbours do not face each other.
     """
     count = walls if walls is not None else int(rng.integers(2, 7))
     wanted = connections if connections is not None else int(rng.integers(0, 7))

@@ -102,7 +102,7 @@ def make_part(seed: int = 0, recipe: str = "random", *, fillet: float = 0.0, **o
     fillet    : mm, radius between walls and floor; 0 for sharp
     overrides : passed to the recipe; the random one takes walls, connections and gap
 
-    A LayoutError says that 60 draws gave no valid layout, or that the union is not a single valid solid.
+    Raises LayoutError where 60 draws gave no valid layout, or the union is not a single valid solid.
     """
     rng = _generator(seed, recipe)
     for attempt in range(BUILDS):
@@ -130,7 +130,10 @@ def _built(layout: PartLayout) -> tuple[PartLayout, Any]:
 
 
 def draw_layout(seed: int, recipe: str = "random", **overrides: Any) -> PartLayout:
-    """The layout of a part without building it; draws again, up to 60 times, until the rules hold."""
+    """The layout of a part without building it; draws again, up to 60 times, until the rules hold.
+
+    Raises LayoutError where they do not hold even then.
+    """
     return _draw(_generator(seed, recipe), seed, recipe, overrides)
 
 

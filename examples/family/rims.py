@@ -30,7 +30,7 @@ def on_borders(
                 values
                 for rays found backwards
 
-    Returns its length, inf where none is found, and its start, (2,) parameters.
+    Returns its length, inf where none is found, and the parameters of its start, (2,) float64, dimensionless.
     """
     wall, other = walls[i], walls[j]
 

@@ -58,7 +58,7 @@ class WallSpec:
 
     @cached_property
     def parameters(self) -> F64:
-        """(n,) float64, chord-length parameters of the centre points, 0 to 1."""
+        """(n,) float64, dimensionless, chord-length parameters of the centre points, 0 to 1."""
         steps = np.linalg.norm(np.diff(self.centre, axis=0), axis=1)
         s = np.concatenate([[0.0], np.cumsum(steps)])
         return np.asarray(s / s[-1])
@@ -130,7 +130,8 @@ class WallSpec:
     def side_derivatives(self, side: int, u: F64, v: F64) -> tuple[F64, F64]:
         """Partial derivatives of a side surface by u and by v.
 
-        side, u, v : as in ``side_point``
+        side : as in ``side_point``
+        u, v : (n,) float64, dimensionless, as in ``side_point``
 
         Returns two (n, 3) float64, mm, part frame.
         """
@@ -142,7 +143,8 @@ class WallSpec:
     def side_normal(self, side: int, u: F64, v: F64) -> F64:
         """Unit normals of a side, out of the material.
 
-        side, u, v : as in ``side_point``
+        side : as in ``side_point``
+        u, v : (n,) float64, dimensionless, as in ``side_point``
 
         Returns (n, 3) float64, dimensionless, part frame.
         """

@@ -119,6 +119,8 @@ def background(settings: Settings, chain: str = "service.pipeline") -> Iterator[
     ------
     UnavailableError
         The service did not start.
+    SetupError
+        The port is in use.
     """
     listener = _listen(settings.host, settings.port)
     server = _server(settings, chain)

@@ -52,6 +52,8 @@ async def read_form(request: Request, *, with_program: bool) -> SubmissionForm:
     ------
     RequestError
         A part is missing, repeated or unknown, or a field has a wrong value.
+    SetupError
+        The setup is larger than 4 MB.
     """
     wanted = {"part", "setup"} | ({"program"} if with_program else set())
     if not request.headers.get("content-type", "").lower().startswith("multipart/form-data"):

@@ -25,6 +25,11 @@ def run_demo(out: Path, *, keep: bool, chain: str = "service.pipeline") -> int:
 
     out  : folder for the fetched files
     keep : continue to serve until Ctrl-C
+
+    Raises
+    ------
+    InternalError
+        The service refused a request of the demo.
     """
     from examples.demo import write_demo
 

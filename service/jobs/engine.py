@@ -79,8 +79,9 @@ class Engine:
         ------
         SetupError
             data_dir_in_use: another service uses this data folder; exposed_without_key: other machines can reach the
-            address,
-            and no key is required.
+            address, and no key is required.
+        UnavailableError
+            The scheduler of the cluster does not answer.
         """
         self.artifacts = Artifacts(self.settings.data_dir)
         embedded = self.settings.scheduler is None

@@ -40,7 +40,12 @@ class Canvas:
         return cls(colour, np.full((height, width), -np.inf), np.zeros((height, width), dtype=np.int32))
 
     def triangles(self, corners: F64, colours: F32, owners: I32) -> None:
-        """Fill triangles: corners (m, 3, 3) in pixels and depth, colours (m, 3), owners (m,)."""
+        """Fill triangles.
+
+        corners : (m, 3, 3) float64, pixels, x, y and depth
+        colours : (m, 3) float32, dimensionless, 0..1, red, green and blue of this colour
+        owners  : (m,) int32, index, number of the face
+        """
         _triangles(np.ascontiguousarray(corners), np.ascontiguousarray(colours, dtype=np.float32),
                    np.ascontiguousarray(owners, dtype=np.int32), self.colour, self.depth, self.owner)
 
@@ -85,7 +90,7 @@ class Canvas:
         self.colour[rim] = colour
 
     def halved(self) -> NDArray[np.uint8]:
-        """The picture at half the size, each pixel the mean of four: (h/2, w/2, 3) uint8."""
+        """The picture at half the size, each pixel the mean of four: (h/2, w/2, 3) uint8, dimensionless, 0..255."""
         h, w = self.colour.shape[0] // 2, self.colour.shape[1] // 2
         mean = self.colour[:2 * h, :2 * w].reshape(h, 2, w, 2, 3).mean(axis=(1, 3))
         return np.asarray(np.rint(np.clip(mean, 0.0, 1.0) * 255.0), dtype=np.uint8)

@@ -88,6 +88,8 @@ def read_job_part(path: Path, setup: Setup, progress: Progress, blank_path: Path
     ------
     CamError
         The part or the setup is wrong, or the reader exceeds its limits.
+    SetupError
+        The setup wants the blank of a STEP file, and none is given.
     """
     progress("read", 0.0)
     if setup.stock.kind == "step" and blank_path is None:

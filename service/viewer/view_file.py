@@ -44,7 +44,7 @@ class Column:
     form: str = "plain"
 
     def rows(self) -> I64:
-        """The values as a table, (n, k) int64."""
+        """The values as a table, (n, k) int64, count of the unit of the column."""
         values = np.asarray(self.values, dtype=np.int64)
         return values[:, None] if values.ndim == 1 else values
 
@@ -120,7 +120,7 @@ def write_view(head: Mapping[str, Any], chunks: Sequence[Chunk]) -> bytes:
 
 
 def read_view(data: bytes) -> tuple[dict[str, Any], list[dict[str, I64]]]:
-    """Head and chunks of a view file; each chunk holds its columns by name, (n, k) int64.
+    """Head and chunks of a view file; each chunk holds its columns by name, (n, k) int64, count of the unit of each.
 
     Raises
     ------

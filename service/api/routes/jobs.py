@@ -100,14 +100,26 @@ def cancel_job(request: Request, principal: Submitter, job_id: str, purge: Annot
 @router.get("/{job_id}/zones", operation_id="getZones", summary="zones.json", response_description="The zones.",
             responses=RESULT | SENT, response_model=Zones)
 def get_zones(request: Request, principal: Principal, job_id: str) -> Response:
-    """Walls, connections, channels, zones and remainder."""
+    """Walls, connections, channels, zones and remainder.
+
+    Raises
+    ------
+    NotFoundError
+        There is no such job of the principal, or it has no zones yet.
+    """
     return _document(request, principal, job_id, "zones.json")
 
 
 @router.get("/{job_id}/report", operation_id="getReport", summary="report.json", response_description="The report.",
             responses=RESULT | SENT, response_model=Report | Verification)
 def get_report(request: Request, principal: Principal, job_id: str) -> Response:
-    """The plan and its proof; for a verification, its findings."""
+    """The plan and its proof; for a verification, its findings.
+
+    Raises
+    ------
+    NotFoundError
+        There is no such job of the principal, or it has no report yet.
+    """
     return _document(request, principal, job_id, "report.json")
 
 
