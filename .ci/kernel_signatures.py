@@ -81,15 +81,19 @@ def main() -> None:
         os.environ["NUMBA_CACHE_DIR"] = cache
         from numba.core import event
 
+        from examples.demo import write_small
         from service.commands.kernel_compiling import LIST
-        from service.commands.warm import plan_small
+        from service.from_wire import read_setup
+        from service.pipeline import plan
 
         class Listener(Compiled, event.Listener):  # type: ignore[misc]
             pass
 
         compiled = Listener()
         event.register("numba:compile", compiled)
-        report = plan_small(lambda stage, share: print(f"{100 * share:3.0f} %  {stage}", file=sys.stderr))
+        step, setup = write_small(cache)
+        report = plan(step, read_setup(setup), Path(cache, "out"),
+                      lambda stage, share: print(f"{100 * share:3.0f} %  {stage}", file=sys.stderr))
         assert report["state"] == "proved", report["findings"]
         listed = entries(compiled.rows)
         path = Path(sys.argv[1]) if len(sys.argv) > 1 else LIST

@@ -15,7 +15,7 @@ from geometry.errors import CamError, OutputError, SetupError
 from geometry.tool_body import HolderFrustum, ToolBody
 from output.inverse_kinematics import RotaryMachine, program_limits
 from schemas.machine import Machine
-from schemas.setup import Placement, Setup
+from schemas.setup import Setup
 from schemas.tools import Tool
 from verify.kinematics import Kinematics
 
@@ -322,23 +322,6 @@ def gauge_lengths(tools: Sequence[Tool], bodies: Sequence[ToolBody]) -> dict[int
 def face_numbers(ids: list[str]) -> tuple[int, ...]:
     """Face numbers of face ids: ``["F12"]`` gives ``(12,)``."""
     return tuple(int(i[1:]) for i in ids)
-
-
-def placement_frame(placement: Placement) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Origin and axes of the setup frame in STEP coordinates.
-
-    Returns
-    -------
-    origin : (3,) float64, mm
-    axes   : (3, 3) float64, rows are the unit x, y and z axis of the setup frame, so a point p of the file
-             is ``axes @ (p - origin)`` in the setup frame
-    """
-    z = np.array(placement.z_axis, dtype=np.float64)
-    z /= np.linalg.norm(z)
-    x = np.array(placement.x_axis, dtype=np.float64)
-    x -= (x @ z) * z
-    x /= np.linalg.norm(x)
-    return np.array(placement.origin_mm, dtype=np.float64), np.vstack([x, np.cross(z, x), z])
 
 
 def material_name(setup: Setup) -> str:

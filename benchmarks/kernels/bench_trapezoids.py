@@ -18,8 +18,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np  # noqa: E402
 
+from tests.noded_segments import take_noded  # noqa: E402
 from zones.kernels.trapezoid import DONE, build_map  # noqa: E402
-from zones.plan_view.snap_rounding import node_segments, take_noded  # noqa: E402
+from zones.plan_view.snap_rounding import node_segments  # noqa: E402
 from zones.plan_view.trapezoidal_map import TrapezoidMap, insertion_order  # noqa: E402
 
 LOOK_UPS = 10_000

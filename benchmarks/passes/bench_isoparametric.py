@@ -22,6 +22,7 @@ import numpy as np  # noqa: E402
 import shapely  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 
+from benchmarks.passes.arc_rule import arc_rule  # noqa: E402
 from benchmarks.passes.bench_scallop import ball, random_surface  # noqa: E402
 from benchmarks.passes.faceting import facet_deviation, steps_for_chord  # noqa: E402
 from examples.family.recipes import make_part  # noqa: E402
@@ -41,7 +42,7 @@ from toolpath.cutter.cutter import Cutter  # noqa: E402
 from toolpath.drop_cutter import drop_cutter  # noqa: E402
 from toolpath.five_axis.oriented_pass import enters, leaned, posed  # noqa: E402
 from toolpath.passes.cutter_locations import FREE, lifted, tips  # noqa: E402
-from toolpath.passes.forward_step import PassProfile, arc_rule, steps  # noqa: E402
+from toolpath.passes.forward_step import PassProfile, steps  # noqa: E402
 from toolpath.passes.isoparametric_passes import Flank, IsoSurface, lay_out  # noqa: E402
 from toolpath.passes.pass_family import Dragged, FinishTarget, Promise, Swath  # noqa: E402
 from toolpath.passes.side_step import lay_out as parallel  # noqa: E402

@@ -13,10 +13,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np  # noqa: E402
 
+from benchmarks.passes.arc_rule import arc_rule  # noqa: E402
 from benchmarks.passes.bench_isoparametric import RADIUS, SCALLOP, case, exact_errors  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.parameterization.square_patches import Method, Squared, squared  # noqa: E402
-from toolpath.passes.forward_step import PassProfile, arc_rule, steps  # noqa: E402
+from toolpath.passes.forward_step import PassProfile, steps  # noqa: E402
 from toolpath.passes.isoparametric_passes import IsoSurface, lay_out  # noqa: E402
 
 IMAGES = Path(__file__).resolve().parents[1] / "images"

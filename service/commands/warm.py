@@ -8,8 +8,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from geometry.errors import InternalError
 from service.console import say
@@ -117,17 +116,3 @@ def prove_small(progress: Progress) -> Proof:
     with tempfile.TemporaryDirectory(prefix="zonemill-warm-") as folder:
         step, setup = write_small(folder)
         return prove_plan(step, read_setup(setup), progress)
-
-
-def plan_small(progress: Progress) -> dict[str, Any]:
-    """The report of a small part, planned and proved in a folder that is removed afterwards.
-
-    progress : takes the stage and the share of the job that is done
-    """
-    from examples.demo import write_small
-    from service.from_wire import read_setup
-    from service.pipeline import plan
-
-    with tempfile.TemporaryDirectory(prefix="zonemill-warm-") as folder:
-        step, setup = write_small(folder)
-        return plan(step, read_setup(setup), Path(folder, "out"), progress)

@@ -89,10 +89,6 @@ class Artifacts:
         """Path of the result with that key."""
         return self.root / "artifacts" / key[:2] / key
 
-    def has_result(self, key: str) -> bool:
-        """Whether the result exists; it appears by one rename, so it is complete."""
-        return self.result(key).is_dir()
-
     def workspace(self) -> Path:
         """A new empty folder into which a result is written."""
         folder = self.tmp / f"result-{uuid.uuid4().hex}"

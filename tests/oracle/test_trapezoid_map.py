@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import shapely
 
+from tests.noded_segments import sources_of, take_noded
 from tests.oracle import arrangement_twin as twin
 from zones.kernels.trapezoid import LIMIT, SUB
-from zones.plan_view.snap_rounding import node_segments, take_noded
+from zones.plan_view.snap_rounding import node_segments
 from zones.plan_view.trapezoidal_map import TrapezoidMap, _hilbert, insertion_order
 
 EVERYDAY = [(kind, seed) for kind in sorted(twin.KINDS) for seed in range(6)]
@@ -92,8 +93,8 @@ def check_look_up(plan):
 def check_sources(plan, segments):
     """The pieces of a segment lead from its one end to the other, nowhere farther than half a step from it."""
     noding = plan.noding
-    pieces = [plan.sources_of(k).tolist() for k in range(len(noding.pieces))]
-    assert all(pieces) and not len(plan.sources_of(len(pieces)))
+    pieces = [sources_of(plan, k) for k in range(len(noding.pieces))]
+    assert all(pieces) and not sources_of(plan, len(pieces))
     hot = noding.hot
     for s, (p, q) in enumerate(np.floor(segments / twin.GRID + 0.5).astype(np.int64)):
         mine = noding.pieces[[k for k, of in enumerate(pieces) if s in of]]

@@ -205,26 +205,3 @@ def errors(profile: PassProfile, ends: F64, radius: float, scallop: float = 0.0)
     pieces, seen, out = profile.pieces(), np.empty(kernels.PLACES + 1), np.empty(6)
     return np.array([kernels.greatest(pieces, profile.width, a, b, radius, _aside(radius, scallop), seen, out)
                      for a, b in zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)])
-
-
-def arc_rule(profile: PassProfile, radius: float, tolerance: float, longest: float = LONGEST) -> F64:
-    """Distances along a pass by the rule of a circular arc, (n,) float64, mm [Sarkar2015, section 3.4].
-
-    The curvature at the start of a step stands for all of it. Convex of radius R: cos phi = 1 - e / (R + r), concave
-    1 - e / (R - r); the step is the chord 2 R sin phi. For comparison only: where the curvature changes this rule
-    exceeds the tolerance.
-    """
-    s = profile.ways
-    spline = CubicSpline(s, profile.contact)
-    bend = np.einsum("ij,ij->i", spline(s, 2), profile.normal)  # positive concave
-    out = [0.0]
-    while out[-1] < profile.length:
-        k = float(np.interp(out[-1], s, bend))
-        step = longest
-        if abs(k) > 1e-9:
-            big = 1.0 / abs(k)
-            share = tolerance / (big + radius if k < 0.0 else max(big - radius, 1e-9))
-            if share < 1.0:
-                step = min(2.0 * big * np.sin(np.arccos(1.0 - share)), longest)
-        out.append(min(out[-1] + step, profile.length))
-    return np.array(out)

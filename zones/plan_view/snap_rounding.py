@@ -79,20 +79,6 @@ def node_segments(segments: ArrayLike, grid: float) -> Noding:
     return _led(grid, rounded, np.unique(hot, axis=0))
 
 
-def take_noded(segments: ArrayLike, grid: float) -> Noding:
-    """Segments that meet only at their ends already, without change; the map checks it exactly.
-
-    segments : (s, 2, 2) float64, mm, in plan, rounded to the grid; equal segments become one piece with several sources
-    grid     : mm, > 0
-    Returns a ``Noding``. Raises InputError like ``node_segments``.
-    """
-    rounded = on_grid(segments, grid)
-    hot, at = np.unique(rounded.reshape(-1, 2), axis=0, return_inverse=True)
-    pairs = np.sort(at.reshape(-1, 2), axis=1)
-    some = np.flatnonzero(pairs[:, 0] != pairs[:, 1])
-    return _sorted_pieces(grid, rounded, hot, pairs[some], some)
-
-
 def on_grid(segments: ArrayLike, grid: float) -> I64:
     """End points in grid steps, halves rounded up: (s, 2, 2) int64, index of the grid.
 

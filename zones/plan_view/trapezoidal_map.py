@@ -122,12 +122,6 @@ class TrapezoidMap:
                             subjects=(str(made[0]), str(made[1])), limit="pieces meet at their ends only",
                             remedy="node the segments first, as TrapezoidMap.of does")
 
-    def sources_of(self, piece: int) -> I64:
-        """(k,) int64, index of the input segments of a piece, ascending; none for the bottom and top of the box."""
-        if piece >= len(self.noding.pieces):
-            return np.zeros(0, np.int64)
-        return self.noding.sources[self.noding.starts[piece] : self.noding.starts[piece + 1]]
-
     def corners(self) -> F64:
         """(t, 4, 2) float64, mm, in plan: left bottom, right bottom, right top, left top.
 

@@ -17,7 +17,6 @@ from service.from_wire import (
     face_numbers,
     machine_kinematics,
     parse_setup,
-    placement_frame,
     rotary_limits,
     rotary_machine,
     tool_bodies,
@@ -199,11 +198,7 @@ def test_any_consistent_tool_is_taken_as_it_is(diameter, relief, neck, stickout)
     assert (body.flute_length, body.neck_length, body.stickout, body.neck_diameter) == tuple(lengths.values())
 
 
-def test_the_placement_becomes_a_right_handed_frame():
-    origin, axes = placement_frame(parse_setup(setup(
-        placement={"origin_mm": [1, 2, 3], "z_axis": [0, 2, 0], "x_axis": [0, 0, 5]})).placement)
-    assert origin.tolist() == [1, 2, 3]
-    assert np.allclose(axes, [[0, 0, 1], [1, 0, 0], [0, 1, 0]]) and np.isclose(np.linalg.det(axes), 1)
+def test_face_ids_become_numbers():
     assert face_numbers(["F12", "F3"]) == (12, 3)
 
 

@@ -28,12 +28,17 @@ from tests.source_tree import ROOT
 REWRITE = "write the list again: make kernels"
 
 USED = """
-import json, sys
+import json, sys, tempfile
+from pathlib import Path
+from examples.demo import write_small
 from geometry.kernels.cache import sources
 from service.commands.kernel_compiling import compile_listed, text_of
-from service.commands.warm import plan_small
+from service.from_wire import read_setup
+from service.pipeline import plan
 compile_listed(lambda done, of, left: None)
-assert plan_small(lambda stage, share: None)["state"] == "proved"
+with tempfile.TemporaryDirectory() as folder:
+    step, setup = write_small(folder)
+    assert plan(step, read_setup(setup), Path(folder, "out"), lambda stage, share: None)["state"] == "proved"
 used = []
 for name in sources().compiled():
     for own, kernel in vars(sys.modules.get(name, sys)).items():

@@ -284,7 +284,7 @@ def test_results_appear_whole_and_once(tmp_path):
     sha, size = files.put_blob([b"ab", b"c"])
     assert files.put_blob([b"abc"]) == (sha, 3) and size == 3 and files.blob(sha).read_bytes() == b"abc"
     key = artifact_key("plan", sha, "s")
-    assert key != artifact_key("zones", sha, "s") and not files.has_result(key)
+    assert key != artifact_key("zones", sha, "s") and not files.result(key).exists()
     for text in ("first", "second"):
         space = files.workspace()
         (space / "f").write_text(text)

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from benchmarks.passes.arc_rule import arc_rule
 from geometry.errors import GeometryError
-from toolpath.passes.forward_step import PassProfile, arc_rule, errors, steps
+from toolpath.passes.forward_step import PassProfile, errors, steps
 
 RADIUS = 5.0
 PROFILES = {

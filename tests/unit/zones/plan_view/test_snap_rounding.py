@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from geometry.errors import GeometryError, InputError
+from tests.noded_segments import sources_of, take_noded
 from zones.kernels.trapezoid import LIMIT
 from zones.plan_view import snap_rounding as module
-from zones.plan_view.snap_rounding import crossing_pixel, node_segments, runs_through, take_noded
+from zones.plan_view.snap_rounding import crossing_pixel, node_segments, runs_through
 from zones.plan_view.trapezoidal_map import TrapezoidMap
 
 CROSS = np.array([[[0.0, 0.0], [10.0, 10.0]], [[0.0, 10.0], [10.0, 0.0]]])
@@ -127,6 +128,6 @@ def test_no_segments_and_dots_leave_the_box():
 
 def test_a_piece_of_several_segments_names_them_all():
     plan = TrapezoidMap.of([[[0, 0], [4, 0]], [[6, 0], [2, 0]], [[2, 0], [4, 0]], [[9, 9], [9, 9]]])
-    named = {tuple((plan.points[plan.pieces[k]] * 1e-3)[:, 0].round(6)): plan.sources_of(k).tolist() for k in range(3)}
+    named = {tuple((plan.points[plan.pieces[k]] * 1e-3)[:, 0].round(6)): sources_of(plan, k) for k in range(3)}
     assert named == {(0.0, 2.0): [0], (2.0, 4.0): [0, 1, 2], (4.0, 6.0): [1]}
     assert node_segments(CROSS, 1e-3).pieces.shape == (4, 2)
