@@ -11,6 +11,8 @@ import re
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 
+from verify.gcode.machine_words import USER_M
+
 CYCLES = frozenset({73, 74, 76, 81, 82, 83, 84, 85, 86, 89})
 MOTION_CODES = frozenset({0, 1, 2, 3, 80}) | CYCLES
 SHIFTS: frozenset[float] = frozenset({10, 52, 92, 92.1, 92.2, 92.3})
@@ -94,7 +96,8 @@ class Block:
     ms      : M words
     values  : number of every other letter but N, as written (units and modes of the program)
     deleted : whether it begins with the block delete sign /
-    idle    : whether it has M words of ``IDLE_M``
+    idle    : whether it has M words of ``IDLE_M`` or functions
+    functions : M words that run a program of the user
     """
 
     codes: list[float] = field(default_factory=list)
@@ -102,6 +105,7 @@ class Block:
     values: dict[str, float] = field(default_factory=dict)
     deleted: bool = False
     idle: bool = False
+    functions: list[int] = field(default_factory=list)
 
 
 def parse_block(text: str, rotary: str = "", further: Collection[float] = ()) -> Block:
@@ -182,8 +186,10 @@ def _add(block: Block, letter: str, digits: str, rotary: str, further: Collectio
         raise BlockError(f"unknown word {letter}{digits} (the rotary axes of the machine are {' and '.join(rotary)})"
                          if rotary else f"unknown word {letter}{digits} (the machine has no rotary axis)",
                          None if rotary else NO_MACHINE)
-    if letter == "M" and number in IDLE_M:
+    if letter == "M" and (number in IDLE_M or number in USER_M):
         block.idle = True
+        if number in USER_M:
+            block.functions.append(int(number))
         return
     if letter not in "XYZABCIJKRPQLFSTHDM@^" and not (letter == "E" and block.idle):
         raise BlockError(f"unknown word {letter}{digits}")

@@ -27,6 +27,7 @@ from verify.gcode.block_words import Block, BlockError, parse_block, straight, u
 from verify.gcode.dialects import CONTROLS, DIALECTS, LINUXCNC, translated_blocks
 from verify.gcode.flow.control_flow import Flow, has_flow
 from verify.gcode.flow.system_parameters import served
+from verify.gcode.machine_words import functions_note
 from verify.gcode.program_text import cleaned
 from verify.kinematics import Kinematics
 from verify.program.move_kinds import FEED, RAPID
@@ -69,6 +70,8 @@ class Reader(BlockMotion):
         if any(self.s.shift):
             log.remark("shift_left", "the program ends with its zero shifted (G92, G52), and a control keeps the shift "
                        "for the next run: cancel it with G92.1")
+        if log.functions:
+            log.notes.append(functions_note(log.functions))
         table = log.table()
         speed, coolant = log.states()
         start, end, feed = (np.ascontiguousarray(table[:, k]) for k in (slice(0, 3), slice(3, 6), 7))
@@ -180,6 +183,8 @@ class Reader(BlockMotion):
         before = len(self.log.errors)
         try:
             block = parse_block(text, self.rotary, self.control.further_words if self.control else ())
+            for function in block.functions:
+                self.log.functions.setdefault(function, self.log.line)
             self._set_modes(block)
             self._move(block)
         except BlockError as problem:

@@ -26,6 +26,7 @@ class Log:
 
     name : of the program
     line : 1-based number of the current line
+    functions : first line of each M word that counts as a function of the machine
     speeds, unknown, stops, blend, leaves, changes, unbounded, pauses, places : as in ``Program``
     rows : latest moves as (start x, y, z, end x, y, z, kind, feed, tool, line), mm and mm/min; call ``flush`` at 65 536
     """
@@ -38,6 +39,7 @@ class Log:
         self.rows: list[Row] = []
         self.errors: list[tuple[int, str]] = []
         self.notes: list[str] = []
+        self.functions: dict[int, int] = {}
         self._remarks: dict[tuple[str, object], Remark] = {}
         self._count: dict[str, int] = {}
         self._chunks: list[F64] = []

@@ -50,7 +50,7 @@ def translated_blocks(lines: Sequence[str], control: DialectReader, machine: Mac
             if control.frame is not frame:
                 frame = control.frame
                 yield number, NEWS
-            if control.notes or control.remarks:
+            if control.notes or control.remarks or control.functions:
                 _report(control, number, log)
             log.unbounded = control.unbounded
             for block in blocks:
@@ -65,6 +65,9 @@ def _report(control: DialectReader, number: int, log: Log) -> None:
         log.note(note)
     for remark in control.remarks:
         log.remark("control", remark, remark, number)
+    for function in control.functions:
+        log.functions.setdefault(function, number)
+    control.functions.clear()
     control.notes.clear()
     control.remarks.clear()
 

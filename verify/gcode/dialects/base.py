@@ -43,6 +43,8 @@ class DialectReader:
 
     notes   : notes to report; the caller clears them
     remarks : remarks on the latest line; the caller clears them
+    functions : M words of the latest line that count as functions of the machine; the caller clears them
+    refused_m : M words that are not followed, and what they do
     unbounded : whether, somewhere, no word bounds the deviation from the path
     bounds_path : whether the control has such a word
     home_from : first tool change, counted from 0, before which our programs send the spindle home; None: the control
@@ -59,6 +61,7 @@ class DialectReader:
 
     style: Style = FANUC_STYLE
     further_words: frozenset[float] = frozenset()
+    refused_m: Mapping[int, str] = {}
     repeats = "LK"
 
     bounds_path = True
@@ -68,6 +71,7 @@ class DialectReader:
     def __init__(self) -> None:
         self.notes: list[str] = []
         self.remarks: list[str] = []
+        self.functions: list[int] = []
         self.unbounded = False
         self._free = False
         self.frame: Frame | None = None
@@ -82,6 +86,18 @@ class DialectReader:
         Raises BlockError where the order cannot be known; the reading ends there, at ``machine.log.line``.
         """
         yield from enumerate(lines, 1)
+
+    def function(self, number: int) -> None:
+        """Take an M word without a meaning here as a function of the machine (``verify.gcode.machine_words``).
+
+        Raises
+        ------
+        BlockError
+            The manual of the control says that it moves something, changes the order, or waits for an answer.
+        """
+        if what := self.refused_m.get(number):
+            raise BlockError(f"M{number} ({what}) is not followed")
+        self.functions.append(number)
 
     def bound(self, known: bool) -> None:
         """From here on a word bounds the deviation from the path (``known``), or none does."""

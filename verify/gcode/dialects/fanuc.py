@@ -5,8 +5,8 @@ decimal point counts thousandths, ';' ends a block. X10 without a decimal point 
 parameter. Subprograms and macros are followed by ``verify.gcode.flow.macro_flow``.
 
 Words that change speed, smoothing, coolant or devices of the machine move nothing and are left out: they are listed
-here, and an M word that is not known counts as one, with a note. A word that moves or cuts and is not followed is
-refused by its name.
+here. What holds for other M words is in ``verify.gcode.machine_words``. A word that moves or cuts and is not followed
+is refused by its name.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ from verify.gcode.block_words import FURTHER, bare
 from verify.gcode.dialects.base import NUMBER, BlockError, Machine, zero_word
 from verify.gcode.dialects.fanuc_planes import FanucPlanes
 from verify.gcode.flow.macro_flow import MacroFlow, has_macros
+from verify.gcode.machine_words import FANUC_M
 
 _PLAIN = re.compile(r"(?:N[0-9]+ ?)?(?:G0?[01] ?)?(?:[XYZABC][+-]?(?:[0-9]*\.[0-9]*|0) ?)*(?:F[0-9]+\.[0-9]* ?)?\r?")
 _WORD = re.compile(rf"([A-Z])({NUMBER})")
 _NAME = re.compile(r"[O:](?:[0-9]+|<[^<>]*>)?(?:<[^<>]*>)?|<[^<>]*>")
 _DELETED = re.compile(r"(N[0-9]+)?/[1-9]?(?=[A-Z]|$)")
 _FOREIGN: dict[str, frozenset[float]] = {
-    "M": frozenset({70, 71, 72, 73, 428, 429}), "G": frozenset({59.1, 59.2, 59.3, 92.2, 92.3})}
+    "M": frozenset({70, 71, 72, 73}), "G": frozenset({59.1, 59.2, 59.3, 92.2, 92.3})}
 ROUNDING = "parameters of the machine set how far the control rounds corners: the error bound does not include it"
 _PLACES = "XYZABCIJKRUVW"
 _KNOWN_M = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30})
@@ -54,6 +55,7 @@ class FanucReader(FanucPlanes):
     local_calls = False
     bounds_path = False
     further_words = FURTHER
+    refused_m = FANUC_M
     repeats = "KL"
     home_from, gives_up_length = 0, True
 
@@ -171,7 +173,7 @@ class FanucReader(FanucPlanes):
         number = float(digits)
         if number in _KNOWN_M or number in _FOREIGN["M"] or number in (96, 97, 98, 99) or number % 1:
             return False
-        self.notes.append(f"M{number:g} counts as a function of the machine that moves nothing")
+        self.function(int(number))
         return True
 
     def _several(self, ms: str) -> None:

@@ -2,13 +2,14 @@
 
 G234 is tool centre point control, G154 P a work offset, G187 smoothness (E: its bound), G101 and G100 mirror. A whole P
 of G04 and of cycles counts ms, one with a decimal point s. F without a decimal point is refused like a coordinate. G28
-cancels the length offset. I of a peck cycle is its first peck, and L the number of holes.
+cancels the length offset. M16 is M6. I of a peck cycle is its first peck, and L the number of holes.
 """
 
 from __future__ import annotations
 
 from verify.gcode.dialects.base import BlockError
 from verify.gcode.dialects.fanuc import FanucReader
+from verify.gcode.machine_words import HAAS_M
 
 _MIRRORS = {101: "G51.1", 100: "G50.1"}
 
@@ -20,6 +21,7 @@ class HaasReader(FanucReader):
     further = 154.0
     local_calls = bounds_path = True
     repeats = "L"
+    refused_m = HAAS_M
 
     def _check(self, letter: str, digits: str) -> None:
         super()._check(letter, digits)
@@ -33,7 +35,12 @@ class HaasReader(FanucReader):
     def _in_seconds(self, digits: str) -> bool:
         return "." in digits
 
+    def _idle_m(self, digits: str) -> bool:
+        return float(digits) != 16 and super()._idle_m(digits)
+
     def _word(self, letter: str, digits: str, codes: list[float], values: dict[str, str]) -> list[str]:
+        if letter == "M" and float(digits) == 16:
+            return ["M6"]
         if self.hole and letter in "IJK" and not {73, 83}.isdisjoint(codes):
             return [f"Q{digits}"] if letter == "I" and "Q" not in values else []
         return super()._word(letter, digits, codes, values)

@@ -10,9 +10,10 @@ from dataclasses import replace
 
 from verify.gcode.dialects.base import BlockError
 from verify.gcode.dialects.heidenhain.heidenhain_edges import HeidenhainEdges
-from verify.gcode.dialects.heidenhain.heidenhain_words import M_AFTER, M_BEFORE, M_REFUSED, M_WORDS, Blocks, Move, Words
+from verify.gcode.dialects.heidenhain.heidenhain_words import M_AFTER, M_BEFORE, M_WORDS, Blocks, Move, Words
 from verify.gcode.dialects.stated_places import digits
 from verify.gcode.dialects.tilted_planes import turn
+from verify.gcode.machine_words import HEIDENHAIN_M
 
 _KEY = re.compile(r"(LN|LP|L|CTP|CT|CP|CR|CC|C|RND|CHF|APPR|DEP)(?![A-Z])\s*")
 
@@ -104,7 +105,7 @@ class HeidenhainPaths(HeidenhainEdges):
         machine = 91 in w.ms
         self._check_m91(machine)
         if w.side in ("RL", "RR") and (corners := {97, 98, 197} & set(w.ms)):
-            raise BlockError(f"M{min(corners)} ({M_REFUSED[min(corners)]}) is not followed")
+            raise BlockError(f"M{min(corners)} ({HEIDENHAIN_M[min(corners)]}) is not followed")
         before, after = self._ms(w.ms)
         self.calls |= self.modal_call and not machine
         if machine:

@@ -14,6 +14,7 @@ from verify.gcode.dialects.heidenhain.heidenhain_flow import HeidenhainFlow
 from verify.gcode.dialects.heidenhain.heidenhain_frames import HeidenhainFrames
 from verify.gcode.dialects.heidenhain.heidenhain_q import VALUE, QParameters
 from verify.gcode.dialects.stated_places import digits
+from verify.gcode.machine_words import HEIDENHAIN_M
 
 HEIDENHAIN_STYLE = Style(Corner.ARC, Approach.NEXT_NORMAL)
 INCH = 25.4
@@ -27,13 +28,7 @@ M_IDLE = frozenset({7, 101, 102, 103, 105, 106, 107, 108, 109, 110, 111, 113, 11
                     141,
                     145, 148, 149, 150})
 """M words that change feed, tool life or messages only; M126 and M127 are kept as state."""
-M_REFUSED = {92: "a place of the machine's maker", 97: "other corners of radius compensation",
-             98: "open contours of radius compensation", 104: "the zero of before", 112: "rounded corners",
-             114: "another compensation of rotary axes",
-             124: "points that are left out", 130: "coordinates that are not tilted", 136: "feed per turn",
-             138: "a choice of tilting axes", 143: "the end of a basic rotation", 144: "the kinematics of the moment",
-             197: "other corners of radius compensation"}
-"""M words that move or cut and are not followed, and what they do."""
+_KNOWN_M = M_BEFORE | M_AFTER | M_IDLE | {89, 91, 99}
 _WORD = re.compile(rf"""\s*(?:M\s*(?P<m>[0-9]+)(?![0-9.])
     |(?P<side>R0|RL|RR)(?![A-Z0-9.])
     |DR\s*(?P<sense>[+-])(?![0-9.])
@@ -118,7 +113,7 @@ class HeidenhainWords(HeidenhainFrames):
     rate     : the F word in force; auto : feed of TOOL CALL
     """
 
-    style = HEIDENHAIN_STYLE
+    style, refused_m = HEIDENHAIN_STYLE, HEIDENHAIN_M
     flow: HeidenhainFlow
 
     def __init__(self) -> None:
@@ -224,10 +219,9 @@ class HeidenhainWords(HeidenhainFrames):
     def _ms(self, ms: list[int]) -> tuple[list[str], list[str]]:
         """M words as blocks before and after the move."""
         for m in ms:
-            if m in M_REFUSED and not (m in (97, 98, 197) and self.side == 0) and not (m == 130 and self.plane is None):
-                raise BlockError(f"M{m} ({M_REFUSED[m]}) is not followed")
-            if m not in M_BEFORE and m not in M_AFTER and m not in M_IDLE and m not in (89, 91, 97, 98, 99, 130, 197):
-                raise BlockError(f"unknown word M{m}")
+            idle_here = m in (97, 98, 197) and self.side == 0 or m == 130 and self.plane is None
+            if not (m in _KNOWN_M or idle_here):
+                self.function(m)
         if 89 in ms or 99 in ms:
             self.modal_call, self.calls = 99 not in ms, True
         ms = self._switch(ms)

@@ -38,6 +38,7 @@ from verify.gcode.dialects.siemens.siemens_words import (
     UNITS,
 )
 from verify.gcode.dialects.stated_places import digits
+from verify.gcode.machine_words import SIEMENS_M
 from verify.program.arc_chords import PLANE_AXES
 
 SMALL = 0.01
@@ -54,8 +55,7 @@ _HARMLESS = re.compile(r"\$(?:AC_TIMER|AC_MARKER|AC_PARAM|A_OUT|A_DB[BWDR]|A_DLB
 """Values of the control that move nothing: timers, counters and outputs."""
 _FRAMES = frozenset({"TRANS", "ATRANS", "ROT", "AROT", "MIRROR", "AMIRROR", "SCALE", "ASCALE"})
 _ORIENTS = {"ORIWKS": True, "ORIVECT": True, "ORIPLANE": True, "ORIMKS": False, "ORIAXES": False}
-_M = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 40, 41, 42, 43, 44, 45})
-_GEARS = frozenset({40, 41, 42, 43, 44, 45})
+_M = {n: n for n in (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30)} | {19: 5, 70: 5}  # a spindle that takes a position stands
 
 
 def is_siemens(text: str) -> bool:
@@ -67,7 +67,7 @@ class SiemensReader(SiemensMoves):
     """840D sl, 828D and ONE."""
 
     home_from, gives_up_length = 1, True
-    style = SIEMENS_STYLE
+    style, refused_m = SIEMENS_STYLE, SIEMENS_M
 
     def __init__(self) -> None:
         super().__init__()
@@ -295,12 +295,11 @@ class SiemensReader(SiemensMoves):
         line.out.append(f"G43 H{self.tool}" if n else "G49")
 
     def _m(self, n: int, line: Line) -> None:
-        if n not in _M:
-            raise BlockError(f"unknown word M{n}")
-        if n in _GEARS:
-            return
-        line.out.append(f"M{n}")
-        line.change |= n == 6
+        if n in _M:
+            line.out.append(f"M{_M[n]}")
+            line.change |= n == 6
+        elif not 40 <= n <= 45:  # gears
+            self.function(n)
 
     def _code(self, n: int, line: Line) -> None:
         line.codes.append(n)

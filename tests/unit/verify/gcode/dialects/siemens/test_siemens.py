@@ -73,7 +73,7 @@ REFUSED = [
     ("X=R5", "R5 has no value yet"),
     ("G1 X=1/0", "has no value"), ("X=$AA_IM[X]", "$AA_IM[X] is a value of the control"),
     ("$P_UIFR[1,X,TR]=5", "$P_UIFR is set"),
-    ("GOTOF ENDE", "no such label"), ("WAYTO", "no subprogram of this file"), ("M77", "unknown word M77"),
+    ("GOTOF ENDE", "no such label"), ("WAYTO", "no subprogram of this file"), ("M98 P1", "M98 (a call of ISO mode)"),
     ("D2", "first cutting edge"),
     ("ENDWHILE", "has no counterpart"), ("ROT X30", "tilts the coordinates"), ("G500\nX1",
                                                                                "G500 without a work offset"),
