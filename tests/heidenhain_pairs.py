@@ -115,6 +115,8 @@ PAIRS = {
     "retract": ("L X+5 Y+5 Z+0\nL M140 MB 20 F99\nL X+6 F200", "G1 X5 Y5 Z0\nZ20 F99\nX6 F200"),
     "retract to the end of the travel": ("L X+5 Z+0\nM140 MB MAX\nL X+6 FMAX\nL Z+9 FMAX",
                                          "G1 X5 Z0\nG0 G53 Z0\nX6\nZ9"),
+    "retract, then a move": ("L X+5 Y+5 Z+0\nL X+8 IY+1 F125 M140 MB 20 F750\nL X+9 Y+9 FMAX M140 MB MAX\nL Z+9 FMAX",
+                             "G1 X5 Y5 Z0\nZ20 F750\nX8 Y6 F125\nG0 G53 Z0\nX9 Y9\nZ9"),
     "machine place": ("L X+5\nL Z+0 R0 FMAX M91\nL Z-1 F999 M91\nL X+7 Y+7 FMAX\nL Z+9 FMAX",
                       "G1 X5\nG0 G53 Z0\nX7 Y7\nZ9"),
     "feeds of TOOL CALL": ("L X+5 FAUTO\nL X+6 F50\nL X+7 FAUTO", "G1 X5 F200\nX6 F50\nX7 F200"),

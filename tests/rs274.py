@@ -18,6 +18,7 @@ INCH = 25.4
 DIAMETER = 6.0
 """mm, of every tool of the judge; the interpreter takes its table in inches."""
 _CALL = re.compile(r"\s*\d+\s+N\S*\s+([A-Z0-9_]+)\((.*)\)\s*")
+_NUMBERS = re.compile(r"(?:-?[0-9]+(?:\.[0-9]+)?(?:, *| +)?)+")
 _PLANES = {"XY": (0, 1, 2), "YZ": (1, 2, 0), "XZ": (2, 0, 1)}
 
 
@@ -67,7 +68,7 @@ def _moves(canon):
     at, unit, coarse, feed, plane, by_turn = np.zeros(3), 1.0, 1.0, math.nan, "XY", False
     offsets = {"SET_G5X_OFFSET": np.zeros(3), "SET_G92_OFFSET": np.zeros(3)}
     for name, words in (m.groups() for m in map(_CALL.fullmatch, canon.splitlines()) if m):
-        numbers = [float(w) for w in words.replace(",", " ").split()] if re.fullmatch(r"[-0-9., ]+", words) else []
+        numbers = [float(w) for w in words.replace(",", " ").split()] if _NUMBERS.fullmatch(words) else []
         zero = sum(offsets.values())
         if name in offsets:
             offsets[name] = np.array(numbers[-6:-3]) * unit
@@ -104,13 +105,14 @@ def _arc(at, numbers, unit, plane):
     sweep = sweep or math.tau
     sweep = sweep - math.tau if turns < 0 and sweep < math.tau else math.copysign(sweep, turns)
     sweep += (abs(turns) - 1) * math.copysign(math.tau, turns)
-    return end, swept_points(start.tolist(), end.tolist(), centre.tolist(), sweep, (i, j, k))
+    return end, swept_points(start.tolist(), end.tolist(), centre.tolist(), sweep, (i, j, k), chord=1e-4)
 
 
-def difference(program, judged, gaps=False):
+def difference(program, judged, gaps=False, off=0.003):
     """What the reader's moves differ in from the judge's, '' where they agree within the digits printed.
 
     gaps : whether the judge may have moves the reader has not (ways from and to the machine's own places)
+    off : mm, how far ours may lie off an arc, besides the digits printed
     """
     keep = (program.start != program.end).any(axis=1)
     keep[program.unknown[:, 0]] = True  # these start where they end, as nothing else is known
@@ -135,7 +137,7 @@ def difference(program, judged, gaps=False):
         else:
             if n == 0:
                 return "the judge begins with an arc"
-            wrong, n = _arc_difference(ours, n, move)
+            wrong, n = _arc_difference(ours, n, move, off)
             if wrong:
                 return f"line {lines[min(n, len(lines) - 1)]}: {wrong}"
         if move.kind == FEED and abs(feeds[n - 1] - move.feed) > 2 * move.grain + 3e-4 * move.feed:
@@ -143,11 +145,11 @@ def difference(program, judged, gaps=False):
     return "" if n == len(ours) else f"line {lines[n]}: {ours[n]} has no counterpart"
 
 
-def _arc_difference(ours, n, move):
+def _arc_difference(ours, n, move, off):
     """Follow ours from ``n`` along the arc: every point near it, in order, as long as it is."""
     points = np.vstack([ours[n - 1], move.points])
     length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
-    gone, near = 0.0, 0.003 + 4 * move.grain
+    gone, near = 0.0, off + 4 * move.grain
     while n < len(ours) and gone < 1.01 * length + near:
         gone += float(np.linalg.norm(ours[n] - ours[n - 1]))
         nearest = np.abs(points - ours[n]).sum(axis=1).argsort()[:4]  # turns lie on one another

@@ -2,8 +2,9 @@
 
 Run from the root of the checkout: ``python benchmarks/faults/planted_offsets.py [--sizes 0.3,5] [--ways +X,-Z]
 [--programs A,B] [--rows FILE]``. The programs are plans of small parts in five dialects, whole and of one operation
-each, and, where the collection of cases lies beside the checkout, one of its programs. Offsets go along X, Y and Z,
-both ways, into one tool length, and into the work offset. The smallest is twice the larger of scallop and gouge
+each, one by hand on five axes, and, where the collection of cases lies beside the checkout, one of its programs. The
+operation on the dome also takes stock off the plane around its foot, so its setup names the face that it works on; the
+other setups name none. Offsets go along X, Y and Z, both ways, into one tool length, and into the work offset. The smallest is twice the larger of scallop and gouge
 tolerance.
 
 Whether an offset changes anything is judged without the code under test: some sample that the right program leaves
@@ -117,12 +118,37 @@ def cases(folder: Path, wanted: set[str]) -> Iterator[Case]:
                 raise SystemExit(f"{name}-{what} is not proved: {report['findings'][:2]}")
             ending = DIALECT_ENDINGS[dialect]
             text = (folder / f"{name}-{what}" / f"program.{dialect}.{ending}").read_text()
-            setup = parse_setup(json.dumps(raw))
+            named = {"operations": {"faces": one["operations"]["faces"]}} if one and name == "dome" else {}
+            setup = parse_setup(json.dumps({**raw, **named}))
             yield Case(f"{name}-{what}", read_job_part(step, setup, _quiet), setup, text, f".{ending}")
+    if not wanted or "slope-five" in wanted:
+        step = write_step(shapes()["slope"][0], folder / "slope-five.step")
+        setup = parse_setup(json.dumps({
+            "tools": [FLAT], "quality": {"scallop_height_mm": 0.02}, "stock": {"margin_mm": 1.0, "uncertainty_mm": 0.0},
+            "machine": {"kind": "5-axis", "kinematics": "table-table-AC", "tcp": True, "dialects": ["siemens"]}}))
+        yield Case("slope-five", read_job_part(step, setup, _quiet), setup, five_axis_text(), ".mpf")
     if (CASES / "nc" / "pocket_ok.ngc").is_file() and (not wanted or "pocket_ok" in wanted):
         setup = parse_setup((CASES / "nc" / "pocket_setup.json").read_bytes())
         yield Case("pocket_ok", read_job_part(CASES / "parts" / "pocket_plate.step", setup, _quiet), setup,
                    (CASES / "nc" / "pocket_ok.ngc").read_text(), ".ngc")
+
+
+def five_axis_text() -> str:
+    """The slope from (6, 7) to (16, 4) in XZ in four passes along Y, with the end of the tool in its plane."""
+    along, normal = np.array([10.0, 0.0, -3.0]) / 109.0**0.5, np.array([3.0, 0.0, 10.0]) / 109.0**0.5
+
+    def words(s: float, y: float, over: float) -> str:
+        x, _, z = np.array([6.0, 0.0, 7.0]) + s * along + over * normal
+        return f"X{x:.6f} Y{y:.6f} Z{z:.6f}"
+
+    axis = " ".join(f"{k}3={v:.9f}" for k, v in zip("ABC", normal, strict=True))
+    lines = ["G710 G17 G90 G94 G54", "T1 M6", "D1", "S6000 M3 M8", "SUPA G0 Z0 D0", "G54 D1", "G0 A0 C0", "TRAORI", "G54",
+             "ORIWKS", "G0 X11 Y-5 Z60", f"G0 {words(0.5, -5.0, 30.0)} {axis}"]
+    for s in (0.5, 3.5, 6.5, 9.5):
+        lines += [f"G0 {words(s, -5.0, 5.0)}", f"G1 {words(s, -5.0, 0.0)} F300", f"G1 {words(s, 17.0, 0.0)}",
+                  f"G0 {words(s, 17.0, 5.0)}"]
+    return "\n".join([*lines, f"G0 {words(9.5, 17.0, 30.0)}", "G0 Z60 A3=0 B3=0 C3=1", "TRAFOOF", "SUPA G0 Z0 D0", "M30",
+                      ""])
 
 
 def _quiet(_stage: str, _share: float) -> None:

@@ -17,7 +17,7 @@ from verify.model import Finding, FindingKind, ProofSetup
 
 LEAST_PLACE = 0.05  # mm²: a smaller place is five samples or fewer, which prove nothing
 CONNECTED = 0.5  # mm, or three distances of samples: so near samples are one place
-ROUND = 0.5  # mm, or 2.5 distances of samples: a height is the median so far around
+ROUND = 0.5  # mm, or 2.5 distances of samples: a height is the lower third so far around
 HIGHEST = 300  # samples of a place whose surroundings are looked at
 MAX_LINES = 50
 BOOL = NDArray[np.bool_]
@@ -49,8 +49,8 @@ def stock_findings(samples: SurfaceSamples, stock: StandingStock, each: float, s
 
     Notes
     -----
-    The height of a place is the largest median of the heights within ``ROUND`` of a sample. So the scallop that a right
-    pass leaves does not count: stock of height d under scallops of height c has a median of d + c / 4.
+    The height of a place is the largest lower third of the heights within ``ROUND`` of a sample. So the scallop that a
+    right pass leaves hardly counts: stock of height d under scallops of height c has the lower third d + c / 9.
     """
     found: list[Finding] = []
     told = np.zeros(len(samples), np.bool_)
@@ -81,7 +81,8 @@ def _finding(samples: SurfaceSamples, stock: StandingStock, rows: INT, area: flo
     height, points = stock.height[rows], samples.points[rows]
     tree = cKDTree(points)
     highest = np.lexsort((np.arange(len(rows)), -height))[:HIGHEST]
-    typical = np.array([float(np.median(height[near])) for near in tree.query_ball_point(points[highest], reach)])
+    typical = np.array([float(np.partition(height[near], len(near) // 3)[len(near) // 3])
+                        for near in tree.query_ball_point(points[highest], reach)])
     best = int(np.argmax(typical))
     k, tall = int(highest[best]), float(typical[best])
     movers = np.unique(stock.mover[rows][stock.mover[rows] >= 0])

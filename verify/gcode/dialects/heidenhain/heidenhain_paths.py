@@ -76,7 +76,7 @@ class HeidenhainPaths(HeidenhainEdges):
         w = self._read(rest)
         if retract:
             if w.places or w.values:
-                raise BlockError("M140 with coordinates in one block")
+                return [*retract, *self._after_retract(key, w)]
             before, after = self._ms(w.ms)
             return [*before, *retract, *after]
         if key == "L" and not w.places and not w.values and not w.side:
@@ -88,6 +88,14 @@ class HeidenhainPaths(HeidenhainEdges):
         before, after = self._ms(w.ms)
         rate, self.end = self._rate(w.feed), self.here()
         return [*before, *([rate] if rate and w.feed != "MAX" else []), *after]
+
+    def _after_retract(self, key: str, w: Words) -> Blocks:
+        """The move of a block with M140, which acts at its start."""
+        plain = key == "L" and not (set(w.places) - {"X", "Y"} or w.values or {89, 91, 99} & set(w.ms))
+        if not plain or self.side or w.side in ("RL", "RR") or self.plane is not None or self.modal_call:
+            raise BlockError("M140 with more than L and X, Y in one block", "give M140 its own block")
+        self._unheld("M140")
+        return self._go(key, w)
 
     def _centre(self, rest: str) -> Blocks:
         w = self._read(rest)
