@@ -6,12 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from geometry.kernels.sampling import lattice_places
+from geometry.kernels.graded_sampling import graded_places, mark_near
+from geometry.kernels.sampling import COSINE, SINE, lattice_places
 from geometry.mesh import F64, I32, TriangleMesh
 
 # Least cosine between the normals of facet and surface. Below it the facet is a sliver or folded, or the surface is
 # singular.
 BELIEVED_DOT = 0.5
+# Middles of the sides of triangles nearer than this are one, mm: such a side lies inside a face.
+SAME_SIDE = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +26,8 @@ class SurfaceSamples:
     area     : (n,) float64, mm², area that each sample represents; sums to the sampled area
     face     : (n,) int32, number of the B-rep face
     triangle : (n,) int32, index of the triangle
+    covers   : (n,) float64, mm, or None: radius of the flat place round a sample that the sample stands for, 0 where it
+               stands for its point alone; None: 0 for all
     """
 
     points: F64
@@ -30,6 +35,7 @@ class SurfaceSamples:
     area: F64
     face: I32
     triangle: I32
+    covers: F64 | None = None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -37,7 +43,7 @@ class SurfaceSamples:
     def subset(self, keep: np.ndarray) -> SurfaceSamples:
         """The selected samples. keep : (n,) bool mask, or (k,) int64 index of the samples."""
         return SurfaceSamples(self.points[keep], self.normals[keep], self.area[keep], self.face[keep],
-                              self.triangle[keep])
+                              self.triangle[keep], None if self.covers is None else self.covers[keep])
 
 
 def sample_surface(mesh: TriangleMesh, density: float, *, seed: int = 0,
@@ -94,6 +100,95 @@ def lattice_samples(mesh: TriangleMesh, spacing: float) -> SurfaceSamples:
         room = count
     points, tri = points[:count].copy(), tri[:count].copy()
     return SurfaceSamples(points, np.ascontiguousarray(normals[tri]), area[:count].copy(), mesh.face_ids[tri], tri)
+
+
+def graded_samples(mesh: TriangleMesh, triangles: np.ndarray, spacing: float, parts: int,
+                   margin: float) -> SurfaceSamples:
+    """Samples of a flat face on a square lattice: coarse inside, fine near its borders.
+
+    mesh      : TriangleMesh
+    triangles : (k,) int64, index of the triangles of the face, all in one plane
+    spacing   : mm, side of a coarse cell
+    parts     : number of fine samples along the side of a split cell, odd
+    margin    : mm; a cell as near to a border as that is split, and so is every cell that meets one
+
+    Returns
+    -------
+    SurfaceSamples
+        A coarse sample is the middle of a cell that lies wholly in the face; ``covers`` is half its diagonal. Fine
+        samples have equal areas that fill the rest of the face. No place of the face, borders apart, is farther than
+        0.71 spacing from a coarse sample or 0.71 spacing / parts from a fine one.
+    """
+    first, second = lattice_axes(mesh.normals[triangles[:1]])
+    origin = mesh.triangles[triangles[0], 0]
+    flat = np.ascontiguousarray((mesh.triangles[triangles] - origin) @ np.stack([first[0], second[0]], axis=1))
+    low = np.floor(flat.min(axis=(0, 1)) / spacing).astype(np.int64) - 1
+    size = np.floor(flat.max(axis=(0, 1)) / spacing).astype(np.int64) + 2 - low
+    near = np.zeros((int(size[0]), int(size[1])), np.bool_)
+    mark_near(_border_places(flat, spacing / 4.0), spacing, int(np.ceil(margin / spacing)), int(low[0]), int(low[1]),
+              near)
+    total = float(mesh.areas[triangles].sum())
+    room = round(1.2 * (total / spacing**2 + float(near.sum()) * parts**2)) + 64
+    while True:
+        out, coarse, owner = np.empty((room, 2)), np.empty(room, np.bool_), np.empty(room, np.int32)
+        count = graded_places(flat, spacing, parts, int(low[0]), int(low[1]), near, out, coarse, owner)
+        if count <= room:
+            break
+        room = count
+    out, coarse, tri = out[:count], coarse[:count], np.asarray(triangles[owner[:count]], np.int32)
+    points = origin + out[:, :1] * first[0] + out[:, 1:] * second[0]
+    fine = int((~coarse).sum())
+    rest = (total - float(coarse.sum()) * spacing**2) / max(fine, 1)
+    return SurfaceSamples(np.ascontiguousarray(points), np.ascontiguousarray(mesh.normals[tri]),
+                          np.where(coarse, spacing**2, rest), mesh.face_ids[tri], tri,
+                          np.where(coarse, spacing * np.sqrt(0.5), 0.0))
+
+
+def split_cells(samples: SurfaceSamples, parts: int) -> tuple[SurfaceSamples, np.ndarray]:
+    """The fine samples of coarse cells.
+
+    samples : SurfaceSamples of ``graded_samples``, coarse ones only
+    parts   : number of fine samples along the side of a cell
+
+    Returns SurfaceSamples of equal areas, and (m,) int64, index of the coarse sample of each.
+    """
+    covers = np.zeros(0) if samples.covers is None else samples.covers
+    first, second = lattice_axes(samples.normals)
+    side = np.sqrt(2.0) * covers
+    across = (np.arange(parts) + 0.5) / parts - 0.5
+    a, b = (x.reshape(-1) for x in np.meshgrid(across, across, indexing="ij"))
+    row = np.repeat(np.arange(len(samples)), parts**2)
+    a, b = np.tile(a, len(samples)) * side[row], np.tile(b, len(samples)) * side[row]
+    out = samples.subset(row)
+    points = out.points + a[:, None] * first[row] + b[:, None] * second[row]
+    return replace(out, points=np.ascontiguousarray(points), area=out.area / parts**2, covers=np.zeros(len(row))), row
+
+
+def lattice_axes(normals: F64) -> tuple[F64, F64]:
+    """The two axes of the lattice of ``graded_samples`` on planes, (n, 3) float64, dimensionless unit vectors each.
+
+    normals : (n, 3) float64, dimensionless unit vectors, in the frame of the planes
+
+    The lattice is turned by the angle whose tangent is the golden section against the axes of the frame, since what is
+    long and narrow on a part mostly lies along these.
+    """
+    one = np.where(np.abs(normals[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    one = one - np.einsum("ij,ij->i", one, normals)[:, None] * normals
+    one /= np.linalg.norm(one, axis=1)[:, None]
+    other = np.cross(normals, one)
+    return COSINE * one + SINE * other, COSINE * other - SINE * one
+
+
+def _border_places(flat: F64, apart: float) -> F64:
+    """Places (n, 2) along the sides of triangles (m, 3, 2) that belong to one triangle only, ``apart`` mm apart."""
+    ends = np.stack([flat, np.roll(flat, -1, axis=1)], axis=2).reshape(-1, 2, 2)
+    _, group, count = np.unique(np.round(ends.mean(axis=1) / SAME_SIDE).astype(np.int64), axis=0, return_inverse=True,
+                                return_counts=True)
+    ends = ends[count[group.reshape(-1)] == 1]
+    steps = np.maximum(1, np.ceil(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / apart)).astype(np.int64) + 1
+    row = np.repeat(np.arange(len(ends)), steps)
+    share = (np.arange(len(row)) - np.repeat(np.cumsum(steps) - steps, steps)) / (steps[row] - 1)
+    return np.ascontiguousarray(ends[row, 0] + share[:, None] * (ends[row, 1] - ends[row, 0]))
 
 
 def sample_borders(mesh: TriangleMesh, spacing: float, inset: float, triangles: np.ndarray) -> SurfaceSamples:
@@ -173,6 +268,9 @@ def _barycentric(u: F64, v: F64, w: F64) -> F64:
 
 def joined(parts: list[SurfaceSamples]) -> SurfaceSamples:
     """Several sets of samples as one, in order."""
+    covers = None
+    if any(p.covers is not None for p in parts):
+        covers = np.concatenate([np.zeros(len(p)) if p.covers is None else p.covers for p in parts])
     return SurfaceSamples(np.concatenate([p.points for p in parts]), np.concatenate([p.normals for p in parts]),
                           np.concatenate([p.area for p in parts]), np.concatenate([p.face for p in parts]),
-                          np.concatenate([p.triangle for p in parts]))
+                          np.concatenate([p.triangle for p in parts]), covers)

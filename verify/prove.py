@@ -52,6 +52,7 @@ from verify.program.move_times import minutes_of, spent
 from verify.program.program import Program
 from verify.progress import Report, StageProgress
 from verify.surface.asked_faces import Cutting
+from verify.surface.between_samples import ClosePoints, close_points
 from verify.surface.guard_points import (
     CLOSER_SHARE,
     SURE,
@@ -131,7 +132,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                 *(box_findings(moves, slides, *dogleg_limits(part.mesh, moves, tools, setup), source)
                   if setup.dogleg else ()),
                 *engagement_findings(angle, stretches, of, source, setup.max_engaged), *unheld,
-                *_residuals(scored, cuts.residual, setup, zone_ids)]
+                *_residuals(scored, cuts, setup, zone_ids)]
     work: WorkDone | None = None
     if asked is not None:
         cutting = Cutting(TriangleTree(part.mesh), setup, moves, tools, threads)
@@ -178,6 +179,8 @@ class _Cuts:
     gouge_max: float
     guard: F64
     edge: F64
+    close: ClosePoints
+    close_residual: F64
     reach: float
     notes: list[str]
 
@@ -195,7 +198,17 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
     reach = max(MIN_REACH, setup.stock_allowance + 4 * setup.scallop_height)
     initial = stock_on_normals(points, normals, part.mesh.bounds, setup, reach)
     residual, mover = residual_on_normals(points, normals, initial, moves, tools, threads=threads,
-                                          progress=lambda f: tell(0.1 + 0.7 * f))
+                                          progress=lambda f: tell(0.1 + 0.6 * f))
+    close = close_points(s, initial[:len(s)], residual[:len(s)], moves, tools, setup, threads,
+                         lambda f: tell(0.7 + 0.05 * f))
+    if len(close.row):
+        first = stock_on_normals(close.points, close.normals, part.mesh.bounds, setup, reach)
+        left, by = residual_on_normals(close.points, close.normals, first, moves, tools, threads=threads,
+                                       progress=lambda f: tell(0.75 + 0.05 * f))
+        points, normals = np.concatenate([points, close.points]), np.concatenate([normals, close.normals])
+        face, area = np.concatenate([face, s.face[close.row]]), np.concatenate([area, np.zeros(len(left))])
+        residual, mover = np.concatenate([residual, left]), np.concatenate([mover, by])
+    between = slice(len(s) + len(guard) + len(edge), len(points))
     left_out, even = 0, len(points)
     near = np.flatnonzero((residual < -CLOSER_SHARE * setup.gouge_tolerance) & (mover >= 0))
     if len(near):
@@ -216,11 +229,13 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
     out = _Cuts()
     out.notes = guard_notes(part.mesh, left_out)
     out.residual, out.mover = residual[:len(s)], mover[:len(s)]
+    out.close, out.close_residual = close, residual[between]
     out.guard, out.edge, out.reach = guard.points, edge, reach
     out.gouge_max = max(float(-residual.min(initial=0.0)), 0.0)
     out.gouges = gouge_findings(points[deep], face[deep], -residual[deep], area[deep], mover[deep], source,
                                 setup.gouge_tolerance)
-    on_faces = np.arange(len(residual)) < len(s) + len(guard)  # the stock on an edge belongs to two faces
+    row = np.arange(len(residual))  # the stock on an edge belongs to two faces
+    on_faces = (row < len(s) + len(guard)) | ((row >= between.start) & (row < between.stop))
     depth = setup.stock_allowance - residual
     into = np.flatnonzero(on_faces & (residual >= -setup.gouge_tolerance) & (mover >= 0)
                           & (depth > setup.gouge_tolerance + RAY_ERROR))
@@ -252,11 +267,18 @@ def _idle_findings(read: Sequence[FramedProgram], run: StockPass, moves: Moves, 
     return out
 
 
-def _residuals(scored: ScoredSamples, residual: F64, setup: ProofSetup, zone_ids: Sequence[str]) -> list[Finding]:
-    bad = np.flatnonzero((scored.zone > 0) & ~proved_samples(residual, setup))
-    s = scored.samples
-    return residual_findings(s.points[bad], scored.zone[bad], s.face[bad], residual[bad] - setup.stock_allowance,
-                             s.area[bad], zone_ids, setup.scallop_height)
+def _residuals(scored: ScoredSamples, cuts: _Cuts, setup: ProofSetup, zone_ids: Sequence[str]) -> list[Finding]:
+    """Findings of samples outside the budget, and of close points outside it whose sample is within."""
+    s, close = scored.samples, cuts.close
+    proved = proved_samples(cuts.residual, setup)
+    bad = np.flatnonzero((scored.zone > 0) & ~proved)
+    within = (scored.zone[close.row] > 0) & proved[close.row]
+    near = np.flatnonzero(within & ~proved_samples(cuts.close_residual, setup))
+    row, excess = close.row[near], np.concatenate([cuts.residual[bad], cuts.close_residual[near]])
+    return residual_findings(np.concatenate([s.points[bad], close.points[near]]),
+                             np.concatenate([scored.zone[bad], scored.zone[row]]),
+                             np.concatenate([s.face[bad], s.face[row]]), excess - setup.stock_allowance,
+                             np.concatenate([s.area[bad], close.area[near]]), zone_ids, setup.scallop_height)
 
 
 def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, readings: Sequence[FramedProgram], moves: Moves,

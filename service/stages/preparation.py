@@ -22,6 +22,7 @@ from service.from_wire import face_numbers
 from service.stages.blank_model import Blank
 from service.stages.job_inputs import JobInputs
 from service.stages.job_part import Progress, read_job_part
+from service.stages.sample_spacing import coarse_sets, coarse_spacing
 from toolpath.scallop_budget import ScallopBudget
 from zones.features.decomposition import decompose
 from zones.lattice import lattice_step
@@ -278,18 +279,20 @@ def _view(inputs: JobInputs, name: str, part: Part, blank: Blank, rotation: F64,
 def planning_samples(part: Part, decomposition: Decomposition, inputs: JobInputs, directions: F64) -> SurfaceSamples:
     """The samples that zones are built of and passes are measured at, in the frame of the part.
 
-    Every face gets ``PLANNING_DENSITY`` samples a mm², a small one more: ``MIN_FACE_SAMPLES`` or ``MAX_DENSITY``. Its
-    borders get a sample every ``BORDER_SPACING`` mm, so that the deepest and the outermost place of a zone are among
-    them. Normals are those of the exact surface: with the normals of facets a tool would stand too far aside to fit
-    into a fillet.
+    Every face gets ``PLANNING_DENSITY`` samples a mm², a small one more: ``MIN_FACE_SAMPLES`` or ``MAX_DENSITY``. A
+    large plane that is level or upright has fewer inside (``service.stages.sample_spacing``). The borders of a face get
+    a sample every ``BORDER_SPACING`` mm, so that the deepest and the outermost place of a zone are among them. Normals
+    are those of the exact surface: with the normals of facets a tool would stand too far aside to fit into a fillet.
 
     directions : (d, 3) float64, dimensionless, frame of the part: unit vectors the area is seen from
     """
     triangles = machinable_triangles(part, decomposition.seat, inputs, directions)
     ids, areas = part.mesh.face_ids[triangles], part.mesh.areas[triangles]
-    thin = min(1.0, MAX_SAMPLES / max(PLANNING_DENSITY * float(areas.sum()), 1e-9))
-    sets = []
-    for face in np.unique(ids):
+    wide = coarse_spacing(part, inputs, directions)
+    close = areas[~np.isin(ids, list(wide))]
+    thin = min(1.0, MAX_SAMPLES / max(PLANNING_DENSITY * float(close.sum()), 1e-9))
+    sets = coarse_sets(part.mesh, triangles, wide, PLANNING_DENSITY**-0.5)
+    for face in np.setdiff1d(ids, list(wide)):
         mine = triangles[ids == face]
         area = float(part.mesh.areas[mine].sum())
         density = max(PLANNING_DENSITY * thin, min(MIN_FACE_SAMPLES / max(area, 1e-9), MAX_DENSITY))

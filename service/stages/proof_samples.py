@@ -1,6 +1,6 @@
 """The samples of the proof, and the zone that answers for each of them.
 
-The proof has samples of its own, four times as dense as those that zones are built of. A sample goes to the zone of a
+The proof has samples of its own, denser than those that zones are built of. A sample goes to the zone of a
 nearby planning sample of the same face and form, if the tool of that zone can touch it by its exact reach. The planner
 measures its passes at the same places by its own formula (``toolpath.stock.residual_map``). The proof measures there
 what the program leaves that it reads back (``verify.surface.removal``).
@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
-from geometry.sampling import SurfaceSamples, sample_surface, with_surface_normals
+from geometry.sampling import SurfaceSamples, joined, sample_surface, with_surface_normals
 from service.stages.preparation import Prepared, machinable_triangles
+from service.stages.sample_spacing import coarse_sets, coarse_spacing, split_where_zones_meet
 from toolpath.passes.pass_family import FinishTarget
 from toolpath.planning.job_plan import Plan
 from zones.machinable_area import forms_of
@@ -80,12 +81,14 @@ class Score:
 
 
 def score(ready: Prepared) -> Score:
-    """Sample the machinable area for the proof and hand every sample to the zone whose tool can touch it."""
+    """Sample the machinable area for the proof and hand every sample to the zone whose tool can touch it.
+
+    Samples stand ``PROOF_DENSITY`` a mm², fewer where ``service.stages.sample_spacing`` allows it.
+    """
     first = ready.views[0]
-    triangles = machinable_triangles(first.part, ready.decomposition.seat, ready.inputs,
-                                     ready.seen_from @ first.rotation.T)
-    mesh = first.part.mesh
-    dense = proof_samples(mesh, triangles)
+    seen_from = ready.seen_from @ first.rotation.T
+    triangles = machinable_triangles(first.part, ready.decomposition.seat, ready.inputs, seen_from)
+    dense = _laid(ready, triangles, seen_from)
     zone, tips = np.zeros(len(dense), np.int32), np.zeros((len(dense), 3))
     own = first.label(dense)
     for view in ready.views:
@@ -115,6 +118,20 @@ def proof_samples(mesh: TriangleMesh, triangles: NDArray[np.int64]) -> SurfaceSa
     Returns SurfaceSamples in the frame of the mesh, with the normals of the exact surface.
     """
     return with_surface_normals(sample_surface(mesh, PROOF_DENSITY, seed=PROOF_SEED, triangles=triangles), mesh)
+
+
+def _laid(ready: Prepared, triangles: NDArray[np.int64], directions: NDArray[np.float64]) -> SurfaceSamples:
+    """The samples of the proof in the frame of the first view.
+
+    triangles  : (k,) int64, index of the triangles of the machinable area
+    directions : (d, 3) float64, dimensionless, unit vectors the area is seen from
+    """
+    part, close = ready.views[0].part, PROOF_DENSITY**-0.5
+    wide = coarse_spacing(part, ready.inputs, directions)
+    rest = triangles[~np.isin(part.mesh.face_ids[triangles], list(wide))]
+    sets = [sample_surface(part.mesh, PROOF_DENSITY, seed=PROOF_SEED, triangles=rest)] if len(rest) else []
+    laid = joined([*sets, *coarse_sets(part.mesh, triangles, wide, close)])
+    return with_surface_normals(split_where_zones_meet(laid, ready.samples, ready.zones, close), part.mesh)
 
 
 def _neighbours(view: View, owner: NDArray[np.int32], dense: SurfaceSamples, labels: Labels) -> NDArray[np.int32]:

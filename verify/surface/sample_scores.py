@@ -38,8 +38,8 @@ def zone_proofs(scored: ScoredSamples, residual: F64, proved: BOOL, setup: Proof
         if len(own) == 0:
             out[name] = ZoneProof(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
             continue
-        left = _left(residual[own], setup.stock_allowance)
         area = scored.samples.area[own]
+        left = _left(residual[own], area, setup.stock_allowance)
         total, good = float(area.sum()), float(area[proved[own]].sum())
         out[name] = ZoneProof(*left, _deepest(residual[own]), total, good, good / total)
     return out
@@ -68,16 +68,26 @@ def face_proofs(samples: SurfaceSamples, residual: F64, reached: BOOL, proved: B
         own = order[a:b]
         area = samples.area[own]
         total, good = float(area.sum()), float(area[proved[own]].sum())
-        out[number] = FaceProof(number, total, *_left(residual[own], setup.stock_allowance), _deepest(residual[own]),
-                                float(area[uncut[own]].sum()), good, good / total if total > 0 else 0.0)
+        out[number] = FaceProof(number, total, *_left(residual[own], area, setup.stock_allowance),
+                                _deepest(residual[own]), float(area[uncut[own]].sum()), good,
+                                good / total if total > 0 else 0.0)
     return out
 
 
-def _left(residual: F64, allowance: float) -> tuple[float, float, float]:
-    """Median, 99th percentile and maximum of rest material over the allowance, mm; deeper cuts count 0."""
+def _left(residual: F64, area: F64, allowance: float) -> tuple[float, float, float]:
+    """Median, 99th percentile by area and maximum of rest material over the allowance, mm; deeper cuts count 0."""
     left = np.maximum(residual - allowance, 0.0)
-    p50, p99 = np.percentile(left, [50, 99])
+    p50, p99 = _percentiles(left, area, np.array([0.5, 0.99]))
     return float(p50), float(p99), float(left.max())
+
+
+def _percentiles(values: F64, weight: F64, shares: F64) -> F64:
+    """Values (n,) at shares (k,) of their weight (n,), (k,) float64; equal weights give the usual percentiles."""
+    if np.ptp(weight) <= 0.0 or weight.sum() <= 0.0:
+        return np.asarray(np.percentile(values, 100.0 * shares))
+    order = np.argsort(values, kind="stable")
+    middle = np.cumsum(weight[order]) - 0.5 * weight[order]
+    return np.asarray(np.interp(shares, (middle - middle[0]) / (middle[-1] - middle[0]), values[order]))
 
 
 def _deepest(residual: F64) -> float:
