@@ -193,11 +193,13 @@ class Asked:
 class WorkDone:
     """What became of the work that a program has to do.
 
-    faces  : numbers of the faces that must be within tolerance, ascending
-    reason : (n,) object array of str, why a scored sample stays that is neither within tolerance nor a finding; ''
-             elsewhere
+    samples : SurfaceSamples, n of them, that the proof has measured: those that were given, with close ones in each
+              place of a coarse one that is not settled whole
+    faces   : numbers of the faces that must be within tolerance, ascending
+    reason  : (n,) object array of str, why a sample stays that is neither within tolerance nor a finding; '' elsewhere
     """
 
+    samples: SurfaceSamples
     faces: tuple[int, ...]
     reason: NDArray[np.object_]
 

@@ -8,14 +8,14 @@ what the program leaves that it reads back (``verify.surface.removal``).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
+from geometry.part import Part
 from geometry.sampling import SurfaceSamples, joined, sample_surface, with_surface_normals
 from service.stages.preparation import Prepared, machinable_triangles
 from service.stages.sample_spacing import coarse_sets, coarse_spacing, split_where_zones_meet
@@ -55,9 +55,10 @@ class Score:
             border = ready.samples.area[z.samples] == 0
             edge = z.samples[border]
             here = turned_samples(self.samples.subset(mine), view.rotation @ ready.views[0].rotation.T)
+            covers = None if here.covers is None else np.concatenate([here.covers, np.zeros(len(edge))])
             out.append(FinishTarget(np.vstack([here.points, view.samples.points[edge]]),
-                              np.vstack([here.normals, view.samples.normals[edge]]),
-                              np.vstack([self.tips[mine], z.tips[border]]), PROOF_DENSITY ** -0.5))
+                                    np.vstack([here.normals, view.samples.normals[edge]]),
+                                    np.vstack([self.tips[mine], z.tips[border]]), PROOF_DENSITY ** -0.5, covers))
         return out
 
     def without(self, plan: Plan, zones: Sequence[ZoneArea]) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
@@ -110,14 +111,22 @@ def score(ready: Prepared) -> Score:
     return Score(dense, own, zone, tips)
 
 
-def proof_samples(mesh: TriangleMesh, triangles: NDArray[np.int64]) -> SurfaceSamples:
-    """The samples of a proof on some triangles of a mesh.
+def proof_samples(part: Part, triangles: NDArray[np.int64], spacing: Mapping[int, float]) -> SurfaceSamples:
+    """The samples of a proof on some triangles of a part.
 
     triangles : (n,) int64, index
+    spacing   : mm between the samples inside the faces that need few, by face number
+                (``service.stages.sample_spacing.coarse_spacing``)
 
-    Returns SurfaceSamples in the frame of the mesh, with the normals of the exact surface.
+    Returns SurfaceSamples in the frame of the part, with the normals of the exact surface.
     """
-    return with_surface_normals(sample_surface(mesh, PROOF_DENSITY, seed=PROOF_SEED, triangles=triangles), mesh)
+    return with_surface_normals(_spread(part, triangles, spacing), part.mesh)
+
+
+def _spread(part: Part, triangles: NDArray[np.int64], spacing: Mapping[int, float]) -> SurfaceSamples:
+    rest = triangles[~np.isin(part.mesh.face_ids[triangles], list(spacing))]
+    sets = [sample_surface(part.mesh, PROOF_DENSITY, seed=PROOF_SEED, triangles=rest)] if len(rest) else []
+    return joined([*sets, *coarse_sets(part.mesh, triangles, spacing, PROOF_DENSITY**-0.5)])
 
 
 def _laid(ready: Prepared, triangles: NDArray[np.int64], directions: NDArray[np.float64]) -> SurfaceSamples:
@@ -126,12 +135,10 @@ def _laid(ready: Prepared, triangles: NDArray[np.int64], directions: NDArray[np.
     triangles  : (k,) int64, index of the triangles of the machinable area
     directions : (d, 3) float64, dimensionless, unit vectors the area is seen from
     """
-    part, close = ready.views[0].part, PROOF_DENSITY**-0.5
-    wide = coarse_spacing(part, ready.inputs, directions)
-    rest = triangles[~np.isin(part.mesh.face_ids[triangles], list(wide))]
-    sets = [sample_surface(part.mesh, PROOF_DENSITY, seed=PROOF_SEED, triangles=rest)] if len(rest) else []
-    laid = joined([*sets, *coarse_sets(part.mesh, triangles, wide, close)])
-    return with_surface_normals(split_where_zones_meet(laid, ready.samples, ready.zones, close), part.mesh)
+    part = ready.views[0].part
+    laid = _spread(part, triangles, coarse_spacing(part, ready.inputs, directions))
+    return with_surface_normals(split_where_zones_meet(laid, ready.samples, ready.zones, PROOF_DENSITY**-0.5),
+                                part.mesh)
 
 
 def _neighbours(view: View, owner: NDArray[np.int32], dense: SurfaceSamples, labels: Labels) -> NDArray[np.int32]:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from geometry.mesh import F64
-from geometry.sampling import SurfaceSamples
+from geometry.sampling import SurfaceSamples, joined
 from service.from_wire import face_numbers
 from service.stages.access_plan import ProofFrame
 from service.stages.job_part import JobPart
 from service.stages.preparation import machinable_triangles, table_height
 from service.stages.proof_samples import proof_samples
+from service.stages.sample_spacing import coarse_spacing
 from service.verification.tool_touch import ToolTouch
 from verify.model import Asked
 from verify.program.move_kinds import FEED
@@ -39,7 +40,11 @@ def asked_work(job: JobPart, frame: ProofFrame, program: Program) -> tuple[Surfa
     first = turned(job.part, given[0])
     seat = (np.flatnonzero(seat_of(first)) + 1).tolist()
     triangles = machinable_triangles(first, seat, inputs, directions @ given[0].T)
-    samples = turned_samples(proof_samples(first.mesh, triangles), frame.rotation @ given[0].T)
+    wide = coarse_spacing(frame.part, inputs, directions @ frame.rotation.T) if program.poses is None else {}
+    fine = triangles[~np.isin(first.mesh.face_ids[triangles], list(wide))]
+    samples = turned_samples(proof_samples(first, fine, {}), frame.rotation @ given[0].T)
+    if wide:
+        samples = joined([samples, proof_samples(frame.part, triangles[~np.isin(triangles, fine)], wide)])
     table = table_height(inputs, job.blank) if inputs.turns else None
     asked = frozenset[int]() if not ops.finishing else None if ops.faces is None else frozenset(face_numbers(ops.faces))
     return samples, Asked(asked, ToolTouch(job.part, inputs, frame.rotation, table),

@@ -56,6 +56,8 @@ def proved_program(job: JobPart, first: ProgramFirst, progress: Callable[[float]
     no_zone = ScoredSamples(samples, np.zeros(len(samples), np.int32))
     proof = prove([first.nc], frame.part, job.inputs.bodies, conditions, no_zone, [], progress,
                   spindle_tool=first.spindle_tool, read=[first.read], asked=asked)
+    if proof.work is not None:
+        samples = proof.work.samples
     report, entry = verification_report(job, in_setup_frame(frame, proof), turned_samples(samples, frame.rotation.T))
     return ProgramProof(frame, samples, conditions, proof, report, entry)
 

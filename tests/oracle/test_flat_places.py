@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
-from geometry.sampling import SurfaceSamples
+from geometry.mesh import TriangleMesh
+from geometry.sampling import SurfaceSamples, graded_samples
 from geometry.tool_body import ToolBody
 from verify.model import ProofSetup
 from verify.moves import Moves
-from verify.surface.between_samples import close_points
+from verify.surface.between_samples import ClosePoints, close_points, judged_places, settled_samples
 from verify.surface.removal import residual_on_normals
 from verify.surface.sample_scores import proved_samples
 
@@ -55,6 +57,15 @@ def wall_passes(rng, apart=2.0):
     """Layers along a wall with normal -X: a tool of radius 3 runs at x = -3."""
     return [((-3.0, -13 + rng.uniform(), z), (-3.0, 13 - rng.uniform(), z))
             for z in np.arange(8.0, -9.0 - rng.uniform(), -apart)]
+
+
+BOUNDS = np.array([[-8.0, -8.0, -20.0], [8.0, 8.0, 0.0]])
+
+
+def between(samples: SurfaceSamples, left, program, cutters) -> ClosePoints:
+    """The close points of a plane under 1.5 mm of stock."""
+    places = judged_places(samples, left, BOUNDS, program, cutters, SETUP, 1.5)
+    return close_points(samples, left, places, SETUP)
 
 
 CASES = {
@@ -101,7 +112,7 @@ def test_what_the_dense_twin_finds_is_found(name, seed):
     program, cutters = moves(*planted(lay(rng), fault, rng)), [TOOLS[kind]]
     samples, twin = face(normal, STEP, True), face(normal, TWIN, False)
     left, _ = residual_on_normals(samples.points, samples.normals, np.full(len(samples), 1.5), program, cutters)
-    close = close_points(samples, np.full(len(samples), 1.5), left, program, cutters, SETUP)
+    close = between(samples, left, program, cutters)
     dense, _ = residual_on_normals(twin.points, twin.normals, np.full(len(twin), 1.5), program, cutters)
     cell = np.zeros(len(twin), np.int64)
     side = round(16.0 / STEP)
@@ -136,13 +147,65 @@ def test_plain_passes_leave_little_to_split():
         program, samples = moves(*lay(rng)), face(normal, STEP, True)
         left, _ = residual_on_normals(samples.points, samples.normals, np.full(len(samples), 1.5), program,
                                       [TOOLS[kind]])
-        close = close_points(samples, np.full(len(samples), 1.5), left, program, [TOOLS[kind]], SETUP)
+        close = between(samples, left, program, [TOOLS[kind]])
         assert proved_samples(left, SETUP).all()
         assert len(np.unique(close.row)) < 0.04 * len(samples)
 
 
 def test_samples_that_cover_nothing_have_no_close_points():
     samples = face((0, 0, 1), STEP, False)
-    none = close_points(samples, np.ones(len(samples)), np.ones(len(samples)), moves(((0, 0, 0), (1, 0, 0))),
-                        [TOOLS["flat"]], SETUP)
-    assert len(none.row) == 0
+    way = moves(((0, 0, 0), (1, 0, 0)))
+    assert len(between(samples, np.ones(len(samples)), way, [TOOLS["flat"]]).row) == 0
+    assert settled_samples(samples, BOUNDS, way, [TOOLS["flat"]], SETUP, 1.5) is samples
+
+
+def lattice(apart=STEP) -> SurfaceSamples:
+    """The level square of 16 mm with coarse samples, as jobs and verifications lay them."""
+    corners = np.array([[-8.0, -8, 0], [8, -8, 0], [8, 8, 0], [-8, 8, 0]])
+    mesh = TriangleMesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), np.ones(2, np.int32))
+    return graded_samples(mesh, np.arange(2), apart, 5, apart)
+
+
+@pytest.mark.parametrize("name", [n for n, case in CASES.items() if case[0] == (0, 0, 1)])
+def test_heights_and_depths_of_settled_samples_are_those_of_the_dense_twin(name):
+    """Every place of 0.05 mm: its nearest sample says what stands there, within 5 µm where the twin is even."""
+    _, kind, lay, fault = CASES[name]
+    rng = np.random.default_rng(7)
+    program, cutters = moves(*planted(lay(rng), fault, rng)), [TOOLS[kind]]
+    samples = settled_samples(lattice(), BOUNDS, program, cutters, SETUP, 1.5)
+    assert samples.area.sum() == pytest.approx(256.0, rel=1e-9)
+    left, _ = residual_on_normals(samples.points, samples.normals, np.full(len(samples), 1.5), program, cutters)
+    twin = face((0, 0, 1), TWIN, False)
+    dense, _ = residual_on_normals(twin.points, twin.normals, np.full(len(twin), 1.5), program, cutters)
+    inside = np.abs(twin.points).max(axis=1) < 7.0
+    row = cKDTree(samples.points).query(twin.points)[1]
+    coarse = inside & (samples.area[row] > 0.2)
+    assert proved_samples(dense, SETUP)[coarse].tolist() == proved_samples(left, SETUP)[row[coarse]].tolist()
+    high = coarse & (dense > 0.0101)
+    assert np.abs(dense - left[row])[high].max(initial=0.0) <= 0.005 + 1e-6
+    assert (dense[coarse] >= -0.4 * SETUP.gouge_tolerance - 1e-6).all()
+    assert -left.min() >= -dense.min() - 1e-6, "the deepest gouge is among the samples"
+    share, true = samples.area[proved_samples(left, SETUP)].sum() / 256.0, proved_samples(dense, SETUP).mean()
+    assert share == pytest.approx(true, abs=0.01)
+
+
+@pytest.mark.parametrize("radius", [0.06, 0.2, 1.5])
+def test_a_pit_is_found_at_its_depth_wherever_it_is(radius):
+    """Pits of a thin ball, narrower than close points stand apart: the deepest point of the move is a sample."""
+    rng = np.random.default_rng(11)
+    ball, flat = ToolBody("T2", 2, 2 * radius, radius, 3.0, 2 * radius, 3.0, 6.0, 30.0), TOOLS["flat"]
+    ways = floor_passes(rng)
+    for x, y in rng.uniform(-6.0, 6.0, (40, 2)):
+        pit = [((x, y, 1.0), (x, y, -0.012)), ((x, y, -0.012), (x, y, 1.0))]
+        both = moves(*ways, *pit)
+        program = Moves(both.start, both.end, both.feed, np.repeat([0, 1], [len(ways), 2]).astype(np.int32))
+        samples = settled_samples(lattice(), BOUNDS, program, [flat, ball], SETUP, 1.5)
+        left, _ = residual_on_normals(samples.points, samples.normals, np.full(len(samples), 1.5), program,
+                                      [flat, ball])
+        assert left.min() == pytest.approx(-0.012, abs=1e-6)
+
+
+def test_a_plane_that_no_move_touches_keeps_its_coarse_samples():
+    coarse = lattice()
+    samples = settled_samples(coarse, BOUNDS, moves(((30.0, 0, 0), (40.0, 0, 0))), [TOOLS["flat"]], SETUP, 1.5)
+    assert len(samples) == len(coarse) and samples.area.tolist() == coarse.area.tolist()

@@ -82,3 +82,33 @@ def test_a_sharp_end_above_the_foot_of_a_wall_leaves_it():
     assert made.residual[0] <= 1e-9
     empty = ResidualMap(np.zeros((0, 3)), np.zeros((0, 3)))
     empty.cut(np.zeros((2, 3)), ball(2.0))
+
+
+@pytest.mark.parametrize("body", [tool(3.0, 0.0), tool(4.0, 1.0)], ids=lambda b: b.kind)
+@pytest.mark.parametrize("upright", [False, True])
+def test_a_place_is_left_with_no_more_than_its_sample_says(body, upright):
+    """A sample that covers a place: a single move leaves no more than that anywhere in the square that holds it."""
+    rng = np.random.default_rng(5)
+    n, half = 300, 0.35
+    normal = np.array([0.6, -0.8, 0.0]) if upright else np.array([0.0, 0.0, 1.0])
+    along = np.array([0.8, 0.6, 0.0])
+    across = np.array([0.0, 0.0, 1.0]) if upright else np.array([-0.6, 0.8, 0.0])
+    points = rng.uniform(-8, 8, (n, 1)) * along + rng.uniform(-5, 5, (n, 1)) * across
+    made = ResidualMap(points, np.tile(normal, (n, 1)), margin=0.015, covers=np.full(n, half))
+    steps = np.linspace(-half, half, 9)
+    e, f = (x.reshape(-1, 1) for x in np.meshgrid(steps, steps))
+    # a square in its own plane; a level one may be turned, so the disc in it counts
+    dense_ = points[:, None] + e * along + f * across if upright else \
+        points[:, None] + np.minimum(1.0, half / np.maximum(np.hypot(e, f), 1e-9)) * (e * along + f * across)
+    every = ResidualMap(dense_.reshape(-1, 3), np.tile(normal, (dense_.size // 3, 1)), margin=0.015)
+    off = body.radius + 0.004
+    for k in range(-2, 3):
+        middle = off * normal + k * 1.9 * across if upright else np.array([0, 0, 0.004]) + k * 2.9 * across
+        path = np.array([middle - 7.0 * along, middle + (6.0 + 0.2 * k) * along])
+        made.cut(path, body)
+        every.cut(path, body)
+    said = made.residual < 0.015
+    assert 100 < said.sum() < n
+    most = every.residual.reshape(n, -1).max(axis=1)
+    assert (most[said] <= made.residual[said] + 1e-9).all()
+    assert body.corner_radius > 0.0 or made.residual[said] == pytest.approx(0.004, abs=1e-6)

@@ -8,6 +8,9 @@ plane, where a sharp-cornered end passes beside p or over it, the height above p
 and a wall below such an end counts as untouched. Along a
 straight move the least lies at the nearest point in plan, at the nearest point in space to the corner's centre,
 or at an end; all are tried.
+
+A sample that stands for a flat place round it is as far from a move as the farthest corner of the square that holds the
+place: what a move sweeps is convex, so the whole place is no farther.
 """
 
 from __future__ import annotations
@@ -76,8 +79,39 @@ def _segment_gap(p, a, b, radius, corner, level):
     return best
 
 
+class PlaceSquares(NamedTuple):
+    """Squares round samples, access frame: in the level plane, or upright.
+
+    half : (n,) float64, mm, half a side; 0 where a sample stands for its point alone
+    x, y : (n,) float64, unit, level direction of the sides of an upright square; both 0 for a level one
+    """
+
+    half: NDArray[np.float64]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+
+
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def lower(points, level, cells: SampleCells, path, cutter: CutterSizes, margin, residual):
+def _farthest_corner(p, squares: PlaceSquares, s, a, b, radius, corner, level, z_hi, enough):
+    """Distance of the farthest corner of square s round p from a move; any value above ``enough`` where it is more."""
+    half, worst = squares.half[s], -FAR
+    corner_of = np.empty(3)
+    for k in range(4):
+        e, f = half if k < 2 else -half, half if k % 2 else -half
+        if level == LEVEL_PLANE:
+            corner_of[0], corner_of[1], corner_of[2] = p[0] + e, p[1] + f, p[2]
+        else:
+            corner_of[0], corner_of[1], corner_of[2] = p[0] + e * squares.x[s], p[1] + e * squares.y[s], p[2] + f
+        if corner_of[2] > z_hi:
+            return FAR
+        worst = max(worst, _segment_gap(corner_of, a, b, radius, corner, level))
+        if worst > enough:
+            return worst
+    return worst
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def lower(points, level, squares: PlaceSquares, cells: SampleCells, path, cutter: CutterSizes, margin, residual):
     """Lower residual (n,) by one polyline of tips (m, 3); samples are binned in square cells in plan.
 
     level (n,): 1 on a level plane, 2 on a wall, else 0; margin: mm beyond the cutter within which it is measured.
@@ -100,5 +134,8 @@ def lower(points, level, cells: SampleCells, path, cutter: CutterSizes, margin, 
                     if residual[s] <= 0.0 or points[s, 2] < z_lo or points[s, 2] > z_hi:
                         continue
                     d = _segment_gap(points[s], a, b, radius, corner, level[s])
+                    if d < residual[s] and squares.half[s] > 0.0:
+                        d = max(d, _farthest_corner(points[s], squares, s, a, b, radius, corner, level[s], z_hi,
+                                                    residual[s]))
                     if d < residual[s]:
                         residual[s] = d

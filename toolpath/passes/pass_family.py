@@ -59,24 +59,31 @@ class FinishTarget:
     normals : (n, 3) float64, unit, out of the material; n_z > 0 where passes are dragged
     tips    : (n, 3) float64, mm, an admissible tip that touches each
     spacing : mm, approximate distance between neighbours
+    covers  : (n,) float64, mm: radius of the flat place that one move has to finish whole, 0 for the point alone; None:
+              0 for all
     """
 
     points: F64
     normals: F64
     tips: F64
     spacing: float
+    covers: F64 | None = None
 
     def subset(self, which: I64) -> FinishTarget:
         """Some of the samples.
 
         which : (m,) int64, index
         """
-        return FinishTarget(self.points[which], self.normals[which], self.tips[which], self.spacing)
+        return FinishTarget(self.points[which], self.normals[which], self.tips[which], self.spacing,
+                            None if self.covers is None else self.covers[which])
 
     def joined(self, more: FinishTarget) -> FinishTarget:
         """These samples followed by others, with the same spacing."""
+        covers = None
+        if self.covers is not None or more.covers is not None:
+            covers = np.concatenate([np.zeros(len(t.points)) if t.covers is None else t.covers for t in (self, more)])
         return FinishTarget(np.vstack([self.points, more.points]), np.vstack([self.normals, more.normals]),
-                      np.vstack([self.tips, more.tips]), self.spacing)
+                            np.vstack([self.tips, more.tips]), self.spacing, covers)
 
 
 @dataclass(frozen=True)

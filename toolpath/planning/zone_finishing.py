@@ -111,7 +111,7 @@ class Finish:
                 8.0 * settings.scallop_height * r), zone.faces))
         self.checks = checks
         self.residual = ResidualMap(checks.points + settings.stock_allowance * checks.normals, checks.normals,
-                                    margin=1.5 * settings.scallop_height)
+                                    margin=1.5 * settings.scallop_height, covers=checks.covers)
         self.strategy = (_once(_strategy(zone, checks, field, cut, settings), len(checks.points))
                          if snapshot is None else
                          _Strategy(snapshot.strategy, snapshot.side_step, _laid_later(anew, snapshot.strategy),

@@ -10,13 +10,14 @@ from __future__ import annotations
 import copy
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.errors import GeometryError
 from geometry.kernels.cutter_sizes import CutterSizes
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.kernels.leaning import lower_leaning
-from toolpath.kernels.residual import LEVEL_PLANE, UPRIGHT, SampleCells, lower
+from toolpath.kernels.residual import LEVEL_PLANE, UPRIGHT, PlaceSquares, SampleCells, lower
 from toolpath.stock.cut_history import PER_MM
 
 CELL = 0.6  # mm
@@ -31,15 +32,20 @@ class ResidualMap:
     points   : (n, 3) float64, mm, access frame
     normals  : (n, 3) float64, unit, access frame
     margin   : mm, a cutter farther away does not count
-    residual : (n,) float64, mm, distance to the nearest swept cutting part so far; below 0 where one entered
+    covers   : (n,) float64, mm: radius of the flat place that a sample of a level or upright plane stands for, 0 for
+               its point alone; None: 0 for all
+    residual : (n,) float64, mm, distance to the nearest swept cutting part so far; below 0 where one entered. For a
+               flat place, that of its farthest point from the one move that comes nearest.
     """
 
-    def __init__(self, points: F64, normals: F64, cell: float = CELL, margin: float = MIN_MARGIN) -> None:
+    def __init__(self, points: F64, normals: F64, cell: float = CELL, margin: float = MIN_MARGIN,
+                 covers: F64 | None = None) -> None:
         self.points = np.ascontiguousarray(points)
         upright = np.abs(normals[:, 2]) < 0.5
         self.level = np.where(normals[:, 2] > 1.0 - 1e-6, LEVEL_PLANE, np.where(upright, UPRIGHT, 0))
         self.residual = np.full(len(points), UNTOUCHED)
         self.margin = max(margin, MIN_MARGIN)
+        self._squares = _squares(normals, self.level, covers)
         self._cells = _binned(points, cell)
 
     def copied(self) -> ResidualMap:
@@ -56,8 +62,8 @@ class ResidualMap:
         A flat end that only just comes down to a place at the top of a wall passes over it where rounding lifts it.
         """
         path = np.column_stack([path[:, :2], np.rint(path[:, 2] * PER_MM) / PER_MM])
-        lower(self.points, self.level, self._cells, np.ascontiguousarray(path), _sizes(tool), self.margin,
-              self.residual)
+        lower(self.points, self.level, self._squares, self._cells, np.ascontiguousarray(path), _sizes(tool),
+              self.margin, self.residual)
 
     def cut_leaning(self, tips: F64, axes: F64, tool: ToolBody) -> None:
         """Lower the residual by poses of a tilted tool: to the least signed distance, below 0 where it gouges.
@@ -125,6 +131,14 @@ def _poses(tips: F64, axes: F64) -> tuple[F64, F64]:
 
 def _sizes(tool: ToolBody) -> CutterSizes:
     return CutterSizes(tool.radius, tool.corner_radius, tool.flute_length)
+
+
+def _squares(normals: F64, level: NDArray[np.int64], covers: F64 | None) -> PlaceSquares:
+    """The squares that hold the places of samples; tilted faces have none."""
+    half = np.zeros(len(normals)) if covers is None else np.where(level != 0, covers, 0.0)
+    upright = (level == UPRIGHT) & (half > 0.0)
+    x, y = np.where(upright, -normals[:, 1], 0.0), np.where(upright, normals[:, 0], 0.0)
+    return PlaceSquares(half, x, y)
 
 
 def _binned(points: F64, cell: float) -> SampleCells:

@@ -1,7 +1,7 @@
-"""Flat places of the surface that one move finishes whole, or that some move may cut too deep.
+"""Flat places of the surface: what single moves leave on them whole, and how deep moves go below them.
 
-Notation as in ``sweep`` and ``rays``. A place is the square of half side e round a sample c, in the plane through c
-square to its normal n; u and v are unit vectors along its sides.
+Notation as in ``sweep`` and ``rays``. A place is a square round a sample c, in the plane through c square
+to its normal n; u and v are unit vectors along its sides, e and f coordinates along them.
 """
 
 from __future__ import annotations
@@ -17,19 +17,21 @@ from geometry.kernels.cutter_sizes import CutterSizes
 from verify.kernels.rays import TOUCH, CellArrays, gap, new_left, plan_distance
 from verify.kernels.tables import F64, MoveArrays
 
-U8 = NDArray[np.uint8]
-
-WHOLE = 1  # one move leaves no more than the limit at all four corners, and so everywhere between them
-DEEP = 2  # the cutting part of some move that passes the place reaches deeper below the plane than allowed
+BOOL = NDArray[np.bool_]
+LEVEL = 1e-9  # component of a unit normal: less is none
 
 
 class PlaceArrays(NamedTuple):
-    """Flat places, sorted by the cells of a grid, setup frame; the last changes in place.
+    """Flat places, sorted by the cells of a grid, setup frame; the last four change in place.
 
     points, normals : (n, 3) float64, mm and unit, out of the material
     u, v            : (n, 3) float64, unit, along the sides
-    half            : (n,) float64, mm, e of each
-    state           : (n,) uint8, WHOLE and DEEP
+    half            : (n,) float64, mm, half a side of each
+    limit           : (n,) float64, mm that may be left
+    whole           : (n,) bool, one move leaves no more than the limit at all four corners, and so between them
+    depth           : (n,) float64, mm below the plane, the most that a move which passes the place reaches
+    inside          : (n,) float64, mm, the same of moves whose deepest point stands over the place
+    foot            : (n, 2) float64, mm along u and v, that point seen from c
     """
 
     points: F64
@@ -37,42 +39,55 @@ class PlaceArrays(NamedTuple):
     u: F64
     v: F64
     half: F64
-    state: U8
+    limit: F64
+    whole: BOOL
+    depth: F64
+    inside: F64
+    foot: F64
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def depth_below(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter: CutterSizes):
-    """How far the swept cutting part reaches beyond the plane through the origin with normal n, nz >= 0.
+def deepest_point(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter: CutterSizes):
+    """How far the swept cutting part reaches beyond the plane through the origin with normal n, and where.
 
     q : the plane's point as seen from the tip at the start of the move, so the tip is at -q
+
+    Returns the depth, mm, and the deepest point (3,), mm; on a vertical line of such points the one nearest in height.
     """
-    out, corner = -1e300, cutter.corner
-    flat = (cutter.radius - corner) * math.sqrt(nx * nx + ny * ny)
+    aside = math.sqrt(nx * nx + ny * ny)
+    best, px, py, pz = -1e300, 0.0, 0.0, 0.0
     for k in range(2):
         x, y, z = k * dx - qx, k * dy - qy, k * dz - qz
-        out = max(out, flat + corner - (nx * x + ny * y + max(nz, 0.0) * (z + corner)))
-    return out
+        if nz < -LEVEL:
+            out, height = cutter.radius, z + cutter.length
+        elif nz > LEVEL:
+            out, height = cutter.radius - cutter.corner * (1.0 - aside), z + cutter.corner * (1.0 - nz)
+        else:
+            out, height = cutter.radius, min(max(0.0, z + cutter.corner), z + cutter.length)
+        if aside > LEVEL:
+            x, y = x - out * nx / aside, y - out * ny / aside
+        depth = -(nx * x + ny * y + nz * height)
+        if depth > best:
+            best, px, py, pz = depth, x, y, height
+    return best, px, py, pz
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def judge_tile(tile, cells: CellArrays, places: PlaceArrays, limit, deep, moves: MoveArrays, cutters):
+def judge_tile(tile, cells: CellArrays, places: PlaceArrays, moves: MoveArrays, cutters):
     """Work all feed moves through the places of the cell columns x0..x1-1, y0..y1-1 of a tile (x0, x1, y0, y1).
 
-    limit, deep : mm that may be left, and that may be cut
-    cutters     : (k, 3) float64, mm: radius, corner radius, flute length
+    cutters : (k, 3) float64, mm: radius, corner radius, flute length
     """
     cx0, cx1, cy0, cy1 = tile
     origin, size, shape, first = cells
-    points, normals, u, v, half, state = places
+    points, normals, u, v, half, limit, whole, deep, inside, foot = places
     starts, ends, feeds, tool = moves
-    most = 0.0
+    pad = 0.0
     for cx in range(cx0, cx1):
         for cy in range(cy0, cy1):
             row = (cx * shape[1] + cy) * shape[2]
             for i in range(first[row], first[row + shape[2]]):
-                most = max(most, half[i])
-    most *= math.sqrt(2.0)
-    pad = most + max(limit, 0.0) + TOUCH
+                pad = max(pad, math.sqrt(2.0) * half[i] + max(limit[i], 0.0) + TOUCH)
     for m in range(len(starts)):
         if not feeds[m]:
             continue
@@ -103,28 +118,32 @@ def judge_tile(tile, cells: CellArrays, places: PlaceArrays, limit, deep, moves:
                 if plan_distance(px - ax, py - ay, dx, dy, plan2) > around:
                     continue
                 for i in range(a, b):
-                    if state[i] == WHOLE | DEEP:
-                        continue
                     qx, qy, qz = points[i, 0] - ax, points[i, 1] - ay, points[i, 2] - az
                     nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
-                    wide = math.sqrt(2.0) * half[i]
-                    if not state[i] & DEEP:
-                        tall = wide * math.sqrt(max(1.0 - nz * nz, 0.0))
-                        if (plan_distance(qx, qy, dx, dy, plan2) < radius + wide
-                                and qz + tall > min(0.0, dz) and qz - tall < max(0.0, dz) + length
-                                and depth_below(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter) > deep):
-                            state[i] |= DEEP
-                    if state[i] & WHOLE or gap(qx, qy, qz, dx, dy, dz, plan2, cutter) > limit + TOUCH:
+                    wide, most = math.sqrt(2.0) * half[i], max(limit[i], 0.0) + TOUCH
+                    aside = math.sqrt(max(1.0 - nz * nz, 0.0))
+                    if plan_distance(qx, qy, dx, dy, plan2) > radius + wide + most * aside:
                         continue
-                    whole = True
+                    tall = wide * aside + most * abs(nz)
+                    if qz + tall < min(0.0, dz) or qz - tall > max(0.0, dz) + length:
+                        continue
+                    depth, wx, wy, wz = deepest_point(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter)
+                    deep[i] = max(deep[i], depth)
+                    if depth > inside[i]:
+                        e = wx * u[i, 0] + wy * u[i, 1] + wz * u[i, 2]
+                        f = wx * v[i, 0] + wy * v[i, 1] + wz * v[i, 2]
+                        if abs(e) <= half[i] and abs(f) <= half[i]:
+                            inside[i], foot[i, 0], foot[i, 1] = depth, e, f
+                    if whole[i] or gap(qx, qy, qz, dx, dy, dz, plan2, cutter) > most:
+                        continue
+                    good = True
                     for k in range(4):
                         e = half[i] if k < 2 else -half[i]
                         f = half[i] if k % 2 else -half[i]
                         t = new_left(qx + e * u[i, 0] + f * v[i, 0], qy + e * u[i, 1] + f * v[i, 1],
                                      qz + e * u[i, 2] + f * v[i, 2], nx, ny, nz, dx, dy, dz, plan2, cutter,
-                                     limit + TOUCH)
-                        if not t < limit + TOUCH:
-                            whole = False
+                                     limit[i] + TOUCH)
+                        if not t < limit[i] + TOUCH:
+                            good = False
                             break
-                    if whole:
-                        state[i] |= WHOLE
+                    whole[i] = good

@@ -158,9 +158,11 @@ def worked_faces(samples: SurfaceSamples, residual: F64, mover: I32, reach: floa
         left, by = cutting.way_through_stock(points, normals, cutting.farthest, OFF_FACETS)
         counts = (by >= 0) & ~planes.holds(points, normals, left, by)
         ends = np.cumsum([len(r) for r in rows])
-        for k, mine in zip(np.flatnonzero(open_), np.split(counts, ends[:-1]), strict=True):
-            worked[k] = sure[k] + more[k] * float(mine.mean()) >= WORKED_SHARE * total[k]
-            more[k] *= float(mine.mean())
+        area = np.split(samples.area[chosen], ends[:-1])
+        for k, mine, each in zip(np.flatnonzero(open_), np.split(counts, ends[:-1]), area, strict=True):
+            share = float(each[mine].sum()) / max(float(each.sum()), 1e-300)
+            worked[k] = sure[k] + more[k] * share >= WORKED_SHARE * total[k]
+            more[k] *= share
     if not worked.any():
         worked = sure + np.where(open_, more, 0.0) > 0.0
     return tuple(int(n) for n in numbers[worked])

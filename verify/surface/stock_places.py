@@ -54,9 +54,9 @@ def stock_findings(samples: SurfaceSamples, stock: StandingStock, each: float, s
     """
     found: list[Finding] = []
     told = np.zeros(len(samples), np.bool_)
-    spacing = float(np.sqrt(each * samples.area.mean())) if len(samples) else 0.0
     for face in np.unique(samples.face).tolist():
         mine = np.flatnonzero(samples.face == face)
+        spacing = float(np.sqrt(each * samples.area[mine].max()))
         group = _connected(samples.points[mine], max(CONNECTED, 3.0 * spacing))
         for number in range(int(group.max()) + 1):
             rows = mine[group == number]

@@ -121,9 +121,9 @@ def work_done(asked: Asked, measured: Measured, cutting: Cutting, cut: BOOL,
     reason[stays & ~on_asked] = NOT_IN_PROGRAM
     rows = np.flatnonzero(stays & on_asked)
     if asked.faces is None and not faces and cut.any():
-        return WorkDone(faces, reason), [_beside(cut, source)]
+        return WorkDone(s, faces, reason), [_beside(cut, source)]
     if not len(rows):
-        return WorkDone(faces, reason), []
+        return WorkDone(s, faces, reason), []
     tried = _tried(rows, s.face)
     used = cut if cut.any() else cutting.moves.feed
     tools = [cutting.tools[k] for k in np.unique(cutting.moves.tool[used])]
@@ -134,7 +134,7 @@ def work_done(asked: Asked, measured: Measured, cutting: Cutting, cut: BOOL,
     why[found] = np.where(told, "", LEFT)
     near = KeyedPoints(few.face.astype(np.int64), few.points)
     reason[rows] = why[near.nearest(s.face[rows].astype(np.int64), s.points[rows])[:, 0]]
-    return WorkDone(faces, reason), findings
+    return WorkDone(s, faces, reason), findings
 
 
 def _beside(cut: BOOL, source: Source) -> Finding:
