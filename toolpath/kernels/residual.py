@@ -120,6 +120,8 @@ def lower(points, level, squares: PlaceSquares, cells: SampleCells, path, cutter
     radius, corner, flute = cutter
     for k in range(len(path) - 1):
         a, b = path[k], path[k + 1]
+        dx, dy = b[0] - a[0], b[1] - a[1]
+        d2 = dx * dx + dy * dy
         r = radius + margin
         j0 = max(int((min(a[0], b[0]) - r - gx) / cell), 0)
         j1 = min(int((max(a[0], b[0]) + r - gx) / cell), ncx - 1)
@@ -132,6 +134,18 @@ def lower(points, level, squares: PlaceSquares, cells: SampleCells, path, cutter
                 for q in range(cell_start[c], cell_start[c + 1]):
                     s = cell_items[q]
                     if residual[s] <= 0.0 or points[s, 2] < z_lo or points[s, 2] > z_hi:
+                        continue
+                    low = min(a[2], b[2]) - points[s, 2]
+                    if level[s] == LEVEL_PLANE and low >= residual[s]:
+                        continue
+                    if level[s] == UPRIGHT and corner == 0.0 and low > BELOW:
+                        continue
+                    # in plan no point of the cutter is nearer than that: most samples were cut as far before
+                    ex, ey = points[s, 0] - a[0], points[s, 1] - a[1]
+                    f = min(max((ex * dx + ey * dy) / d2, 0.0), 1.0) if d2 > 0.0 else 0.0
+                    ex, ey = ex - f * dx, ey - f * dy
+                    near = radius if level[s] == LEVEL_PLANE else radius + residual[s]
+                    if ex * ex + ey * ey > near * near:
                         continue
                     d = _segment_gap(points[s], a, b, radius, corner, level[s])
                     if d < residual[s] and squares.half[s] > 0.0:

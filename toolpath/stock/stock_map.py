@@ -17,7 +17,7 @@ from scipy import ndimage
 
 from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
-from geometry.mesh_queries.drop import drop_grid
+from geometry.mesh_queries.flat_grid import drop_over_flats
 from geometry.tool_body import ToolBody
 from toolpath.kernels.shell import Ceilings, PoseArrays, highest_of_four, stands_in
 from toolpath.kernels.stock import HALF_DIAGONAL, meets, overlaps, sink, stamp, stamp_balls, stamp_leaning, standing
@@ -68,7 +68,7 @@ class StockMap:
         r, half = max(offset, 1e-3), HALF_DIAGONAL * step
         # A ball dropped from above stands at the highest point of such balls; with a flat end as wide as the disc
         # round a cell it stands at the highest of the disc.
-        top, cover = (drop_grid(tree, lat.x0, lat.y0, step, lat.nx, lat.ny, r + d, r) + r for d in (0.0, half))
+        top, cover = (drop_over_flats(tree, lat.x0, lat.y0, step, lat.nx, lat.ny, r + d, r) + r for d in (0.0, half))
         return cls(lat, top, cover, _in_cells(part or tree, lat))
 
     @classmethod
@@ -394,7 +394,7 @@ def _upper_end(u: F64, length: float, aside: float, up: float) -> F64:
 
 def _in_cells(tree: TriangleTree, lat: Lattice) -> F64:
     """(ny, nx) float64, mm: highest of the part in the disc round each cell."""
-    return drop_grid(tree, lat.x0, lat.y0, lat.step, lat.nx, lat.ny, HALF_DIAGONAL * lat.step, 0.0)
+    return drop_over_flats(tree, lat.x0, lat.y0, lat.step, lat.nx, lat.ny, HALF_DIAGONAL * lat.step, 0.0)
 
 
 def _stacked(heights: Sequence[F64]) -> F64:

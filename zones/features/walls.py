@@ -12,6 +12,7 @@
 from __future__ import annotations
 
 import heapq
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -181,12 +182,11 @@ def _continue_across_junctions(graph: FaceGraph, thin: np.ndarray, body: np.ndar
     ends = [(f, k) for k in graph.links if k.kind == EdgeKind.CONCAVE and thin[k.a] and thin[k.b]
             and body[k.a] != body[k.b] for f in (k.a, k.b)]
     between: dict[tuple[int, int], set[int]] = {}
-    for i, (f, first) in enumerate(ends):
-        for g, second in ends[i + 1:]:
-            pair = (int(min(body[f], body[g])), int(max(body[f], body[g])))
-            if pair[0] != pair[1] and _interrupted(graph, f, first, g, second):
-                others = {int(body[first.other(f)]), int(body[second.other(g)])}
-                between[pair] = between.get(pair, set()) | (others - set(pair))
+    for i, j in _interrupted(graph, ends, body):
+        (f, first), (g, second) = ends[i], ends[j]
+        pair = (int(min(body[f], body[g])), int(max(body[f], body[g])))
+        others = {int(body[first.other(f)]), int(body[second.other(g)])}
+        between[pair] = between.get(pair, set()) | (others - set(pair))
     sets = UnionFind(graph.n)
     for (a, b), others in between.items():
         if len(others) >= 2:
@@ -194,18 +194,30 @@ def _continue_across_junctions(graph: FaceGraph, thin: np.ndarray, body: np.ndar
     return sets.labels()[body]
 
 
-def _interrupted(graph: FaceGraph, f: int, first: Link, g: int, second: Link) -> bool:
-    p, q = graph.mesh.vertices[first.nodes], graph.mesh.vertices[second.nodes]
-    a, b = p.mean(axis=0), q.mean(axis=0)
-    n1, n2 = graph.normals_at(f, first.nodes).mean(axis=0), graph.normals_at(g, second.nodes).mean(axis=0)
-    step = b - a
-    far = float(np.linalg.norm(step))
-    overlap = min(p[:, 2].max(), q[:, 2].max()) - max(p[:, 2].min(), q[:, 2].min())
-    if not (0 < far < overlap) or not float(n1 @ n2) > 0.9:
-        return False
-    in_plane = max(abs(float(n1 @ step)), abs(float(n2 @ step))) < 0.2 * far
-    away = (graph.centroid[f] - a) @ step < 0 < (graph.centroid[g] - b) @ step
-    return bool(in_plane and away)
+def _interrupted(graph: FaceGraph, ends: Sequence[tuple[int, Link]], body: np.ndarray) -> list[tuple[int, int]]:
+    """Pairs i < j of ends of sides, of two bodies, that are one interrupted surface.
+
+    ends : (face, edge) each
+    """
+    if not ends:
+        return []
+    corners = [graph.mesh.vertices[k.nodes] for _, k in ends]
+    middle = np.array([p.mean(axis=0) for p in corners])
+    normal = np.array([graph.normals_at(f, k.nodes).mean(axis=0) for f, k in ends])
+    low, high = (np.array([m(p[:, 2]) for p in corners]) for m in (np.min, np.max))
+    face = np.array([f for f, _ in ends])
+    back = graph.centroid[face] - middle  # from the edge into its face
+    out = []
+    for i in range(len(ends) - 1):
+        step = middle[i + 1:] - middle[i]
+        far = np.linalg.norm(step, axis=1)
+        overlap = np.minimum(high[i], high[i + 1:]) - np.maximum(low[i], low[i + 1:])
+        n1, n2 = normal[i], normal[i + 1:]
+        off_plane = np.maximum(np.abs(step @ n1), np.abs((n2 * step).sum(axis=1)))
+        away = (step @ back[i] < 0.0) & ((back[i + 1:] * step).sum(axis=1) > 0.0)
+        near = (far > 0.0) & (far < overlap) & (n2 @ n1 > 0.9) & (off_plane < 0.2 * far) & away
+        out += [(i, i + 1 + int(k)) for k in np.flatnonzero(near & (body[face[i + 1:]] != body[face[i]]))]
+    return out
 
 
 def _is_pillar(graph: FaceGraph, faces: np.ndarray) -> bool:

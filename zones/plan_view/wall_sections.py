@@ -264,9 +264,10 @@ class _Section(Pieces):
     def _bridge(self, chains: list[_Chain]) -> list[_Chain]:
         """Stretches of one side, joined by bridges over interruptions, nearest first."""
         pairs = []
+        ways = [(self._heading(c.rows[::-1]), self._heading(c.rows)) for c in chains]
         for i, one in enumerate(chains):
             for j, two in enumerate(chains):
-                far = self._in_line(one, two)
+                far = self._in_line(one, two, ways[i][0], ways[j][1])
                 if far is not None:
                     pairs.append((far, i, j))
         after: dict[int, int] = {}
@@ -293,12 +294,13 @@ class _Section(Pieces):
     def _torn(self, chain: _Chain) -> bool:
         """Whether a chain is a ring interrupted in a bend: its ends face each other, but not in line."""
         rows = _Chain([r for r in chain.rows if r >= 0], chain.closed)
-        return self._in_line(rows, rows, 0.0) is not None
+        return self._in_line(rows, rows, self._heading(rows.rows[::-1]), self._heading(rows.rows), 0.0) is not None
 
-    def _in_line(self, one: _Chain, two: _Chain, min_cosine: float = IN_LINE) -> float | None:
+    def _in_line(self, one: _Chain, two: _Chain, leave: F64, enter: F64, min_cosine: float = IN_LINE) -> float | None:
         """Length of the chord from the end of one chain to the start of another, None where they are not one side.
 
-        min_cosine : cosine of the angle between the chord and either side that is allowed
+        leave, enter : (2,) float64, unit, directions of the end of the first and of the start of the second
+        min_cosine   : cosine of the angle between the chord and either side that is allowed
         """
         if one.closed or two.closed or not one.rows or not two.rows:
             return None
@@ -307,7 +309,6 @@ class _Section(Pieces):
         if far < 1e-9 * self.thick:
             return None
         u = (q - p) / far
-        leave, enter = self._heading(one.rows[::-1]), self._heading(two.rows)
         if min(float(leave @ u), float(enter @ u)) < min_cosine:
             return None
         return far if self._filled(p, q) else None
@@ -325,8 +326,8 @@ class _Section(Pieces):
 
     def _heading(self, rows: list[int]) -> F64:
         """Mean direction of the pieces nearest to an end, unit."""
-        reach = np.cumsum(self.length[rows]) - self.length[rows]
-        near = np.asarray(rows)[reach <= self.thick]
+        of = np.asarray(rows, np.int64)
+        near = of[np.cumsum(self.length[of]) - self.length[of] <= self.thick]
         total = (self.way[near] * self.length[near][:, None]).sum(axis=0)
         return np.asarray(total / max(float(np.linalg.norm(total)), 1e-30))
 
