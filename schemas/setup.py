@@ -16,7 +16,7 @@ from pydantic import Field, model_validator
 from schemas.base import Count, FaceId, Number, Shelf, Triple, WireModel
 from schemas.machine import Machine
 from schemas.materials import MATERIALS, Material, MaterialField
-from schemas.tools import HolderSegment, Tool, numbered
+from schemas.tools import VERIFIED_KINDS, HolderSegment, Tool, numbered
 
 AXIS_TOLERANCE = 1e-6
 SHORTEST_AXIS = 1e-6
@@ -266,8 +266,8 @@ class Setup(WireModel):
     def _check(self) -> Setup:
         self.tools = numbered(self.tools)
         _check_accesses(self.access)
-        smallest = min(self.tools, key=lambda t: t.diameter_mm)
-        if self.quality.scallop_height_mm >= smallest.diameter_mm / 2:
+        smallest = min((t for t in self.tools if t.kind not in VERIFIED_KINDS), key=lambda t: t.diameter_mm, default=None)
+        if smallest is not None and self.quality.scallop_height_mm >= smallest.diameter_mm / 2:
             raise ValueError(f"quality.scallop_height_mm {self.quality.scallop_height_mm:g} is not below the radius "
                              f"{smallest.diameter_mm / 2:g} of the smallest tool {smallest.id}")
         if self.operations.lean.asked and not (self.machine.kind == "5-axis" and self.machine.simultaneous):

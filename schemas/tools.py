@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
@@ -9,8 +10,12 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from schemas.base import Count, Number, WireModel
 
-ToolKind = Literal["ball", "flat", "bull", "tapered_ball", "barrel"]
+ToolKind = Literal["ball", "flat", "bull", "tapered_ball", "barrel", "drill", "tap", "chamfer", "thread_mill"]
 BUILT_KINDS = ("ball", "flat", "bull")
+VERIFIED_KINDS = ("drill", "tap", "chamfer", "thread_mill")
+"""Kinds that programs to be verified use, and that jobs do not plan."""
+POINT_ANGLES = {"drill": 118.0, "chamfer": 90.0}
+"""Default of ``point_angle_deg``, deg."""
 LENGTH_EPSILON = 1e-9
 
 Length = Annotated[Number, Field(ge=1e-3, le=2000)]
@@ -44,9 +49,17 @@ class Tool(WireModel):
     number: Annotated[Count | None, Field(
         ge=1, le=99999, description="Tool number in programs, in T and H words. Default: the digits of the id if they "
                                     "are unique, otherwise the position in the list.")] = None
-    kind: Annotated[ToolKind, Field(description="Shape of the cutting end. tapered_ball and barrel are not available "
-                                                "yet.")]
-    diameter_mm: Annotated[Length, Field(ge=0.01, description="Diameter of the cutting part, mm, from 0.01.")]
+    kind: Annotated[ToolKind, Field(description="Shape of the cutting end. Kinds drill, tap, chamfer and thread_mill are for "
+                                                "programs to be verified; jobs do not plan them. tapered_ball and "
+                                                "barrel are not available yet.")]
+    diameter_mm: Annotated[Length, Field(ge=0.01, description="Diameter of the cutting part, mm, from 0.01. Of a tap "
+                                                              "or thread mill the outer diameter of its teeth.")]
+    point_angle_deg: Annotated[Number | None, Field(
+        ge=10, le=180, description="Whole angle of the cone at the end, deg. Default: 118 for a drill, 90 for a "
+                                   "chamfer mill. null for a tap means no lead. null for all other kinds.")] = None
+    tip_diameter_mm: Annotated[Number | None, Field(
+        ge=0, le=2000, description="Diameter of the flat at the tip of the cone, mm. Default: 0, a point. The lead of "
+                                   "a tap needs it.")] = None
     corner_radius_mm: Annotated[Number, Field(
         ge=0, description="Corner radius, mm. Above 0 for a bull nose, 0 for a flat end mill. For a ball, 0 means half "
                           "the diameter.")] = 0.0
@@ -104,15 +117,18 @@ class Tool(WireModel):
 
     def _check_kind(self) -> None:
         radius = self.diameter_mm / 2
-        if self.kind not in BUILT_KINDS:
+        if self.kind not in BUILT_KINDS + VERIFIED_KINDS:
             raise ValueError(f"tool {self.id}: kind '{self.kind}' is not available yet; "
-                             f"use one of {', '.join(BUILT_KINDS)}")
+                             f"use one of {', '.join(BUILT_KINDS + VERIFIED_KINDS)}")
+        self._check_cone()
         if self.taper_angle_deg != 0 or self.profile_radius_mm is not None:
             raise ValueError(f"tool {self.id}: taper_angle_deg and profile_radius_mm belong to tapered and barrel "
                              "tools, which are not available yet; leave them at 0 and null")
         if self.corner_radius_mm > radius + LENGTH_EPSILON:
             raise ValueError(f"tool {self.id}: corner_radius_mm {self.corner_radius_mm:g} is larger than half the "
                              f"diameter, {radius:g}")
+        if self.kind in VERIFIED_KINDS and self.corner_radius_mm != 0:
+            raise ValueError(f"tool {self.id}: a tool of kind {self.kind} has corner_radius_mm 0")
         if self.kind == "flat" and self.corner_radius_mm != 0:
             raise ValueError(f"tool {self.id}: a flat end mill has corner_radius_mm 0; use kind bull")
         if self.kind == "bull" and self.corner_radius_mm == 0:
@@ -123,10 +139,41 @@ class Tool(WireModel):
                                  f"not {self.corner_radius_mm:g}; call it bull")
             self.corner_radius_mm = radius
 
+    def _check_cone(self) -> None:
+        if self.point_angle_deg is None:
+            self.point_angle_deg = POINT_ANGLES.get(self.kind)
+        if self.point_angle_deg is None:
+            if self.tip_diameter_mm is not None:
+                raise ValueError(f"tool {self.id}: tip_diameter_mm belongs to a cone, which needs point_angle_deg")
+            return
+        if self.kind not in ("drill", "tap", "chamfer"):
+            raise ValueError(f"tool {self.id}: point_angle_deg belongs to kinds drill, tap and chamfer")
+        if self.kind == "tap" and self.tip_diameter_mm is None:
+            raise ValueError(f"tool {self.id}: the lead of a tap needs tip_diameter_mm, its diameter at the tip")
+        if self.kind == "drill" and self.tip_diameter_mm:
+            raise ValueError(f"tool {self.id}: a drill has a point, so tip_diameter_mm is 0; use kind chamfer")
+        if self.kind == "chamfer" and self.point_angle_deg > 175:
+            raise ValueError(f"tool {self.id}: a chamfer mill with a point_angle_deg of {self.point_angle_deg:g} has no "
+                             "cone; use kind flat")
+        if self.tip_diameter_mm is None:
+            self.tip_diameter_mm = 0.0
+        if self.tip_diameter_mm >= self.diameter_mm:
+            raise ValueError(f"tool {self.id}: tip_diameter_mm {self.tip_diameter_mm:g} is not below diameter_mm "
+                             f"{self.diameter_mm:g}, so there is no cone")
+
+    @property
+    def cone_height(self) -> float:
+        """Height of the cone over the tip, mm; 0 for an end without a cone."""
+        if self.point_angle_deg is None or self.point_angle_deg >= 180.0:
+            return 0.0
+        wide = 0.5 * (self.diameter_mm - (self.tip_diameter_mm or 0.0))
+        return wide / math.tan(math.radians(0.5 * self.point_angle_deg))
+
     def _derive(self) -> None:
         if self.flute_length_mm is None:
             bounds = [v for v in (self.neck_length_mm, self.stickout_mm) if v is not None]
-            self.flute_length_mm = min([3 * self.diameter_mm, *bounds])
+            usual = self.cone_height if self.kind == "chamfer" else max(3 * self.diameter_mm, self.cone_height)
+            self.flute_length_mm = min([usual, *bounds])
         if self.neck_length_mm is None:
             if self.neck_diameter_mm is not None and self.neck_diameter_mm < self.diameter_mm:
                 raise ValueError(f"tool {self.id}: neck_diameter_mm is given without neck_length_mm (tip to shank)")
@@ -161,6 +208,9 @@ class Tool(WireModel):
         if _given(self.flute_length_mm) < self.corner_radius_mm - LENGTH_EPSILON:
             raise ValueError(f"tool {self.id}: flute_length_mm {self.flute_length_mm:g} is shorter than the corner "
                              f"radius {self.corner_radius_mm:g}, so the rounded end would not cut")
+        if _given(self.flute_length_mm) < self.cone_height - LENGTH_EPSILON:
+            raise ValueError(f"tool {self.id}: flute_length_mm {self.flute_length_mm:g} is shorter than the cone at "
+                             f"its end, {self.cone_height:g} high; flute_length_mm counts from the tip of the cone")
 
 
 def _given(value: float | None) -> float:
@@ -200,4 +250,4 @@ def numbered(tools: list[Tool]) -> list[Tool]:
     return [t.model_copy(update={"number": numbers[t.id]}) for t in tools]
 
 
-__all__: list[Any] = ["BUILT_KINDS", "HolderSegment", "Tool", "ToolKind", "default_numbers", "numbered"]
+__all__: list[Any] = ["BUILT_KINDS", "VERIFIED_KINDS", "HolderSegment", "Tool", "ToolKind", "default_numbers", "numbered"]

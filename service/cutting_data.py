@@ -28,7 +28,7 @@ from zones.lattice import lattice_step
 DEFAULT_MAX_RPM = 18000.0
 DEFAULT_MAX_FEED_MM_MIN = 5000.0
 PLUNGE_FACTOR = 0.3
-STEP_DOWN = {"ball": 0.3, "bull": 0.3, "flat": 0.5}
+STEP_DOWN = {"ball": 0.3, "bull": 0.3, "flat": 0.5, "drill": 0.5, "tap": 0.5, "chamfer": 0.5, "thread_mill": 0.5}
 """Deepest layer by the kind of a tool, as a share of its diameter."""
 MAX_CHIP_THINNING = 1.5
 """Largest increase of the feed per tooth for a thin chip. Where a cutter runs into a rib the chip is not thin."""

@@ -16,7 +16,7 @@ from geometry.tool_body import HolderFrustum, ToolBody
 from output.inverse_kinematics import RotaryMachine, program_limits
 from schemas.machine import Machine
 from schemas.setup import Setup
-from schemas.tools import Tool
+from schemas.tools import BUILT_KINDS, VERIFIED_KINDS, Tool
 from verify.kinematics import Kinematics
 
 LOWEST_AXIS = -0.5  # Z of the unit tool axis: 30 degrees below level
@@ -116,14 +116,21 @@ def check_blank(setup: Setup) -> None:
 
 
 def check_plannable(setup: Setup) -> None:
-    """Refuse accesses that the machine cannot reach.
+    """Refuse tools that jobs do not plan, and accesses that the machine cannot reach.
 
     Raises
     ------
     SetupError
-        Code 'dogleg_rapids', 'no_gauge_length', 'no_inverse_time', 'no_rotary_zero',
+        Code 'verify_only_tool', 'dogleg_rapids', 'no_gauge_length', 'no_inverse_time', 'no_rotary_zero',
         'access_out_of_reach', 'access_from_below', 'two_clampings'; as ``rotary_machine``.
     """
+    others = [t for t in setup.tools if t.kind in VERIFIED_KINDS]
+    if others:
+        raise SetupError(f"jobs do not plan {', '.join(f'{t.id} ({t.kind})' for t in others)}; such tools are for "
+                         "programs to be verified", code="verify_only_tool", subjects=tuple(t.id for t in others),
+                         measured=[t.kind for t in others], limit=list(BUILT_KINDS),
+                         remedy="leave these tools out of the setup of a job; zonemill verify and POST "
+                                "/v1/verifications take them")
     machine = rotary_machine(setup.machine)
     if machine is not None:
         _check_turning(setup, machine)
@@ -304,8 +311,10 @@ def tool_body(tool: Tool) -> ToolBody:
         raise SetupError(f"tool {tool.id} has not been completed by a Setup", subjects=(tool.id,))
     segments = tuple(HolderFrustum(s.diameter_mm, s.diameter_top_mm or s.diameter_mm, s.length_mm)
                      for s in tool.holder)
+    named = tool.kind in VERIFIED_KINDS
     return ToolBody(tool.id, int(number or 0), tool.diameter_mm, tool.corner_radius_mm, float(flute or 0),
-                    float(neck_d or 0), float(neck_l or 0), float(shank or 0), float(stickout or 0), segments)
+                    float(neck_d or 0), float(neck_l or 0), float(shank or 0), float(stickout or 0), segments,
+                    tool.kind if named else "", tool.tip_diameter_mm or 0.0, tool.cone_height if named else 0.0)
 
 
 def tool_bodies(setup: Setup) -> tuple[ToolBody, ...]:

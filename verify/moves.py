@@ -49,9 +49,9 @@ class Moves:
 
 
 def cutter_table(tools: Sequence[ToolBody]) -> F64:
-    """Sizes of the cutting parts: radius, corner radius and flute length of each of k tools.
+    """Sizes of the cutting parts of k tools, as rows of ``geometry.kernels.cutter_sizes.CutterSizes``.
 
-    Returns (k, 3) float64, mm, in the tool frame.
+    Returns (k, 4) float64, mm, in the tool frame.
 
     Raises
     ------
@@ -59,10 +59,10 @@ def cutter_table(tools: Sequence[ToolBody]) -> F64:
         Code flute_too_short: the flutes end inside the corner of the cutting part.
     """
     for tool in tools:
-        corner_height = 2.0 * tool.corner_radius if tool.kind == "bull" else tool.corner_radius
+        corner_height = 2.0 * tool.corner_radius if tool.kind == "bull" else max(tool.corner_radius, tool.cone_height)
         if tool.flute_length < corner_height:
             raise VerificationError(
                 f"{tool.id}: the flute length {tool.flute_length} mm ends inside the corner of the cutting part",
                 code="flute_too_short", subjects=(tool.id,), measured=tool.flute_length, limit=corner_height,
                 remedy="give the flute length measured from the tip")
-    return np.array([[t.radius, min(t.corner_radius, t.radius), t.flute_length] for t in tools]).reshape(-1, 3)
+    return np.array([[t.radius, t.corner_width, t.flute_length, t.cone_height] for t in tools]).reshape(-1, 4)

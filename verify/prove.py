@@ -19,6 +19,7 @@ from geometry.tool_body import ToolBody
 from verify.blank.blank import stock_on_normals
 from verify.checks.program_sequence import FramedProgram, Given, check_numbers, counted, moves_of, read_all, slides_of
 from verify.checks.repeated_passes import repeat_findings
+from verify.checks.sideways_cuts import sideways_findings
 from verify.checks.table_clearance import table_findings
 from verify.findings import (
     Source,
@@ -131,7 +132,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     findings = [*contact_findings(run.events, moves, source, setup.clearance_rapid, skins),
                 *cuts.gouges, *_program_findings(framed), *(f for p in framed for f in p.findings(tools)),
                 *table_findings([p.program for p in framed], tools, setup),
-                *_idle_findings(framed, run, moves, source, fine, asked), *repeat_findings(moves, run.cut, source),
+                *_idle_findings(framed, run, moves, source, [t for t in fine if t.cone_height <= 0.0], asked),
+                *repeat_findings(moves, run.cut, source), *sideways_findings(moves, run.cut, tools, source),
                 *(box_findings(moves, slides, *dogleg_limits(part.mesh, moves, tools, setup), source)
                   if setup.dogleg else ()),
                 *engagement_findings(angle, stretches, of, source, setup.max_engaged), *unheld,

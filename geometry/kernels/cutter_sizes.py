@@ -9,10 +9,13 @@ class CutterSizes(NamedTuple):
     """A cutting part, in the frame of the tool: tip at the origin, axis Z towards the spindle.
 
     radius : float, mm
-    corner : float, mm, corner radius: the radius for a ball, 0 for a flat end
+    corner : float, mm, width of the corner between the flat end and the side: the radius for a ball or a point, 0 for a
+             flat end
     length : float, mm, flute length; the cutting part ends so high above the tip
+    cone   : float, mm, height of a straight corner, so that the end is a cone; 0 for a round one, as high as wide
     """
 
     radius: float
     corner: float
     length: float
+    cone: float = 0.0

@@ -85,7 +85,8 @@ def draw_tool(body: ToolBody, gauge: float) -> ToolDrawing:
     tip_scale = None
     if scale * body.diameter < MIN_TIP_WIDTH:
         tip_scale = _add_tip(body, outlines[0][1], areas, strokes, words)
-    title = f"T{body.number}: {body.kind} end mill of {decimal(body.diameter)} mm, to scale"
+    what = body.named.replace("_", " ") or f"{body.kind} end mill"
+    title = f"T{body.number}: {what} of {decimal(body.diameter)} mm, to scale"
     return ToolDrawing(title, scale, tip_scale, tuple(areas), tuple(strokes), tuple(words))
 
 
@@ -124,6 +125,8 @@ def _outlines(body: ToolBody) -> list[tuple[str, list[Point]]]:
     r, c = body.radius, body.corner_radius
     turns = [math.radians(90.0 * k / 18) for k in range(19)] if c > 0.0 else []
     nose = [(r - c + c * math.sin(a), c - c * math.cos(a)) for a in turns] or [(r, 0.0)]
+    if body.cone_height > 0.0:
+        nose = [(r - body.corner_width, 0.0), (r, body.cone_height)]
     out = [("flutes", [(0.0, 0.0), *nose, (r, body.flute_length)])]
     n, s = 0.5 * body.neck_diameter, 0.5 * body.shank_diameter
     if body.neck_length > body.flute_length:

@@ -199,6 +199,8 @@ def tool_shape(tool: ToolBody) -> dict[str, Any]:
     turn = np.linspace(0.0, 0.5 * np.pi, ARC + 1) if c > 0.0 else np.zeros(0)
     corner = [[round(float(v), 5) for v in p] for p in np.column_stack([r - c + c * np.sin(turn),
                                                                        c - c * np.cos(turn)])]
+    if tool.cone_height > 0.0:
+        corner = [[round(r - tool.corner_width, 5), 0.0], [r, round(tool.cone_height, 5)]]
     cutter = [[0.0, 0.0], *(corner or [[r, 0.0]]), [r, tool.flute_length]]
     neck, shank = 0.5 * tool.neck_diameter, 0.5 * tool.shank_diameter
     bodies = [{"kind": "cutting part", "profile": cutter}]

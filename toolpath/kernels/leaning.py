@@ -154,7 +154,7 @@ def _lower_part(points, cells, part, cutter, margin, least, stack):
     halfway bound s all along, most samples in that shadow are asked once only.
     """
     cell_start, cell_items, gx, gy, cell, ncx, ncy = cells
-    radius, corner, flute = cutter
+    radius, corner, flute, _cone = cutter
     theta = part[12]
     cosine, sine = np.cos(0.5 * theta), np.sin(0.5 * theta)
     length = np.sqrt(part[3] ** 2 + part[4] ** 2 + part[5] ** 2)

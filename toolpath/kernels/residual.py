@@ -117,7 +117,7 @@ def lower(points, level, squares: PlaceSquares, cells: SampleCells, path, cutter
     level (n,): 1 on a level plane, 2 on a wall, else 0; margin: mm beyond the cutter within which it is measured.
     """
     cell_start, cell_items, gx, gy, cell, ncx, ncy = cells
-    radius, corner, flute = cutter
+    radius, corner, flute, _cone = cutter
     for k in range(len(path) - 1):
         a, b = path[k], path[k + 1]
         dx, dy = b[0] - a[0], b[1] - a[1]

@@ -68,11 +68,11 @@ def _meet_point(p, x, y, z, cutter, bodies, b, grow, slack, known):
         body, clearance = bodies[b], bodies[b, 4] + grow
         return contact(qx, qy, qz, dx, dy, dz, Frustum(body[0], body[1], body[2] + grow, body[3] + grow), clearance,
                        slack, known, False)
-    a, r, length = cutter.radius - cutter.corner, cutter.corner, cutter.length
-    bare = -carried(qx, qy, qz, dx, dy, dz, a, r, length)
+    a, r, length, cone = cutter.radius - cutter.corner, cutter.corner, cutter.length, cutter.cone
+    bare = -carried(qx, qy, qz, dx, dy, dz, a, r, length, cone)
     if bare > slack:
         return grow + bare
-    return grow - beside(qx, qy, qz, dx, dy, dz, a, r, length, 0.0, grow, slack) if known < grow else 0.0
+    return grow - beside(qx, qy, qz, dx, dy, dz, a, r, length, 0.0, grow, slack, cone) if known < grow else 0.0
 
 
 @njit(**KERNEL)
@@ -133,7 +133,7 @@ def clash_chunk(chunk, cloud: PointArrays, moves: MoveArrays, axes: AxisArrays, 
         far = reach[k] + rad + bow + rapid_grow
         if near_segment2(x, y, z, starts[m], ends[m]) > far * far:
             continue
-        cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2])
+        cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3])
         grow = 0.0 if feed or free[m] else rapid_grow
         length2 = (ends[m, 0] - starts[m, 0]) ** 2 + (ends[m, 1] - starts[m, 1]) ** 2 + (ends[m, 2] - starts[m, 2]) ** 2
         n = pieces(angle[m], math.sqrt(length2), reach[k], bow)

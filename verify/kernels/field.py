@@ -123,8 +123,8 @@ def _cut_brick(stock, tile, brick, p, cutter, steep, end_radius, twist, engaged,
     """
     field, origin, h, band = stock
     i0, j0, k0 = tile[0] + 4 * brick[0], tile[2] + 4 * brick[1], tile[4] + 4 * brick[2]
-    radius, r, length = cutter
-    a = radius - r
+    radius, r, length, cone = cutter
+    a, corner = radius - r, (cone if cone > 0.0 else r)
     top = -1e30
     straight = p[30] == 0.0
     mx, my, mz = p[27], p[28], p[29]
@@ -150,12 +150,13 @@ def _cut_brick(stock, tile, brick, p, cutter, steep, end_radius, twist, engaged,
                             top = max(top, v)
                             continue
                     qx, qy, qz, dx, dy, dz = view(p, origin[0] + i * h, origin[1] + j * h, origin[2] + k * h)
-                    # the search that a flat or a bull nose asks for pays only where the node may be lowered
-                    if a > 1e-12 and gap(qx, qy, qz, dx, dy, dz, dx * dx + dy * dy, CutterSizes(a + r, r, length)) >= v:
+                    # the search that all but a ball ask for pays only where the node may be lowered
+                    if (a > 1e-12 or cone > 0.0) and gap(qx, qy, qz, dx, dy, dz, dx * dx + dy * dy,
+                                                         CutterSizes(a + r, r, length, cone)) >= v:
                         top = max(top, v)
                         continue
-                    d = max(carried(qx, qy, qz, dx, dy, dz, a, r, length), -band)
-                    if steep and 0.0 < d <= h and v > 0.0 and qz - dz <= r:
+                    d = max(carried(qx, qy, qz, dx, dy, dz, a, r, length, cone), -band)
+                    if steep and 0.0 < d <= h and v > 0.0 and qz - dz <= corner:
                         off = math.sqrt((qx - dx) ** 2 + (qy - dy) ** 2)
                         totals[4] += h * h * min(max(0.5 + (end_radius - off) / h, 0.0), 1.0)
                     if d < v - LEAST_CUT:
@@ -166,14 +167,14 @@ def _cut_brick(stock, tile, brick, p, cutter, steep, end_radius, twist, engaged,
                             plan = math.sqrt(dx * dx + dy * dy)
                             if d <= 0.0 and plan > 0.0:
                                 aside = min(abs(dx * qy - dy * qx) / plan, radius)
-                                if qz - 0.5 * dz - bottom(aside, radius, r) > LEAST_DEPTH * radius:
+                                if qz - 0.5 * dz - bottom(aside, radius, r, cone) > LEAST_DEPTH * radius:
                                     # where the edge comes to the place
                                     ahead = (qx * dx + qy * dy) / plan
-                                    edge = edge_radius(max(qz - 0.5 * dz, 0.0), radius, r)
+                                    edge = edge_radius(max(qz - 0.5 * dz, 0.0), radius, r, cone)
                                     ahead -= math.sqrt(max(edge * edge - aside * aside, 0.0))
                                     k_part = min(max(int(ahead / plan * len(engaged)), 0), len(engaged) - 1)
                                     engaged[k_part] |= sector_bits(qx, qy, dx, dy, plan, qz - 0.5 * dz, radius, r, h,
-                                                                   twist)
+                                                                   twist, cone)
                         totals[0] += gone
                         if steep:
                             off = plan_distance(qx, qy, dx, dy, dx * dx + dy * dy)
@@ -254,11 +255,11 @@ def _meet(stock, bricks, p, body, is_cutter, cutter, grow, slack, best):
                             qx, qy, qz, dx, dy, dz = view(p, x, y, z)
                             if is_cutter:
                                 bare = v - carried(qx, qy, qz, dx, dy, dz, cutter.radius - cutter.corner, cutter.corner,
-                                                   cutter.length)
+                                                   cutter.length, cutter.cone)
                                 depth = grow + bare if bare > slack else 0.0
                                 if depth == 0.0 and known_depth(best, code, grow) < grow:
                                     depth = grow - beside(qx, qy, qz, dx, dy, dz, cutter.radius - cutter.corner,
-                                                          cutter.corner, cutter.length, v, grow, slack)
+                                                          cutter.corner, cutter.length, v, grow, slack, cutter.cone)
                             else:
                                 # the ball of radius v round the node is stock
                                 depth = contact_of_ball(qx, qy, qz, dx, dy, dz,
@@ -305,7 +306,7 @@ def _beside(seen, z0, z1, wide):
 def _look(stock, bricks, p, tools, k, seen, feed, free, grow, slack, best):
     """Find the stock of a tile that neck, shank and holder of tool k take in on piece p."""
     cutters, bodies = tools.cutters, tools.bodies
-    cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2])
+    cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3])
     for b in range(tools.first[k], tools.first[k + 1]):
         extra = 0.0 if feed else -bodies[b, 4] if free else grow - min(grow, bodies[b, 4])
         if _beside(seen, bodies[b, 0], bodies[b, 1], max(bodies[b, 2], bodies[b, 3]) + extra):
@@ -369,7 +370,7 @@ def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, tw
         far = reach[k] + rad + band + bow + rapid_grow
         if near_segment2(cx, cy, cz, starts[m], ends[m]) > far * far:
             continue
-        cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2])
+        cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3])
         grow = 0.0 if feed or free[m] else rapid_grow
         length2 = (ends[m, 0] - starts[m, 0]) ** 2 + (ends[m, 1] - starts[m, 1]) ** 2 + (ends[m, 2] - starts[m, 2]) ** 2
         n = pieces(angle[m], math.sqrt(length2), reach[k], bow)

@@ -4,7 +4,8 @@ Notation
     (x, y), top : one line and the height up to which it is solid
     A, D        : tip at the start of the move and its displacement, tip(s) = A + s D
     rho(s)      : distance in plan from the line to the tool axis
-    R, r, a     : radius, corner radius, R - r; ``grow`` widens the profile radially
+    R, r, a     : radius, width of the corner, R - r; ``grow`` widens the profile radially
+    cone        : height of a straight corner, 0 for a round one
 Heights on the lines are exact; what stands wholly between two lines is not seen.
 """
 
@@ -19,9 +20,11 @@ INF = np.inf
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def bottom(rho, a, r):
+def bottom(rho, a, r, cone=0.0):
     """Height of the cutting profile over the tip at distance rho from the axis."""
     over = max(rho - a, 0.0)
+    if cone > 0.0:
+        return over * cone / r
     return r - math.sqrt(max(r * r - over * over, 0.0))
 
 
@@ -32,12 +35,28 @@ def _rho(s, wx, wy, dx, dy):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _lowest_s(wx, wy, dx, dy, dz, plan, s0, miss2, s1, s2, a, r):
+def _lowest_on_cone(dz, plan, s0, miss2, a, slope):
+    """Where s dz + slope max(rho(s) - a, 0) is lowest over all s, dz not 0.
+
+    With u the way past the nearest place, rho = sqrt(miss² + u²): the slope is 0 where slope u / rho = -dz / plan. On
+    the flat end it is that of dz, so the lowest place is no nearer than the rim of the flat.
+    """
+    g = -dz / (plan * slope)
+    if abs(g) >= 1.0:
+        return INF if g > 0.0 else -INF
+    u = max(abs(g) * math.sqrt(miss2 / (1.0 - g * g)), math.sqrt(max(a * a - miss2, 0.0)))
+    return s0 + (u if g > 0.0 else -u) / plan
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _lowest_s(wx, wy, dx, dy, dz, plan, s0, miss2, s1, s2, a, r, cone):
     """Where on [s1, s2] the profile over the line is lowest (a convex function of s)."""
     if dz == 0.0:
         return min(max(s0, s1), s2)
     if r <= 0.0:
         return s1 if dz > 0.0 else s2
+    if cone > 0.0:
+        return min(max(_lowest_on_cone(dz, plan, s0, miss2, a, cone / r), s1), s2)
     if a <= 1e-12:
         w = math.sqrt(max(r * r - miss2, 0.0))
         return min(max(s0 - w * dz / math.sqrt(plan * plan + dz * dz) / plan, s1), s2)
@@ -57,22 +76,22 @@ def _lowest_s(wx, wy, dx, dy, dz, plan, s0, miss2, s1, s2, a, r):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def lowest(x, y, ax, ay, az, dx, dy, dz, radius, corner, grow):
+def lowest(x, y, ax, ay, az, dx, dy, dz, radius, corner, grow, cone=0.0):
     """Least height over (x, y) of a cutting profile carried along the move, and the s of its first touch.
 
     Returns (inf, 0) where the move passes by.
     """
-    return lowest_within(x, y, ax, ay, az, dx, dy, dz, radius + grow, radius - corner + grow, corner)
+    return lowest_within(x, y, ax, ay, az, dx, dy, dz, radius + grow, radius - corner + grow, corner, cone)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def lowest_within(x, y, ax, ay, az, dx, dy, dz, wide, a, r):
-    """As ``lowest``, of what of a profile, flat to a and round by r, is no farther out than ``wide``."""
+def lowest_within(x, y, ax, ay, az, dx, dy, dz, wide, a, r, cone=0.0):
+    """As ``lowest``, of what of a profile, flat to a with a corner as wide as r, is no farther out than ``wide``."""
     wx, wy = x - ax, y - ay
     plan2 = dx * dx + dy * dy
     if plan2 < 1e-18:
         rho = math.sqrt(wx * wx + wy * wy)
-        return (min(az, az + dz) + bottom(rho, a, r), 0.0) if rho <= wide else (INF, 0.0)
+        return (min(az, az + dz) + bottom(rho, a, r, cone), 0.0) if rho <= wide else (INF, 0.0)
     s0 = (wx * dx + wy * dy) / plan2
     miss2 = wx * wx + wy * wy - s0 * s0 * plan2
     if miss2 > wide * wide:
@@ -82,19 +101,19 @@ def lowest_within(x, y, ax, ay, az, dx, dy, dz, wide, a, r):
     s1, s2 = max(0.0, s0 - half), min(1.0, s0 + half)
     if s1 > s2:
         return INF, 0.0
-    s = _lowest_s(wx, wy, dx, dy, dz, plan, s0, max(miss2, 0.0), s1, s2, a, r)
-    return az + s * dz + bottom(_rho(s, wx, wy, dx, dy), a, r), s1
+    s = _lowest_s(wx, wy, dx, dy, dz, plan, s0, max(miss2, 0.0), s1, s2, a, r, cone)
+    return az + s * dz + bottom(_rho(s, wx, wy, dx, dy), a, r, cone), s1
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _within(s, wx, wy, dx, dy, dz, over, radius, corner):
+def _within(s, wx, wy, dx, dy, dz, over, radius, corner, cone):
     """How deep a line is in a cutting part at s: the shorter of the way aside and the way over its end."""
     rho = _rho(s, wx, wy, dx, dy)
-    return min(radius - rho, over - s * dz - bottom(min(rho, radius), radius - corner, corner))
+    return min(radius - rho, over - s * dz - bottom(min(rho, radius), radius - corner, corner, cone))
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def entered(wx, wy, over, dx, dy, dz, radius, corner):
+def entered(wx, wy, over, dx, dy, dz, radius, corner, cone=0.0):
     """How deep a line is in a cutting part carried along a move, mm: the shorter way out, aside or over its end.
 
     (wx, wy) is the line seen from the tool at the start of the move, ``over`` its top over the tip there. Aside is
@@ -116,11 +135,12 @@ def entered(wx, wy, over, dx, dy, dz, radius, corner):
             return -1.0
     for _ in range(60):
         u, v = s1 + 0.381966 * (s2 - s1), s2 - 0.381966 * (s2 - s1)
-        if _within(u, wx, wy, dx, dy, dz, over, radius, corner) > _within(v, wx, wy, dx, dy, dz, over, radius, corner):
+        if _within(u, wx, wy, dx, dy, dz, over, radius, corner, cone) \
+                > _within(v, wx, wy, dx, dy, dz, over, radius, corner, cone):
             s2 = v
         else:
             s1 = u
-    return _within(0.5 * (s1 + s2), wx, wy, dx, dy, dz, over, radius, corner)
+    return _within(0.5 * (s1 + s2), wx, wy, dx, dy, dz, over, radius, corner, cone)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)

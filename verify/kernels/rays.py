@@ -64,8 +64,13 @@ def plan_distance(wx, wy, dx, dy, length2):
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def gap(x, y, z, dx, dy, dz, plan2, cutter: CutterSizes):
-    """A lower bound of the distance from a point, seen from the tip, to the swept cutting part (negative inside)."""
-    radius, corner, length = cutter
+    """A lower bound of the distance from a point, seen from the tip, to the swept cutting part (negative inside).
+
+    A cone counts as the cylinder round it.
+    """
+    radius, corner, length, cone = cutter
+    if cone > 0.0:
+        corner = 0.0
     plan = plan_distance(x, y, dx, dy, plan2)
     side = plan - radius
     low = min(0.0, dz)
@@ -105,8 +110,9 @@ def new_left(qx, qy, qz, nx, ny, nz, dx, dy, dz, plan2, cutter: CutterSizes, lef
 
     q, n, D as in ``sweep``; plan2 = dx² + dy².
     """
-    radius, corner, length = cutter
-    if corner >= radius - 1e-12 and qz < min(0.0, dz) + corner:
+    radius, corner, length, cone = cutter
+    ball = cone == 0.0 and corner >= radius - 1e-12
+    if ball and qz < min(0.0, dz) + corner:
         # under every equator a ball is as far as its sphere: squares decide most pairs
         wx, wy, wz = qx, qy, qz - corner
         space2 = plan2 + dz * dz
@@ -121,7 +127,7 @@ def new_left(qx, qy, qz, nx, ny, nz, dx, dy, dz, plan2, cutter: CutterSizes, lef
             return left
         if gap(qx, qy, qz, dx, dy, dz, plan2, cutter) > max(left, 0.0) + TOUCH:
             return left
-    if corner >= radius - 1e-12 and nz >= 0.0 and qz + nz * left < min(0.0, dz) + min(corner, length - corner):
+    if ball and nz >= 0.0 and qz + nz * left < min(0.0, dz) + min(corner, length - corner):
         # the ray meets the ball below its equator first: one root decides nearly all pairs
         t = capsule_start(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, corner)
         if t >= left:
@@ -138,7 +144,7 @@ def cut_tile(tile, cells: CellArrays, samples: SampleArrays, left, moves: MoveAr
 
     samples : sorted by cell
     left    : (cells,) float64, mm, largest residual of each cell, changed in place
-    cutters : (k, 3) float64, mm: radius, corner radius, flute length
+    cutters : (k, 4) float64, mm, rows of ``CutterSizes``
     """
     cx0, cx1, cy0, cy1 = tile
     origin, size, shape, first = cells
@@ -162,7 +168,7 @@ def cut_tile(tile, cells: CellArrays, samples: SampleArrays, left, moves: MoveAr
             continue
         ax, ay, az = starts[m, 0], starts[m, 1], starts[m, 2]
         dx, dy, dz = ends[m, 0] - ax, ends[m, 1] - ay, ends[m, 2] - az
-        cutter = CutterSizes(cutters[tool[m], 0], cutters[tool[m], 1], cutters[tool[m], 2])
+        cutter = CutterSizes(cutters[tool[m], 0], cutters[tool[m], 1], cutters[tool[m], 2], cutters[tool[m], 3])
         radius = cutter.radius
         reach = radius + pad
         x0 = max(cx0, math.floor((min(ax, ax + dx) - reach - origin[0]) / size))

@@ -139,7 +139,7 @@ def _lower(lines, box, a, d, cutter, end_radius, skin, descents, m, history, eng
     steep, earned, gone_on = descents.steep[m], descents.earned[m], descents.way[m]
     since, dug, come, begun = history
     i0, i1, j0, j1 = box
-    radius, corner, length = cutter
+    radius, corner, length, cone = cutter
     cut, under = False, False
     a0, a1 = _cells(min(a[0], a[0] + d[0]) - radius, max(a[0], a[0] + d[0]) + radius, origin[0], step, i0, i1)
     b0, b1 = _cells(min(a[1], a[1] + d[1]) - radius, max(a[1], a[1] + d[1]) + radius, origin[1], step, j0, j1)
@@ -159,11 +159,13 @@ def _lower(lines, box, a, d, cutter, end_radius, skin, descents, m, history, eng
             s = min(max((wx * d[0] + wy * d[1]) * along, 0.0), 1.0)
             wx, wy = wx - s * d[0], wy - s * d[1]
             reach = radius
-            if over < corner:
+            if cone > 0.0:
+                reach = flat + corner * min(over / cone, 1.0)
+            elif over < corner:
                 reach = flat + math.sqrt(over * (2.0 * corner - over))
             if wx * wx + wy * wy > reach * reach + 1e-9 * radius * radius:
                 continue
-            low, s = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, 0.0)
+            low, s = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, 0.0, cone)
             gone = height[i, j] - low
             if gone <= 1e-9:
                 continue
@@ -180,11 +182,11 @@ def _lower(lines, box, a, d, cutter, end_radius, skin, descents, m, history, eng
                 tip = a[2] + s * d[2]
                 if min(come[i - i0, j - j0] - low, low + gone - tip) > LEAST_DEPTH * radius:
                     engaged[min(int(s * len(engaged)), len(engaged) - 1)] |= sector_bits(
-                        x - a[0], y - a[1], d[0], d[1], plan, come[i - i0, j - j0] - tip, radius, corner, step, 0.0)
+                        x - a[0], y - a[1], d[0], d[1], plan, come[i - i0, j - j0] - tip, radius, corner, step, 0.0, cone)
             if not steep:
                 continue
             # what the flank took before the end came over the line was not dug
-            end, _ = lowest_within(x, y, a[0], a[1], a[2], d[0], d[1], d[2], end_radius, flat, corner)
+            end, _ = lowest_within(x, y, a[0], a[1], a[2], d[0], d[1], d[2], end_radius, flat, corner, cone)
             over = low + gone - end
             gone = min(gone, over)
             if gone > 0.0:
@@ -224,7 +226,7 @@ def _meet_body(lines, box, a, d, body, grow, slack, best):
 def _rapid_cutter(lines, box, a, d, cutter, grow, best):
     """Find the lines that the cutting part, grown radially, enters in a rapid; whether they stand over the flutes."""
     height, origin, step = lines
-    radius, corner, length = cutter
+    radius, corner, length, cone = cutter
     under, above = False, max(a[2], a[2] + d[2]) + length + ARM
     wide = radius + grow
     i0, i1, j0, j1 = box
@@ -238,17 +240,17 @@ def _rapid_cutter(lines, box, a, d, cutter, grow, best):
             if top <= floor:
                 continue
             y = origin[1] + (j + 0.5) * step
-            low, _ = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, grow)
+            low, _ = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, grow, cone)
             if top <= low + 1e-3:
                 continue
-            bare = entered(x - a[0], y - a[1], top - a[2], d[0], d[1], d[2], radius, corner)
+            bare = entered(x - a[0], y - a[1], top - a[2], d[0], d[1], d[2], radius, corner, cone)
             depth = grow + bare
             if bare <= 1e-3:
                 # how wide the tool must be to touch: the gap to what stands here
                 free, hits = 0.0, grow
                 for _ in range(20):
                     wider = 0.5 * (free + hits)
-                    if top > lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, wider)[0] + 1e-3:
+                    if top > lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, wider, cone)[0] + 1e-3:
                         hits = wider
                     else:
                         free = wider
@@ -296,7 +298,7 @@ def stock_tile(box, lines: LineArrays, moves: MoveArrays, free, descents: Descen
         if min(a[0], ends[m, 0]) - wide > x1 or max(a[0], ends[m, 0]) + wide < x0 \
                 or min(a[1], ends[m, 1]) - wide > y1 or max(a[1], ends[m, 1]) + wide < y0:
             continue
-        cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2])
+        cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3])
         if feeds[m]:
             went, below = _lower(lines, box, a, d, cutter, ends_radius[k], skins[k], descents, m, history,
                                  sectors[parts[m]:parts[m + 1]], best)

@@ -4,13 +4,15 @@ Notation
     p, n     : start and unit direction of the ray, p + t n
     A, D     : tip at the start of the move and its displacement; the tip is A + s D, 0 <= s <= 1
     q        : p - A
-    R, r, L  : radius, corner radius and flute length of the cutting part; a = R - r
+    R, r, L  : radius, width of the corner and flute length of the cutting part; a = R - r
     h        : height over the tip, h(s, t) = q_z + t n_z - s D_z
 
 The cutting part is convex and a translation keeps it so: the swept volume is convex and the ray meets
 it in one interval of t. In the plane (s, t) a swept sphere or cylinder is an ellipse, the limits of the
 move and of the height are lines, and the interval is the extent in t of their intersection: it is
 reached at an extreme of the ellipse or on one of the four lines, all of them quadratics.
+A cone is the same with a radius that grows along the axis: its quadric is of any kind, but between the heights of its
+ends the region stays convex, and each place tried lies in it.
 A torus corner is a disc of radius a grown by r: the distance to the swept disc is convex in t, so
 Newton's step from outside never passes the root.
 """
@@ -148,6 +150,81 @@ def sphere_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, centre, h1):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _in_nappe(a, b, c, grows):
+    """The interval of x with a x² + 2 b x + c <= 0 on one nappe of a cone, for any a; (inf, -inf) where there is none.
+
+    grows : where a < 0, whether the radius of that nappe grows with x
+    """
+    disc = b * b - a * c
+    if disc < 0.0:
+        if a >= 0.0:
+            return INF, -INF
+        disc = 0.0  # a line along the nappe, through its apex
+    q = -b - math.sqrt(disc) if b >= 0.0 else -b + math.sqrt(disc)
+    if q == 0.0:  # b = 0 and a c = 0
+        if a == 0.0:
+            return (-INF, INF) if c <= 0.0 else (INF, -INF)
+        return (0.0, 0.0) if a > 0.0 else (0.0, INF) if grows else (-INF, 0.0)
+    if a == 0.0:
+        return (-INF, c / q) if b > 0.0 else (c / q, INF)
+    lo, hi = min(q / a, c / q), max(q / a, c / q)
+    if a > 0.0:
+        return lo, hi
+    return (hi, INF) if grows else (-INF, lo)
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _cone_on_line_s(s, ray, dx, dy, dz, a, m, h1):
+    """Extent in t of the standing cone of the move at s: radius a + m h, 0 <= h <= h1."""
+    qx, qy, qz, nx, ny, nz = ray
+    wx, wy, base = qx - s * dx, qy - s * dy, qz - s * dz
+    wide = a + m * base
+    lo, hi = _in_nappe(nx * nx + ny * ny - m * m * nz * nz, wx * nx + wy * ny - m * nz * wide,
+                       wx * wx + wy * wy - wide * wide, nz > 0.0)
+    if lo > hi:
+        return INF, -INF
+    if abs(nz) <= FLAT_RAY:
+        return (lo, hi) if -1e-12 <= base <= h1 + 1e-12 else (INF, -INF)
+    ta, tb = -base / nz, (h1 - base) / nz
+    lo, hi = max(lo, min(ta, tb)), min(hi, max(ta, tb))
+    return (lo, hi) if lo <= hi else (INF, -INF)
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def cone_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, a, radius, h1):
+    """Interval of t inside the sweep of a cone of radius a at the tip and ``radius`` at height h1 > 0."""
+    ray, m = Ray(qx, qy, qz, nx, ny, nz), (radius - a) / h1
+    lo, hi = _cone_on_line_s(0.0, ray, dx, dy, dz, a, m, h1)
+    u, v = _cone_on_line_s(1.0, ray, dx, dy, dz, a, m, h1)
+    lo, hi = min(lo, u), max(hi, v)
+    att, ats, ass = nx * nx + ny * ny, -(nx * dx + ny * dy), dx * dx + dy * dy
+    bt, bs, c = qx * nx + qy * ny, -(qx * dx + qy * dy), qx * qx + qy * qy
+    if abs(nz) > FLAT_RAY or abs(dz) > 1e-12:
+        for k in range(2):
+            r, h = (a, 0.0) if k == 0 else (radius, h1)
+            u, v = _on_line_h(h, att, ats, ass, bt, bs, c - r * r, qz, nz, dz)
+            lo, hi = min(lo, u), max(hi, v)
+    # where the side is met along the move: the derivative of the quadric in s is 0
+    wide = a + m * qz
+    att, ats, ass = att - m * m * nz * nz, ats + m * m * nz * dz, ass - m * m * dz * dz
+    bt, bs, c = bt - wide * m * nz, bs + wide * m * dz, c - wide * wide
+    if abs(ass) > 1e-15 * (dx * dx + dy * dy + m * m * dz * dz):
+        p, r, k0 = att - ats * ats / ass, bt - ats * bs / ass, c - bs * bs / ass
+        disc = r * r - p * k0
+        if disc >= 0.0:
+            q = -r - math.sqrt(disc) if r >= 0.0 else -r + math.sqrt(disc)
+            for k in range(2):
+                if (k == 0 and p == 0.0) or (k == 1 and q == 0.0):
+                    continue
+                t = q / p if k == 0 else k0 / q
+                s = -(bs + ats * t) / ass
+                h = qz + t * nz - s * dz
+                if 0.0 <= s <= 1.0 and 0.0 <= h <= h1:
+                    lo, hi = min(lo, t), max(hi, t)
+    return lo, hi
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def capsule_start(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, centre):
     """Least t inside the sweep of a whole sphere: inf where missed, NaN where the ray runs along the move.
 
@@ -264,8 +341,11 @@ def torus_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, r):
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def cutter_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter: CutterSizes):
     """Interval of t inside the sweep of a whole cutting part; (inf, -inf) where the ray misses it."""
-    radius, corner, length = cutter
-    lo, hi = cylinder_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, corner, length)
+    radius, corner, length, cone = cutter
+    lo, hi = cylinder_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, cone if cone > 0.0 else corner, length)
+    if cone > 0.0:
+        u, v = cone_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius - corner, radius, cone)
+        return min(lo, u), max(hi, v)
     if corner <= 0.0:
         return lo, hi
     if corner >= radius - 1e-12:

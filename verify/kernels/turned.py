@@ -78,7 +78,7 @@ def cut_chunk(chunk, balls, samples: SampleArrays, moves: MoveArrays, axes: Axis
 
     balls   : four (k, 4) float64, mm, balls of 8, 64, 512, 4096 samples
     samples : in the order of the tree
-    cutters : (k, 3) float64, mm: radius, corner radius, flute length
+    cutters : (k, 4) float64, mm, rows of ``CutterSizes``
     reach   : (k,) float64, mm, how far the cutting part reaches from the tip
     """
     b0, b1, b2, b3 = balls
@@ -100,7 +100,7 @@ def cut_chunk(chunk, balls, samples: SampleArrays, moves: MoveArrays, axes: Axis
         far = reach[k] + rad + left3 + bow
         if near_segment2(x, y, z, starts[m], ends[m]) > far * far:
             continue
-        cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2])
+        cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3])
         length2 = (ends[m, 0] - starts[m, 0]) ** 2 + (ends[m, 1] - starts[m, 1]) ** 2 + (ends[m, 2] - starts[m, 2]) ** 2
         count = pieces(angle[m], math.sqrt(length2), reach[k], bow)
         # a turning ray runs off its chord by half the angle of the piece for every mm of what is left

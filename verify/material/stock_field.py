@@ -188,7 +188,7 @@ def run_field(field: DistanceField, moves: Moves, tools: Sequence[ToolBody], set
     cutters, ends = cutter_table(tools), end_radii(tools)
     bodies = Bodies(np.zeros((0, 6)), np.zeros(len(tools) + 1, np.int64)) if bare else Bodies.of(tools, setup)
     axes = moves.axes or ToolAxes.upright(len(moves))
-    sizes, (steep, earned) = bodies.arrays(cutters, ends), descents(moves, setup.ramp_angle)
+    sizes, (steep, earned) = bodies.arrays(cutters, ends), descents(moves, setup.ramp_angle, tools)
     stock, limits = field.arrays, ContactLimits(setup.clearance_rapid, setup.gouge_tolerance)
     steps, turns, free = moves.arrays, axes.arrays(bow), free_rapids(moves)
     x, y = sector_frames(moves.axes, len(moves))
@@ -231,8 +231,9 @@ def round_off(tools: Sequence[ToolBody]) -> F64:
     share = (np.arange(400) + 0.5) / 400.0  # of the area of the end
     out = []
     for tool, end in zip(tools, end_radii(tools).tolist(), strict=True):
-        over = np.maximum(end * np.sqrt(share) - (tool.radius - tool.corner_radius), 0.0)
-        out.append(float(np.mean(tool.corner_radius - np.sqrt(np.maximum(tool.corner_radius**2 - over**2, 0.0)))))
+        over, corner = np.maximum(end * np.sqrt(share) - (tool.radius - tool.corner_width), 0.0), tool.corner_width
+        out.append(float(np.mean(over * tool.cone_height / corner if tool.cone_height > 0.0 else
+                                 corner - np.sqrt(np.maximum(corner**2 - over**2, 0.0)))))
     return np.array(out)
 
 

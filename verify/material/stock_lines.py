@@ -15,7 +15,8 @@ of the part check necks, shanks and holders, so the spacing matters only for sto
   depths add up; sideways travel reduces them at the slope of the ramp. It is a plunge where more than ``plunge_skin``
   tool diameters are open, so a descent interrupted by side steps, lifts or pecks is still one descent. The end-cutting
   region is the whole end of a flat, the flat and half the corner of a bull nose, and the inner half radius of a ball
-  (to 30 degrees of its sphere). A ball that finishes downhill through a thin skin therefore does not plunge.
+  (to 30 degrees of its sphere). A ball that finishes downhill through a thin skin therefore does not plunge. It is the
+  flat at the tip of a chamfer mill, and the core of a tap. A drill and a pointed chamfer mill cut straight down.
 """
 
 from __future__ import annotations
@@ -124,7 +125,7 @@ def run_stock(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup:
     """
     cutters, bodies = cutter_table(tools), Bodies.of(tools, setup)
     sizes = bodies.arrays(cutters, end_radii(tools))
-    allowed = DescentArrays(*descents(moves, setup.ramp_angle), ways_before(moves),
+    allowed = DescentArrays(*descents(moves, setup.ramp_angle, tools), ways_before(moves),
                             setup.plunge_skin * 2.0 * cutters[:, 0])
     cut, under = np.zeros(len(moves), np.uint8), np.zeros(len(moves), np.uint8)
     limits, free = ContactLimits(setup.clearance_rapid, setup.gouge_tolerance), free_rapids(moves)

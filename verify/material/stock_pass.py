@@ -21,14 +21,17 @@ from verify.moves import Moves
 
 EVENTS = 4096
 ANOTHER_TOOL = 1e6  # mm
+TAP_CORE = 0.75  # radii: what is nearer to the axis of a tap, the hole must have taken; less than any ISO 68 core
 SAME = 1e-6  # mm, and rad: closer ends of moves and axes are the same
 Spare = queue.SimpleQueue[NDArray[np.int64]]
 
 
-def descents(moves: Moves, ramp_angle: float) -> tuple[NDArray[np.bool_], F64]:
+def descents(moves: Moves, ramp_angle: float,
+             tools: Sequence[ToolBody] | None = None) -> tuple[NDArray[np.bool_], F64]:
     """Feed moves that descend steeper than ``ramp_angle``, rad, and the depth that ramps could have removed so far.
 
-    Down is along the tool axis, for a turning tool along its axis half way.
+    Down is along the tool axis, for a turning tool along its axis half way. Moves of ``tools`` that cut straight down
+    do not count.
 
     Returns
     -------
@@ -44,6 +47,8 @@ def descents(moves: Moves, ramp_angle: float) -> tuple[NDArray[np.bool_], F64]:
         rise = np.einsum("ij,ij->i", d, up)
         aside = np.linalg.norm(d - rise[:, None] * up, axis=1)
     steep = np.asarray(moves.feed & (-rise > aside * slope + 1e-9))
+    if tools is not None and len(moves):
+        steep &= ~np.array([t.cuts_down for t in tools])[moves.tool]
     earned = np.cumsum(np.where(moves.feed & ~steep, aside * slope, 0.0))
     changed = np.concatenate([[False], moves.tool[1:] != moves.tool[:-1]]) if len(d) else np.zeros(0, np.bool_)
     return steep, earned + ANOTHER_TOOL * np.cumsum(changed)
@@ -97,7 +102,9 @@ class StockPass:
 def end_radii(tools: Sequence[ToolBody]) -> F64:
     """(k,) float64, mm: radius of the end-cutting region of each tool (see ``verify.material.stock_lines``)."""
     share = {"flat": lambda t: t.radius, "ball": lambda t: 0.5 * t.radius,
-             "bull": lambda t: t.radius - 0.5 * t.corner_radius}
+             "bull": lambda t: t.radius - 0.5 * t.corner_radius, "drill": lambda t: t.radius,
+             "thread_mill": lambda t: t.radius, "tap": lambda t: TAP_CORE * t.radius,
+             "chamfer": lambda t: 0.5 * t.tip_diameter if t.tip_diameter > 0.0 else t.radius}
     return np.array([share[t.kind](t) for t in tools])
 
 

@@ -1,0 +1,49 @@
+"""Drills and taps that cut sideways: their lips and leads cut along the axis only.
+
+Coordinates are in the setup frame, lengths in mm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.tool_body import ToolBody
+from verify.findings import Source
+from verify.model import Finding, FindingKind
+from verify.moves import Moves
+from verify.tool_axes import ToolAxes
+
+ASIDE = 0.01  # mm: coordinates of programs have three decimals
+
+
+def sideways_findings(moves: Moves, cut: NDArray[np.bool_], tools: Sequence[ToolBody], source: Source) -> list[Finding]:
+    """One finding for each line in which a drill or tap removes stock on a way that is not along its axis.
+
+    cut : (m,) bool, whether each move removes stock
+
+    The depth of a finding is the way across the axis, mm.
+    """
+    only = np.array([t.along_axis_only for t in tools], np.bool_)
+    if not only.any() or not len(moves):
+        return []
+    axes = moves.axes or ToolAxes.upright(len(moves))
+    way, up = moves.end - moves.start, axes.middle
+    aside = np.linalg.norm(way - np.einsum("ij,ij->i", way, up)[:, None] * up, axis=1)
+    bad = np.flatnonzero(moves.feed & cut & only[moves.tool] & ((aside > ASIDE) | (axes.angle > 0.0)))
+    out, seen = [], set[tuple[int, int]]()
+    for m in bad.tolist():
+        key = (int(source.program[m]), int(source.line[m]))
+        if key in seen:
+            continue
+        seen.add(key)
+        x, y, z = (round(float(v), 6) for v in moves.end[m])
+        out.append(Finding(FindingKind.PROGRAM, source.names[key[0]], key[1], None, None, (x, y, z), float(aside[m]),
+                           0.0, f"T{source.tool[m]} is a {tools[moves.tool[m]].kind} and cuts {aside[m]:.3f} mm "
+                           "sideways; it cuts along its axis only", tip=(x, y, z)))
+    return out
+
+
+__all__ = ["sideways_findings"]
