@@ -12,6 +12,7 @@ from service.stages.job_part import JobPart
 from service.stages.preparation import machinable_triangles, table_height
 from service.stages.proof_samples import proof_samples
 from service.stages.sample_spacing import coarse_spacing
+from service.verification.named_touch import axis_lines
 from service.verification.tool_touch import ToolTouch
 from verify.model import Asked
 from verify.program.move_kinds import FEED
@@ -47,7 +48,7 @@ def asked_work(job: JobPart, frame: ProofFrame, program: Program) -> tuple[Surfa
         samples = joined([samples, proof_samples(frame.part, triangles[~np.isin(triangles, fine)], wide)])
     table = table_height(inputs, job.blank) if inputs.turns else None
     asked = frozenset[int]() if not ops.finishing else None if ops.faces is None else frozenset(face_numbers(ops.faces))
-    return samples, Asked(asked, ToolTouch(job.part, inputs, frame.rotation, table),
+    return samples, Asked(asked, ToolTouch(job.part, inputs, frame.rotation, table, axis_lines(program, inputs.bodies)),
                           max(job.part.chord, job.part.deviation))
 
 

@@ -2,12 +2,12 @@
 
 The proof asks for single samples along the axes that the program cuts with. The answer is the exact approach of
 ``zones.reach.approach_cones``: the contact of the cutting part, and the whole tool free of part and fixtures. No zone
-is built for it.
+is built for it. Drills, taps, chamfer and thread mills are asked as ``service.verification.named_touch`` says.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +21,7 @@ from geometry.sampling import SurfaceSamples
 from geometry.tool_body import ToolBody
 from service.stages.job_inputs import JobInputs
 from service.stages.preparation import obstacle_mesh
+from service.verification.named_touch import AxisLines, NamedTouch
 from zones.machinable_area import SEEN
 from zones.reach.approach_cones import approach
 from zones.reach.index_orientations import AxisCoverage
@@ -38,9 +39,11 @@ class ToolTouch:
     inputs : JobInputs
     turn   : (3, 3) float64, dimensionless, from the setup frame to that of the proof
     table  : mm, setup frame, height of the machine table, which a tilted tool must avoid; None: no table
+    lines  : of drills and taps, frame of the proof, as ``service.verification.named_touch.axis_lines``
     """
 
-    def __init__(self, part: Part, inputs: JobInputs, turn: F64, table: float | None) -> None:
+    def __init__(self, part: Part, inputs: JobInputs, turn: F64, table: float | None,
+                 lines: Mapping[int, AxisLines]) -> None:
         matrix = np.eye(4)
         matrix[:3, :3] = turn
         self.inputs = inputs
@@ -48,6 +51,7 @@ class ToolTouch:
         self.clamped = bool(inputs.fixtures) or table is not None
         self.obstacles = TriangleTree(obstacle_mesh(part, inputs, table=table).transformed(matrix)) \
             if self.clamped else self.bare
+        self.named = NamedTouch(self.obstacles, inputs.clearances, lines)
 
     def reaches(self, samples: SurfaceSamples, tools: Sequence[ToolBody], axes: F64, lift: float,
                 room: float) -> BOOL:
@@ -64,6 +68,10 @@ class ToolTouch:
         out = np.zeros(len(samples), np.bool_)
         for tool in sorted(tools, key=lambda t: (-t.diameter, t.stickout, t.id)):
             rows = np.flatnonzero(~out)
+            if tool.named:
+                out[rows] = self.named.reaches(samples.subset(rows), tool, axes, lift,
+                                               quality.stock_allowance_mm + room)
+                continue
             one = AxisCoverage(self.obstacles, [tool], self.inputs.clearances, quality.scallop_height_mm, lift,
                                quality.stock_allowance_mm + room)
             out[rows] = one.reached(samples.subset(rows), axes).any(axis=1)
@@ -77,6 +85,7 @@ class ToolTouch:
 
         Returns (n,) object array of str.
         """
+        tools = [t for t in tools if not t.named]
         n = len(samples)
         step = -(-n // MAX_REASONED) if n else 1
         few = samples.subset(np.arange(0, n, step))

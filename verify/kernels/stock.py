@@ -182,7 +182,8 @@ def _lower(lines, box, a, d, cutter, end_radius, skin, descents, m, history, eng
                 tip = a[2] + s * d[2]
                 if min(come[i - i0, j - j0] - low, low + gone - tip) > LEAST_DEPTH * radius:
                     engaged[min(int(s * len(engaged)), len(engaged) - 1)] |= sector_bits(
-                        x - a[0], y - a[1], d[0], d[1], plan, come[i - i0, j - j0] - tip, radius, corner, step, 0.0, cone)
+                        x - a[0], y - a[1], d[0], d[1], plan, come[i - i0, j - j0] - tip, radius, corner, step, 0.0,
+                        cone)
             if not steep:
                 continue
             # what the flank took before the end came over the line was not dug

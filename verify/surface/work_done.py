@@ -9,7 +9,7 @@ stock allowance.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -195,9 +195,16 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     height = along - cutting.setup.stock_allowance
     high = np.flatnonzero(height > limits.face)
     left, why = np.zeros(len(tried), np.bool_), np.full(len(tried), LEFT, dtype=object)
-    left[high] = asked.touch.reaches(few.subset(high), tools, axes, limits.lift, limits.face)
+    by, face = np.concatenate([measured.mover, mover]), np.concatenate([measured.samples.face, few.face])
+    cutter = np.where(by >= 0, cutting.moves.tool[by], -1)
+    own = {t.id: np.unique(face[cutter == k]) for k, t in enumerate(cutting.tools) if t in tools and t.named}
+
+    def reached(rows: INT, lift: float, room: float) -> BOOL:
+        return _reached(asked, few.subset(rows), tools, axes, own, lift, room)
+
+    left[high] = reached(high, limits.lift, limits.face)
     tight = high[~left[high]]
-    touched = tight[asked.touch.reaches(few.subset(tight), tools, axes, limits.near, 0.0)]
+    touched = tight[reached(tight, limits.near, 0.0)]
     beyond = np.setdiff1d(tight, touched)
     why[beyond] = asked.touch.reasons(few.subset(beyond), tools, axes)
     corner = np.zeros(len(tried), np.bool_)
@@ -211,6 +218,21 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     mover[moved] = by[np.isin(rows, moved)]
     height[rows[nearer]] = way[nearer]
     return StandingStock(np.where(np.isfinite(height), height, MAX_WAY), mover), left, why
+
+
+def _reached(asked: Asked, few: SurfaceSamples, tools: Sequence[ToolBody], axes: F64,
+             own: Mapping[str, NDArray[np.int32]], lift: float, room: float) -> BOOL:
+    """Samples that tools touch.
+
+    own : by tool id, faces that a drill, tap, chamfer or thread mill has cut; it touches no other, as it does one kind
+          of work
+    """
+    out = asked.touch.reaches(few, [t for t in tools if not t.named], axes, lift, room)
+    for tool in tools:
+        rows = np.flatnonzero(~out & np.isin(few.face, own.get(tool.id, ())))
+        if len(rows):
+            out[rows] = asked.touch.reaches(few.subset(rows), [tool], axes, lift, room)
+    return out
 
 
 def _sides(measured: Measured, few: SurfaceSamples, tried: INT, height: F64, rows: INT, corner: BOOL,
