@@ -266,7 +266,8 @@ class Setup(WireModel):
     def _check(self) -> Setup:
         self.tools = numbered(self.tools)
         _check_accesses(self.access)
-        smallest = min((t for t in self.tools if t.kind not in VERIFIED_KINDS), key=lambda t: t.diameter_mm, default=None)
+        mills = [t for t in self.tools if t.kind not in VERIFIED_KINDS]
+        smallest = min(mills, key=lambda t: t.diameter_mm, default=None)
         if smallest is not None and self.quality.scallop_height_mm >= smallest.diameter_mm / 2:
             raise ValueError(f"quality.scallop_height_mm {self.quality.scallop_height_mm:g} is not below the radius "
                              f"{smallest.diameter_mm / 2:g} of the smallest tool {smallest.id}")

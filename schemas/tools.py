@@ -153,8 +153,8 @@ class Tool(WireModel):
         if self.kind == "drill" and self.tip_diameter_mm:
             raise ValueError(f"tool {self.id}: a drill has a point, so tip_diameter_mm is 0; use kind chamfer")
         if self.kind == "chamfer" and self.point_angle_deg > 175:
-            raise ValueError(f"tool {self.id}: a chamfer mill with a point_angle_deg of {self.point_angle_deg:g} has no "
-                             "cone; use kind flat")
+            raise ValueError(f"tool {self.id}: a chamfer mill with point_angle_deg {self.point_angle_deg:g} has no cone; "
+                             "use kind flat")
         if self.tip_diameter_mm is None:
             self.tip_diameter_mm = 0.0
         if self.tip_diameter_mm >= self.diameter_mm:

@@ -65,6 +65,7 @@ from verify.surface.guard_points import (
 )
 from verify.surface.remains import Rays, Remains, depths_both_ways
 from verify.surface.removal import residual_on_normals
+from verify.surface.tip_gouges import tip_gouges
 from verify.surface.sample_scores import RAY_ERROR, face_proofs, proved_samples, zone_proofs
 from verify.surface.wall_support import supported
 from verify.surface.ways_in import deep_findings
@@ -251,8 +252,10 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
     out.close, out.close_residual = close, residual[between]
     out.guard, out.edge, out.reach = guard.points, edge, reach
     out.gouge_max = max(float(-residual.min(initial=0.0)), 0.0)
-    out.gouges = gouge_findings(points[deep], face[deep], -residual[deep], area[deep], mover[deep], source,
-                                setup.gouge_tolerance)
+    tips = tip_gouges(part.mesh, moves, tools, source, setup.gouge_tolerance + RAY_ERROR)
+    out.gouge_max = max([out.gouge_max, *(f.depth for f in tips)])
+    out.gouges = [*gouge_findings(points[deep], face[deep], -residual[deep], area[deep], mover[deep], source,
+                                  setup.gouge_tolerance), *tips]
     row = np.arange(len(residual))  # the stock on an edge belongs to two faces
     on_faces = (row < len(s) + len(guard)) | ((row >= between.start) & (row < between.stop))
     depth = setup.stock_allowance - residual

@@ -31,11 +31,13 @@ class LineArrays(NamedTuple):
     height : (nx, ny) float64, mm, top of the stock
     origin : (2,) float64, mm
     step   : float, mm between lines
+    bottom : float, mm, underside of the stock: what an end takes off a line below it is not dug
     """
 
     height: F64
     origin: F64
     step: float
+    bottom: float
 
 
 class DescentArrays(NamedTuple):
@@ -135,7 +137,7 @@ def _lower(lines, box, a, d, cutter, end_radius, skin, descents, m, history, eng
 
     Returns whether any stock went, and whether the flutes were under stock.
     """
-    height, origin, step = lines
+    height, origin, step, bottom = lines
     steep, earned, gone_on = descents.steep[m], descents.earned[m], descents.way[m]
     since, dug, come, begun = history
     i0, i1, j0, j1 = box
@@ -188,7 +190,7 @@ def _lower(lines, box, a, d, cutter, end_radius, skin, descents, m, history, eng
                 continue
             # what the flank took before the end came over the line was not dug
             end, _ = lowest_within(x, y, a[0], a[1], a[2], d[0], d[1], d[2], end_radius, flat, corner, cone)
-            over = low + gone - end
+            over = low + gone - max(end, bottom)
             gone = min(gone, over)
             if gone > 0.0:
                 paid = earned - since[i - i0, j - j0]
@@ -202,7 +204,7 @@ def _lower(lines, box, a, d, cutter, end_radius, skin, descents, m, history, eng
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _meet_body(lines, box, a, d, body, grow, slack, best):
     """Find the lines that one body, grown further by ``grow``, takes in by more than ``slack``."""
-    height, origin, step = lines
+    height, origin, step, _bottom = lines
     z0, z1, r0, r1 = body[0], body[1], body[2] + grow, body[3] + grow
     wide = max(r0, r1)
     i0, i1, j0, j1 = box
@@ -226,7 +228,7 @@ def _meet_body(lines, box, a, d, body, grow, slack, best):
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _rapid_cutter(lines, box, a, d, cutter, grow, best):
     """Find the lines that the cutting part, grown radially, enters in a rapid; whether they stand over the flutes."""
-    height, origin, step = lines
+    height, origin, step, _bottom = lines
     radius, corner, length, cone = cutter
     under, above = False, max(a[2], a[2] + d[2]) + length + ARM
     wide = radius + grow
@@ -273,7 +275,7 @@ def stock_tile(box, lines: LineArrays, moves: MoveArrays, free, descents: Descen
     Returns the number of events found, which may exceed the table.
     """
     i0, i1, j0, j1 = box
-    height, origin, step = lines
+    height, origin, step, _bottom = lines
     starts, ends, feeds, tool = moves
     cutters, ends_radius, _reach, bodies, body_first = tools
     rapid_grow, slack = limits

@@ -65,11 +65,13 @@ class StockLines:
     origin : (2,) float64, mm, setup frame
     step   : mm between lines
     height : (nx, ny) float64, mm, top of the stock
+    bottom : mm, underside of the stock: an end that comes out of a hole there digs no further
     """
 
     origin: F64
     step: float
     height: F64
+    bottom: float = NEVER
 
 
 def blank(mesh: TriangleMesh, spacing: float, setup: ProofSetup, *, threads: int = 2,
@@ -100,7 +102,7 @@ def blank(mesh: TriangleMesh, spacing: float, setup: ProofSetup, *, threads: int
         _raise(height, origin, step, blank_mesh(setup), setup.uncertainty, threads, stages.span(0.0, 0.5))
     reach = setup.margin + setup.uncertainty if setup.stock_kind == StockKind.PART_OFFSET else 0.0
     _raise(height, origin, step, mesh, reach, threads, stages.span(0.5, 1.0))
-    return StockLines(origin, step, height)
+    return StockLines(origin, step, height, float(min(c[0, 2] for c in corners)))
 
 
 def _raise(height: F64, origin: F64, step: float, mesh: TriangleMesh, reach: float, threads: int,
@@ -129,7 +131,7 @@ def run_stock(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup:
                             setup.plunge_skin * 2.0 * cutters[:, 0])
     cut, under = np.zeros(len(moves), np.uint8), np.zeros(len(moves), np.uint8)
     limits, free = ContactLimits(setup.clearance_rapid, setup.gouge_tolerance), free_rapids(moves)
-    lines, steps = LineArrays(field.height, field.origin, field.step), moves.arrays
+    lines, steps = LineArrays(field.height, field.origin, field.step, field.bottom), moves.arrays
     nx, ny = field.height.shape
     first = parts(moves, tools)
     tables, spare = tables_for(threads, (int(first[-1]),))

@@ -1,0 +1,75 @@
+"""Programs that drill, tap and chamfer: a small plate made right, and the faults that shops fear."""
+
+import json
+import math
+from dataclasses import replace
+from functools import lru_cache
+
+import pytest
+
+from geometry.errors import SetupError
+from schemas.report import Verification
+from service.from_wire import check_plannable, parse_setup
+from service.stages.job_inputs import JobInputs
+from service.stages.job_part import read_job_part
+from service.verification.program_first import read_first
+from service.verification.program_proof import proved_program
+from tests.step_files import write_step
+
+POINT = 1.5 / math.tan(math.radians(59.0))  # height of the point of the drill, 0.901 mm
+BARE = {"shank_diameter_mm": 3, "stickout_mm": 30}
+SETUP = {
+    "tools": [{"id": "T1", "kind": "drill", "diameter_mm": 3, "point_angle_deg": 118, "flute_length_mm": 20, **BARE},
+              {"id": "T2", "kind": "chamfer", "diameter_mm": 6, "tip_diameter_mm": 1, "stickout_mm": 30},
+              {"id": "T3", "kind": "tap", "diameter_mm": 4, "point_angle_deg": 60, "tip_diameter_mm": 3.2,
+               "flute_length_mm": 12, "stickout_mm": 30},
+              {"id": "T4", "kind": "drill", "diameter_mm": 3.3, "flute_length_mm": 20, "stickout_mm": 30}],
+    "stock": {"kind": "box", "box_mm": [[-8, -6, -8], [8, 6, 0]], "uncertainty_mm": 0},
+    "machine": {"kind": "3-axis", "dialects": ["linuxcnc"]}, "quality": {"scallop_height_mm": 0.02}}
+
+
+def program(*, deep=-5.0 - POINT, through=-9.2, chamfer=-1.6, tapped=True, first=True, more=()):
+    """A blind hole at X-4, a through hole at X0, a tapped one at X4, and the edge at X8 with a chamfer of 0.6 mm."""
+    lines = ["%", "G21 G90 G17 G94 G40 G49 G54 G64 P0.001", "T1 M6", "S3000 M3", "G0 X-4 Y0", "G43 H1 Z20", "G0 Z3"]
+    lines += [f"G98 G83 X-4 Y0 Z{deep:.4f} R2 Q1.5 F150", f"G81 X0 Y0 Z{through:.4f} R2", "G80", *more, "G0 Z20"]
+    lines += ["T4 M6", "S3000 M3", "G0 X4 Y0", "G43 H4 Z20", "G81 X4 Y0 Z-9.5 R2 F150", "G80"] if first else []
+    if tapped:
+        lines += ["T3 M6", "S500 M3", "G0 X4 Y0", "G43 H3 Z20", "G0 Z2", "G1 Z-9 F350", "Z2", "G0 Z20"]
+    lines += ["T2 M6", "S8000 M3", "G0 X9.5 Y-12", "G43 H2 Z20", f"G0 Z{chamfer}", "G1 Y12 F400", "G0 Z20"]
+    return "\n".join([*lines, "M5", "M30", "%"]) + "\n"
+
+
+@pytest.fixture(scope="module")
+def verify(tmp_path_factory):
+    """Verify a text against the plate -> the report. The plate is read once."""
+    import cadquery as cq
+
+    plate = cq.Workplane("XY").box(16, 12, 8, centered=(True, True, False)).translate((0, 0, -8))
+    plate = plate.faces(">X").edges(">Z").chamfer(0.6)
+    for x, radius, depth in ((-4.0, 1.5, 5.0), (0.0, 1.5, 8.0), (4.0, 2.0, 8.0)):
+        plate = plate.cut(cq.Workplane("XY").circle(radius).extrude(-depth).translate((x, 0, 0)))
+    cone = cq.Solid.makeCone(0.0, 1.5, POINT, pnt=cq.Vector(-4, 0, -5.0 - POINT), dir=cq.Vector(0, 0, 1))
+    path = write_step(plate.cut(cq.Workplane(cone)), tmp_path_factory.mktemp("drilled") / "plate.step")
+    job = read_job_part(path, parse_setup(json.dumps(SETUP)), lambda _stage, _share: None)
+
+    @lru_cache
+    def report(text):
+        mine = replace(job, inputs=JobInputs.of(parse_setup(json.dumps(SETUP))))
+        made = proved_program(mine, read_first(mine_setup(), text, ending=".ngc"), lambda _share: None).report
+        Verification.model_validate(made)
+        return made
+
+    def mine_setup():
+        return parse_setup(json.dumps(SETUP))
+
+    return report
+
+
+def kinds(report):
+    return report["finding_counts"]
+
+
+def test_a_right_program_is_proved(verify):
+    report = verify(program())
+    assert report["state"] == "proved", report["findings"]
+    assert report["gouge_max_mm"] < 0.01
