@@ -73,3 +73,53 @@ def test_a_right_program_is_proved(verify):
     report = verify(program())
     assert report["state"] == "proved", report["findings"]
     assert report["gouge_max_mm"] < 0.01
+
+
+def test_a_drill_too_deep_is_a_gouge_as_deep_at_its_point(verify):
+    found = [f for f in verify(program(deep=-5.3 - POINT))["findings"] if f["kind"] == "gouge"]
+    assert found[0]["depth"] == pytest.approx(0.3, abs=1e-3)
+    assert found[0]["point"] == pytest.approx([-4, 0, -5.3 - POINT], abs=1e-3)
+    # along the normals of the cone it is 0.3 sin 59 degrees
+    assert found[1]["depth"] == pytest.approx(0.3 * math.sin(math.radians(59.0)), abs=0.003)
+
+
+@pytest.mark.parametrize("change", [{"deep": -4.0 - POINT}, {"through": -7.0}])
+def test_a_hole_that_is_not_deep_enough_is_stock_left(verify, change):
+    report = verify(program(**change))
+    assert report["state"] == "clean" and kinds(report).keys() == {"stock_left"}
+    assert max(f["depth"] for f in report["findings"]) > 0.7
+
+
+@pytest.mark.parametrize(("chamfer", "kind"), [(-1.5, "stock_left"), (-1.8, "gouge")])
+def test_a_chamfer_too_high_or_too_low(verify, chamfer, kind):
+    report = verify(program(chamfer=chamfer))
+    assert kinds(report).keys() == {kind}
+    depth = max(f["depth"] for f in report["findings"])
+    assert depth == pytest.approx(abs(chamfer + 1.6) / math.sqrt(2.0), abs=0.002)
+
+
+def test_a_tap_without_its_hole_plunges(verify):
+    report = verify(program(first=False))
+    assert kinds(report) == {"plunge": 1} and report["findings"][0]["depth"] == pytest.approx(8.0, abs=1e-6)
+
+
+def test_a_hole_that_is_not_tapped_is_remainder(verify):
+    report = verify(program(tapped=False))
+    assert report["state"] == "proved" and [e["reason"] for e in report["remainder"]] == ["corner"]
+
+
+def test_a_drill_goes_neither_sideways_nor_at_rapid_into_stock(verify):
+    more = ("G0 X0 Y0", "G0 Z2", "G1 Z-3 F100", "G1 X1", "X0", "G0 Z2")
+    words = {f["kind"]: f["message"] for f in verify(program(more=more))["findings"]}
+    assert words["program"] == "T1 is a drill and cuts 1.000 mm sideways; it cuts along its axis only"
+    more = ("G0 X-4 Y3.5", "G0 Z2", "G0 Z-1", "G0 Z2")
+    assert "a rapid takes the cutting part into stock" in \
+        next(f["message"] for f in verify(program(more=more))["findings"] if f["kind"] == "rapid")
+
+
+def test_jobs_refuse_such_tools_by_name():
+    with pytest.raises(SetupError) as caught:
+        check_plannable(parse_setup(json.dumps(SETUP)))
+    assert caught.value.code == "verify_only_tool" and caught.value.subjects == ("T1", "T2", "T3", "T4")
+    assert "T1 (drill), T2 (chamfer), T3 (tap), T4 (drill)" in caught.value.message
+    assert "zonemill verify" in caught.value.remedy

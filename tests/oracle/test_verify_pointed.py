@@ -1,15 +1,26 @@
 """Cutting parts with a cone at the end (drills, chamfer mills, leads of taps) against sampled bodies of revolution."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from geometry.kernels.cutter_sizes import CutterSizes
+from geometry.tool_body import ToolBody
+from tests.hand_parts import box_mesh
 from verify.kernels.engaged import bottom as end_height
 from verify.kernels.engaged import edge_radius
 from verify.kernels.heights import entered, lowest
 from verify.kernels.profile import carried, standing
 from verify.kernels.rays import gap, new_left
+from verify.kernels.stock import PLUNGE
 from verify.kernels.sweep import cutter_interval
+from verify.material.stock_field import run_field, stock_field
+from verify.material.stock_lines import blank, run_stock
+from verify.model import ProofSetup
+from verify.moves import Moves
+from verify.tool_axes import ToolAxes
 
 # radius, width of the corner, length, height of the cone: a drill, a chamfer mill, a lead, an engraver without a side
 PARTS = [(1.5, 1.5, 6.0, 0.9), (2.0, 1.4, 5.0, 1.4), (2.0, 0.5, 5.0, 2.0), (1.5, 1.5, 4.0, 4.0)]
@@ -152,3 +163,51 @@ def test_the_edge_is_as_wide_as_the_cone_there():
     for over, wide in ((0.0, 0.6), (0.7, 1.3), (1.4, 2.0), (3.0, 2.0)):
         assert edge_radius(over, radius, corner, cone) == pytest.approx(wide)
     assert [end_height(r, radius, corner, cone) for r in (0.3, 0.6, 1.3, 2.0)] == pytest.approx([0.0, 0.0, 0.7, 1.4])
+
+
+DRILL = ToolBody("T1", 1, 3.0, 0.0, 12.0, 3.0, 12.0, 3.0, 30.0, (), "drill", 0.0, 0.9)
+BLANK = ProofSetup(stock_kind="box", margin=0.0, uncertainty=0.0, line_spacing=0.2)
+
+
+def feed(start, end, axis=None):
+    """One feed move, with a tool axis where it is not +Z."""
+    axes = None if axis is None else ToolAxes.between(np.array([axis]), np.array([axis]))
+    return Moves(np.array([start], float), np.array([end], float), np.ones(1, bool), np.zeros(1, np.int32), axes)
+
+
+def test_a_blind_hole_leaves_its_cone_on_every_line():
+    mesh = box_mesh((-4, -4, -10), (4, 4, 0))
+    field = blank(mesh, 0.2, BLANK)
+    run = run_stock(field, feed((0, 0, 3), (0, 0, -5)), [DRILL], BLANK)
+    x, y = (field.origin[k] + (np.arange(field.height.shape[k]) + 0.5) * field.step for k in range(2))
+    rho = np.hypot(*np.meshgrid(x, y, indexing="ij"))
+    want = np.where(rho <= 1.5, np.minimum(-5.0 + rho * 0.9 / 1.5, 0.0), 0.0)
+    held = field.height > -20
+    np.testing.assert_allclose(field.height[held], want[held], atol=1e-12)
+    assert len(run.events) == 0 and run.cut.tolist() == [True]  # a drill may go straight down
+
+
+@pytest.mark.parametrize("angle", [0.0, 25.0])
+def test_the_volume_of_a_drilled_hole(angle):
+    # level with the place where the axis meets the top: a slanted top takes as much from one side as it gives the other
+    axis = np.array([math.sin(math.radians(angle)), 0.0, math.cos(math.radians(angle))])
+    field = stock_field(box_mesh((-5, -4, -9), (5, 4, 0)), BLANK, 0.1)
+    run = run_field(field, feed(4.0 * axis, -5.0 * axis, axis), [DRILL], BLANK)
+    want = math.pi * 1.5**2 * (5.0 - 0.9 + 0.9 / 3.0)
+    assert run.taken is not None and run.taken.sum() == pytest.approx(want, rel=0.005)
+    assert len(run.events) == 0
+
+
+def test_a_blunt_chamfer_mill_and_a_tap_do_not_plunge():
+    mesh = box_mesh((-6, -6, -10), (6, 6, 0))
+    chamfer = replace(DRILL, named="chamfer", diameter=6.0, tip_diameter=2.0, cone_height=2.0)
+    tap, pointed = replace(DRILL, named="tap", tip_diameter=3.0, cone_height=0.0), replace(chamfer, tip_diameter=0.0)
+    down = feed((0, 0, 1), (0, 0, -2))
+    depths = [[e[2] for e in run_stock(blank(mesh, 0.2, BLANK), down, [t], BLANK).events if e[1] == PLUNGE]
+              for t in (chamfer, tap, replace(pointed, cone_height=3.0), DRILL)]
+    assert [max(d, default=0.0) for d in depths] == pytest.approx([2.0, 2.0, 0.0, 0.0])
+    # a tap follows its drill, also where that came out under the plate
+    field, wide = blank(box_mesh((-6, -6, -3), (6, 6, 0)), 0.2, BLANK), replace(tap, diameter=3.6)
+    both = Moves(np.array([[0, 0, 1], [0, 0, 1]], float), np.array([[0, 0, -4], [0, 0, -6]], float), np.ones(2, bool),
+                 np.array([0, 1], np.int32))
+    assert [e for e in run_stock(field, both, [DRILL, wide], BLANK).events if e[1] == PLUNGE] == []
