@@ -49,8 +49,8 @@ class Tool(WireModel):
     number: Annotated[Count | None, Field(
         ge=1, le=99999, description="Tool number in programs, in T and H words. Default: the digits of the id if they "
                                     "are unique, otherwise the position in the list.")] = None
-    kind: Annotated[ToolKind, Field(description="Shape of the cutting end. Kinds drill, tap, chamfer and thread_mill are for "
-                                                "programs to be verified; jobs do not plan them. tapered_ball and "
+    kind: Annotated[ToolKind, Field(description="Shape of the cutting end. Kinds drill, tap, chamfer and thread_mill are "
+                                                "for programs to be verified; jobs do not plan them. tapered_ball and "
                                                 "barrel are not available yet.")]
     diameter_mm: Annotated[Length, Field(ge=0.01, description="Diameter of the cutting part, mm, from 0.01. Of a tap "
                                                               "or thread mill the outer diameter of its teeth.")]
@@ -153,7 +153,7 @@ class Tool(WireModel):
         if self.kind == "drill" and self.tip_diameter_mm:
             raise ValueError(f"tool {self.id}: a drill has a point, so tip_diameter_mm is 0; use kind chamfer")
         if self.kind == "chamfer" and self.point_angle_deg > 175:
-            raise ValueError(f"tool {self.id}: a chamfer mill with point_angle_deg {self.point_angle_deg:g} has no cone; "
+            raise ValueError(f"tool {self.id}: a chamfer mill of {self.point_angle_deg:g} deg has no cone; "
                              "use kind flat")
         if self.tip_diameter_mm is None:
             self.tip_diameter_mm = 0.0

@@ -65,8 +65,8 @@ from verify.surface.guard_points import (
 )
 from verify.surface.remains import Rays, Remains, depths_both_ways
 from verify.surface.removal import residual_on_normals
-from verify.surface.tip_gouges import tip_gouges
 from verify.surface.sample_scores import RAY_ERROR, face_proofs, proved_samples, zone_proofs
+from verify.surface.tip_gouges import tip_gouges
 from verify.surface.wall_support import supported
 from verify.surface.ways_in import deep_findings
 from verify.surface.work_done import Measured, work_done

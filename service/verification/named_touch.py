@@ -67,7 +67,14 @@ class NamedTouch:
         self.tree, self.clear, self.lines = tree, clear, lines
 
     def reaches(self, samples: SurfaceSamples, tool: ToolBody, axes: F64, lift: float, grow: float) -> BOOL:
-        """Samples that a tool touches within ``lift`` mm along some axis (k, 3), ``grow`` mm from everything."""
+        """Samples that a tool touches along some axis.
+
+        axes : (k, 3) float64, unit, tip to spindle, frame of the tree
+        lift : mm, distance within which a touch counts
+        grow : mm, distance that the whole tool keeps from everything
+
+        Returns (n,) bool.
+        """
         out = np.zeros(len(samples), np.bool_)
         for axis in axes:
             rows = np.flatnonzero(~out)
@@ -119,8 +126,9 @@ class NamedTouch:
 
 
 def lowest_tips(tree: TriangleTree, xy: F64, tool: ToolBody, clear: Clearances, slack: float, grow: float) -> F64:
-    """Lowest tip over places in plan (n, 2), from above: the whole tool ``grow`` mm from everything.
+    """Lowest tips from above: the whole tool ``grow`` mm from everything.
 
+    xy    : (n, 2) float64, mm, plan, places of the axis
     slack : mm by which a tool without ``grow`` may enter: a drill in its own hole touches the facets all round
 
     Returns (n,) float64, mm; -inf where nothing is below.
@@ -142,7 +150,12 @@ def lowest_tips(tree: TriangleTree, xy: F64, tool: ToolBody, clear: Clearances, 
 
 
 def distance(tool: ToolBody, rho: F64, height: F64) -> F64:
-    """Distance, mm, of places at ``rho`` from the axis and a height over the tip from an endless tool; 0 inside."""
+    """Distance of places from a tool without upper end.
+
+    rho, height : (n,) float64, mm, tool frame, distance from the axis and height over the tip
+
+    Returns (n,) float64, mm, 0 inside.
+    """
     tip = tool.radius - tool.corner_width
     x, cone, width = rho - tip, tool.cone_height, tool.corner_width
     side = np.hypot(x - width, np.minimum(height - cone, 0.0))

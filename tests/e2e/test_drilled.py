@@ -83,6 +83,7 @@ def test_a_drill_too_deep_is_a_gouge_as_deep_at_its_point(verify):
     assert found[1]["depth"] == pytest.approx(0.3 * math.sin(math.radians(59.0)), abs=0.003)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [{"deep": -4.0 - POINT}, {"through": -7.0}])
 def test_a_hole_that_is_not_deep_enough_is_stock_left(verify, change):
     report = verify(program(**change))
@@ -90,6 +91,7 @@ def test_a_hole_that_is_not_deep_enough_is_stock_left(verify, change):
     assert max(f["depth"] for f in report["findings"]) > 0.7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("chamfer", "kind"), [(-1.5, "stock_left"), (-1.8, "gouge")])
 def test_a_chamfer_too_high_or_too_low(verify, chamfer, kind):
     report = verify(program(chamfer=chamfer))
@@ -98,16 +100,19 @@ def test_a_chamfer_too_high_or_too_low(verify, chamfer, kind):
     assert depth == pytest.approx(abs(chamfer + 1.6) / math.sqrt(2.0), abs=0.002)
 
 
+@pytest.mark.slow
 def test_a_tap_without_its_hole_plunges(verify):
     report = verify(program(first=False))
     assert kinds(report) == {"plunge": 1} and report["findings"][0]["depth"] == pytest.approx(8.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_hole_that_is_not_tapped_is_remainder(verify):
     report = verify(program(tapped=False))
     assert report["state"] == "proved" and [e["reason"] for e in report["remainder"]] == ["corner"]
 
 
+@pytest.mark.slow
 def test_a_drill_goes_neither_sideways_nor_at_rapid_into_stock(verify):
     more = ("G0 X0 Y0", "G0 Z2", "G1 Z-3 F100", "G1 X1", "X0", "G0 Z2")
     words = {f["kind"]: f["message"] for f in verify(program(more=more))["findings"]}
