@@ -1,6 +1,7 @@
 """SETUP.json: defaults, refusals with sentences, canonical form."""
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -71,6 +72,16 @@ def test_a_tool_that_leaves_lengths_out_is_straight():
     (tool(corner_radius_mm=1), "half its diameter"), (tool(corner_radius_mm=2), "larger than half"),
     (tool(kind="flat", corner_radius_mm=1), "use kind bull"), (tool(kind="bull"), "use kind flat"),
     (tool(kind="barrel"), "not available yet"), (tool(kind="tapered_ball"), "not available yet"),
+    (tool(point_angle_deg=118), "belongs to kinds drill, tap and chamfer"),
+    (tool(kind="drill", tip_diameter_mm=1), "a drill has a point"),
+    (tool(kind="drill", corner_radius_mm=1), "has corner_radius_mm 0"),
+    (tool(kind="drill", point_angle_deg=181), "less than or equal to 180"),
+    (tool(kind="drill", flute_length_mm=0.5), "shorter than the cone at its end, 0.901291 high"),
+    (tool(kind="chamfer", tip_diameter_mm=3), "is not below diameter_mm 3"),
+    (tool(kind="chamfer", point_angle_deg=180), "has no cone; use kind flat"),
+    (tool(kind="tap", point_angle_deg=60), "the lead of a tap needs tip_diameter_mm"),
+    (tool(kind="tap", tip_diameter_mm=2), "needs point_angle_deg"),
+    (tool(kind="thread_mill", point_angle_deg=60), "belongs to kinds drill, tap and chamfer"),
     (tool(taper_angle_deg=3), "not available yet"), (tool(number=0), "greater than or equal to 1"),
     (setup(quality={"scallop_height_mm": 1.5}), "radius 1.5 of the smallest tool T1"),
     (setup(quality={"scallop_height_mm": 0}), "greater than or equal to 0.0001"),
@@ -152,6 +163,23 @@ def test_what_a_machine_of_five_axes_cannot_do_is_said(machine, access, code, su
     with pytest.raises(SetupError) as caught:
         check_plannable(parse_setup(setup(machine={**FIVE, **machine}, access=access)))
     assert caught.value.code == code and subject in caught.value.subjects and caught.value.remedy
+
+
+@pytest.mark.parametrize(("given", "cone", "flutes", "tip"), [
+    ({"kind": "drill"}, 1.5 / math.tan(math.radians(59)), 9.0, 0.0),
+    ({"kind": "drill", "point_angle_deg": 180}, 0.0, 9.0, 0.0),
+    ({"kind": "chamfer", "tip_diameter_mm": 1}, 1.0, 1.0, 1.0),
+    ({"kind": "tap"}, 0.0, 9.0, 0.0), ({"kind": "tap", "point_angle_deg": 90, "tip_diameter_mm": 2.4}, 0.3, 9.0, 2.4),
+    ({"kind": "thread_mill", "flute_length_mm": 6, "neck_diameter_mm": 2, "neck_length_mm": 12}, 0.0, 6.0, 0.0)])
+def test_tools_of_programs_to_be_verified_have_their_cone_and_are_not_planned(given, cone, flutes, tip):
+    one = parse_setup({"tools": [{"id": "T1", "diameter_mm": 3, **given}], "quality": {"scallop_height_mm": 0.05}})
+    body = tool_bodies(one)[0]
+    assert body.kind == given["kind"] and body.tip_diameter == tip and body.corner_radius == 0.0
+    assert (body.cone_height, body.flute_length) == pytest.approx((cone, flutes))
+    assert canonical_json(parse_setup(canonical_json(one))) == canonical_json(one)
+    with pytest.raises(SetupError, match=rf"T1 \({given['kind']}\)") as caught:
+        check_plannable(one)
+    assert caught.value.code == "verify_only_tool" and caught.value.limit == ["ball", "flat", "bull"]
 
 
 def test_the_tool_in_the_spindle_is_one_of_the_setup():

@@ -17,7 +17,8 @@ BULL = ToolBody("T7", 7, 8.0, 1.0, 20.0, 8.0, 20.0, 8.0, 50.0)
 LONG = ToolBody("T9", 9, 0.4, 0.0, 0.8, 0.38, 6.0, 4.0, 60.0, (HolderFrustum(63.0, 63.0, 160.0),) * 3)
 CROWDED = ToolBody("T3", 3, 1.0, 0.5, 1.0, 0.9, 1.2, 3.0, 1.4, (HolderFrustum(40.0, 40.0, 0.3),) * 12)
 STACKED = ToolBody("T4", 4, 6.0, 0.0, 12.0, 6.0, 12.0, 6.0, 30.0, (HolderFrustum(20.0, 22.0, 1.0),) * 50)
-TOOLS = [(BALL, 87.0), (BULL, 50.0), (LONG, 560.0), (CROWDED, 5.0), (STACKED, 80.0)]
+DRILL = ToolBody("T5", 5, 3.0, 0.0, 24.0, 3.0, 24.0, 3.0, 40.0, (), "drill", 0.0, 0.9)
+TOOLS = [(DRILL, 40.0), (BALL, 87.0), (BULL, 50.0), (LONG, 560.0), (CROWDED, 5.0), (STACKED, 80.0)]
 
 
 def read(body: ToolBody, gauge: float) -> ET.Element:
@@ -52,6 +53,14 @@ def test_every_part_is_drawn_to_scale(body, gauge):
         assert right - left == pytest.approx(scale * across, abs=0.003)
         assert floor - down == pytest.approx(scale * low, abs=0.003)
         assert floor - up == pytest.approx(scale * high, abs=0.003)
+
+
+def test_a_drill_has_its_point_and_its_name():
+    drawing = draw_tool(DRILL, 40.0)
+    flutes = next(a for a in drawing.areas if a.part == "flutes").points
+    low = max(y for _, y in flutes)
+    assert sorted({round((low - y) / drawing.scale, 6) for _, y in flutes}) == pytest.approx([0.0, 0.9, 24.0])
+    assert drawing.title == "T5: drill of 3 mm, to scale"
 
 
 def test_the_tip_is_drawn_larger_and_round_where_it_is_small():

@@ -1,6 +1,7 @@
 """The part for a page: facets with one label, the worst that was measured at their corners, and a rough level."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -123,3 +124,8 @@ def test_the_profile_of_a_tool_is_its_shape(body):
     assert np.allclose(np.hypot(arc[:, 0] - (body.radius - c), arc[:, 1] - c), c, atol=1e-4)
     assert [b["kind"] for b in shape["bodies"]][-1] in ("shank", "holder")
     json.dumps(shape, allow_nan=False)
+
+
+def test_the_profile_of_a_chamfer_mill_has_its_cone():
+    body = replace(tool(6.0, 0.0), named="chamfer", tip_diameter=1.0, cone_height=2.5)
+    assert tool_shape(body)["bodies"][0]["profile"][:3] == [[0.0, 0.0], [0.5, 0.0], [3.0, 2.5]]
