@@ -49,9 +49,9 @@ class Tool(WireModel):
     number: Annotated[Count | None, Field(
         ge=1, le=99999, description="Tool number in programs, in T and H words. Default: the digits of the id if they "
                                     "are unique, otherwise the position in the list.")] = None
-    kind: Annotated[ToolKind, Field(description="Shape of the cutting end. Kinds drill, tap, chamfer and thread_mill are "
-                                                "for programs to be verified; jobs do not plan them. tapered_ball and "
-                                                "barrel are not available yet.")]
+    kind: Annotated[ToolKind, Field(description="Shape of the cutting end. Kinds drill, tap, chamfer and thread_mill "
+                                                "are for programs to be verified; jobs do not plan them. tapered_ball "
+                                                "and barrel are not available yet.")]
     diameter_mm: Annotated[Length, Field(ge=0.01, description="Diameter of the cutting part, mm, from 0.01. Of a tap "
                                                               "or thread mill the outer diameter of its teeth.")]
     point_angle_deg: Annotated[Number | None, Field(

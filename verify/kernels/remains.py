@@ -69,7 +69,7 @@ def fill_pieces(chosen, count, moves: MoveArrays, axes: AxisArrays, cutters, rea
             fill_piece(out[at], moves.start[m], moves.end[m], axes.axis[m], axes.about[m], axes.angle[m], part, n)
             qx, qy, qz, dx, dy, dz = view(out[at], x, y, z)
             r = cutters[k, 1]
-            if carried(qx, qy, qz, dx, dy, dz, cutters[k, 0] - r, r, cutters[k, 2]) <= far + axes.bow:
+            if carried(qx, qy, qz, dx, dy, dz, cutters[k, 0] - r, r, cutters[k, 2], cutters[k, 3]) <= far + axes.bow:
                 tool[at] = k
                 at += 1
     return out[:at], tool[:at]
@@ -83,7 +83,7 @@ def _swept(x, y, z, enough, rows, tool, cutters):
         k = tool[j]
         qx, qy, qz, dx, dy, dz = view(rows[j], x, y, z)
         r = cutters[k, 1]
-        d = carried(qx, qy, qz, dx, dy, dz, cutters[k, 0] - r, r, cutters[k, 2])
+        d = carried(qx, qy, qz, dx, dy, dz, cutters[k, 0] - r, r, cutters[k, 2], cutters[k, 3])
         if d < least:
             least = d
             if least <= enough:
