@@ -165,9 +165,11 @@ def split_cells(samples: SurfaceSamples, parts: int) -> tuple[SurfaceSamples, np
 
 
 def lattice_axes(normals: F64) -> tuple[F64, F64]:
-    """The two axes of the lattice of ``graded_samples`` on planes, (n, 3) float64, dimensionless unit vectors each.
+    """The two axes of the lattice of ``graded_samples`` on planes.
 
     normals : (n, 3) float64, dimensionless unit vectors, in the frame of the planes
+
+    Returns two (n, 3) float64 arrays, dimensionless unit vectors, in the same frame.
 
     The lattice is turned by the angle whose tangent is the golden section against the axes of the frame, since what is
     long and narrow on a part mostly lies along these.

@@ -139,9 +139,13 @@ def gouge_findings(points: F64, face: I32, depth: F64, area: F64, mover: I32, so
 
 def allowance_findings(points: F64, face: I32, depth: F64, area: F64, mover: I32, source: Source, allowance: float,
                        tolerance: float) -> list[Finding]:
-    """Findings of cuts that go into the stock allowance; arguments as those of ``gouge_findings``.
+    """Findings of cuts that go deeper into the stock allowance than the tolerance.
 
-    depth : (n,) float64, mm, how deep the cut goes under the allowance; allowance, tolerance : mm
+    points : (n, 3) float64, mm, setup frame
+    face   : (n,) int32, index, face number
+    depth  : (n,) float64, mm, how deep the cut goes under the allowance; allowance, tolerance : mm
+    area   : (n,) float64, mm²
+    mover  : (n,) int32, index, the move that cut deepest
     """
     text = f"cuts {{:.4f}} mm into the stock allowance of {allowance:g} mm"
     return _cut_findings(FindingKind.ALLOWANCE, text, points, face, depth, area, mover, source, tolerance)

@@ -234,10 +234,10 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
     if len(near):
         tree = TriangleTree(part.mesh)
         seeds, left_out = closer_seeds(points[near], residual[near], mover[near], SURE * setup.gouge_tolerance)
-        places, outward, row = closer_points(tree, seeds)
-        left, by = residual_on_normals(places, outward, np.full(len(places), reach), moves, tools, threads=threads,
+        there, outward, row = closer_points(tree, seeds)
+        left, by = residual_on_normals(there, outward, np.full(len(there), reach), moves, tools, threads=threads,
                                        progress=lambda f: tell(0.8 + 0.1 * f))
-        points, normals = np.concatenate([points, places]), np.concatenate([normals, outward])
+        points, normals = np.concatenate([points, there]), np.concatenate([normals, outward])
         face, area = np.concatenate([face, part.mesh.face_ids[row]]), np.concatenate([area, np.zeros(len(row))])
         residual, mover = np.concatenate([residual, left]), np.concatenate([mover, by])
     deep = np.flatnonzero((residual < -setup.gouge_tolerance) & (mover >= 0))

@@ -28,6 +28,8 @@ def drop_over_flats(tree: TriangleTree, x0: float, y0: float, step: float, nx: i
     """``geometry.mesh_queries.drop.drop_grid``, to ``EVEN``, with few queries over level areas.
 
     large : number of points from which on areas are looked for
+
+    Returns (ny, nx) float64, mm, the lowest tip over each point, frame of the mesh.
     """
     if nx * ny < large:
         return drop_grid(tree, x0, y0, step, nx, ny, radius, corner_radius)

@@ -128,7 +128,7 @@ class NamedTouch:
 def lowest_tips(tree: TriangleTree, xy: F64, tool: ToolBody, clear: Clearances, slack: float, grow: float) -> F64:
     """Lowest tips from above: the whole tool ``grow`` mm from everything.
 
-    xy    : (n, 2) float64, mm, plan, places of the axis
+    xy    : (n, 2) float64, mm, places of the axis in plan, frame of the tree
     slack : mm by which a tool without ``grow`` may enter: a drill in its own hole touches the facets all round
 
     Returns (n,) float64, mm; -inf where nothing is below.

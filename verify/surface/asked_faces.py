@@ -92,8 +92,12 @@ class FinishedPlanes:
 
     @classmethod
     def of(cls, samples: SurfaceSamples, residual: F64, mover: I32, cutting: Cutting) -> FinishedPlanes:
-        """The planes on which samples are within tolerance; arguments as those of ``worked_faces``."""
-        setup, run = cutting.setup, np.cumsum(~cutting.moves.feed)
+        """The planes on which samples are within tolerance.
+
+        samples  : SurfaceSamples, n of them, frame of the proof
+        residual : (n,) float64, mm of stock on their normals; mover : (n,) int32, index, as ``worked_faces`` takes them
+        """
+        setup, run = cutting.setup, np.cumsum(~cutting.moves.feed).astype(np.int64)
         width = max(setup.scallop_height, setup.gouge_tolerance)
         rows = np.flatnonzero((mover >= 0) & proved_samples(residual, setup))
         keys = _plane_keys(run[mover[rows]], samples.points[rows], samples.normals[rows], width)
@@ -102,7 +106,7 @@ class FinishedPlanes:
     def holds(self, points: F64, normals: F64, height: F64, mover: I32) -> BOOL:
         """Whether what a move leaves above a place lies in a plane that its run finishes.
 
-        points, normals : (n, 3) float64, mm and unit, samples of the part
+        points, normals : (n, 3) float64, mm and unit, samples of the part, frame of the proof
         height : (n,) float64, mm of stock on each normal; mover : (n,) int32, index, -1 where no move left it
 
         Returns (n,) bool; false where the height is within the width itself.
