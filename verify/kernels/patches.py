@@ -60,10 +60,16 @@ def deepest_point(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter: CutterSizes):
         x, y, z = k * dx - qx, k * dy - qy, k * dz - qz
         if nz < -LEVEL:
             out, height = cutter.radius, z + cutter.length
+        elif nz > LEVEL and cutter.cone > 0.0:
+            # the lower or the upper end of the cone
+            out, height = cutter.radius - cutter.corner, z
+            if cutter.corner * aside > cutter.cone * nz:
+                out, height = cutter.radius, z + cutter.cone
         elif nz > LEVEL:
             out, height = cutter.radius - cutter.corner * (1.0 - aside), z + cutter.corner * (1.0 - nz)
         else:
-            out, height = cutter.radius, min(max(0.0, z + cutter.corner), z + cutter.length)
+            low = z + (cutter.cone if cutter.cone > 0.0 else cutter.corner)
+            out, height = cutter.radius, min(max(0.0, low), z + cutter.length)
         if aside > LEVEL:
             x, y = x - out * nx / aside, y - out * ny / aside
         depth = -(nx * x + ny * y + nz * height)
@@ -76,7 +82,7 @@ def deepest_point(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter: CutterSizes):
 def judge_tile(tile, cells: CellArrays, places: PlaceArrays, moves: MoveArrays, cutters):
     """Work all feed moves through the places of the cell columns x0..x1-1, y0..y1-1 of a tile (x0, x1, y0, y1).
 
-    cutters : (k, 3) float64, mm: radius, corner radius, flute length
+    cutters : (k, 4) float64, mm: radius, corner, flute length and height of the cone, as ``CutterSizes``
     """
     cx0, cx1, cy0, cy1 = tile
     origin, size, shape, first = cells
@@ -93,7 +99,7 @@ def judge_tile(tile, cells: CellArrays, places: PlaceArrays, moves: MoveArrays, 
             continue
         ax, ay, az = starts[m, 0], starts[m, 1], starts[m, 2]
         dx, dy, dz = ends[m, 0] - ax, ends[m, 1] - ay, ends[m, 2] - az
-        cutter = CutterSizes(cutters[tool[m], 0], cutters[tool[m], 1], cutters[tool[m], 2])
+        cutter = CutterSizes(cutters[tool[m], 0], cutters[tool[m], 1], cutters[tool[m], 2], cutters[tool[m], 3])
         radius, length = cutter.radius, cutter.length
         reach = radius + pad
         x0 = max(cx0, math.floor((min(ax, ax + dx) - reach - origin[0]) / size))
