@@ -22,10 +22,6 @@ from toolpath.workingsteps import ArcSpan, Trajectory, TrajectoryKind, Workingst
 
 BOOL = NDArray[np.bool_]
 
-SHARE = 0.5
-"""Share of the chordal tolerance that arcs and longer lines may deviate from the planned path. The planner gets the
-rest. It spends half of its share on the points it leaves out, so noise of the plan does not split an arc."""
-
 MIN_ARC_MOVES = 3
 """Fewest moves that an arc replaces. Any three points lie on a circle, so two moves prove nothing."""
 MIN_ARC_CHORD = 0.02
@@ -387,4 +383,4 @@ def _along(points: F64, fit: FittedStretches) -> tuple[F64, I64, I64]:
     return out, starts, per
 
 
-__all__ = ["SAG", "SHARE", "FittedStretches", "fitted", "stretches"]
+__all__ = ["SAG", "FittedStretches", "fitted", "stretches"]

@@ -15,6 +15,7 @@ from schemas.machine import Machine
 from schemas.materials import MATERIALS, FeedPoint, Material, find_material
 from schemas.setup import Setup
 from schemas.tools import Tool
+from toolpath.scallop_budget import ScallopBudget
 from toolpath.tool_deflection import (
     LAYER_LIMIT,
     MIN_FEED,
@@ -171,9 +172,9 @@ def bending(setup: Setup, tool: Tool, body: ToolBody, data: CuttingData, depth: 
 
 def rates_of(setup: Setup) -> Rates:
     """Rates of the machine of a setup; corners are rounded by the tolerance of the programs (``path_tolerance``)."""
-    machine = setup.machine
+    machine, quality = setup.machine, setup.quality
     return Rates(machine.rapid_mm_min or RATES.rapid, machine.acceleration_mm_s2 or RATES.acceleration,
-                 min(RATES.rounding, 0.5 * setup.quality.chordal_tolerance_mm))
+                 min(RATES.rounding, ScallopBudget(quality.scallop_height_mm, quality.chordal_tolerance_mm).program))
 
 
 __all__ = ["DEFAULT_MAX_FEED_MM_MIN", "DEFAULT_MAX_RPM", "MATERIALS", "MAX_CHIP_THINNING",

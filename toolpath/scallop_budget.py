@@ -16,6 +16,13 @@ PASS_SHARE = 0.85  # of the scallop: a sample with less left is done
 REACH_SHARE = 0.1  # of the scallop: lift of the tool off the part
 CHORD_SHARE = 0.5  # of the chordal tolerance: chords between the locations of a pass
 ROUNDING_SHARE = 0.25  # of the chordal tolerance: error of leaving out poses of a tilted tool
+TIPS_SHARE = 0.5  # of the chord of a pass: chords of the way of the tip; leaving out points takes the other half
+LEAD_SHARE = 0.5  # of the chord of a pass: chords of the arcs that lead onto it
+SWING_SHARE = 0.1  # of the chord of a pass: what turning between two locations adds
+ARC_SHARE = 0.5
+"""Share of the chordal tolerance that arcs and longer lines may deviate from the planned path. The planner gets the
+rest. It spends half of its share on the points it leaves out, so noise of the plan does not split an arc."""
+PROGRAM_SHARE = 0.5  # of the chordal tolerance: rounding of corners by the control, and blocks of a joint program
 
 
 @dataclass(frozen=True)
@@ -58,3 +65,13 @@ class ScallopBudget:
     def rounding(self) -> float:
         """Error of leaving out poses of a tilted tool, mm."""
         return ROUNDING_SHARE * self.chordal_tolerance
+
+    @property
+    def arcs(self) -> float:
+        """Deviation of arcs and longer lines from the planned path, mm."""
+        return ARC_SHARE * self.chordal_tolerance
+
+    @property
+    def program(self) -> float:
+        """Rounding of corners by the control, and deviation of the blocks of a joint program, mm."""
+        return PROGRAM_SHARE * self.chordal_tolerance

@@ -51,9 +51,9 @@ SEEN = -0.02  # n_z above: the access direction sees it
 LEVEL = 1.0 - 1e-6  # n_z above: level
 UPRIGHT_STEP = 0.1  # mm, step down at which a sharp-cornered end must keep the scallop on a wall
 HOLDER_SLICES = 12
-MOST_WORK = 1.0e10
+MAX_WORK = 1.0e10
 SAMPLES = 400_000
-MOST_DENSITY = 100.0  # samples a mm²
+MAX_DENSITY = 100.0  # samples a mm²
 SEED = 7
 FOOT = 2.0  # deviations of the mesh: a sample is no farther from the face it lies on, else the foot is another place
 
@@ -356,7 +356,7 @@ def drawn(mesh: Any, setup: dict[str, Any], normals: Normals | None = None) -> D
     numbers = [None if v is None else {int(f[1:]) for f in v} for v in (ops["faces"], ops["exclude_faces"])]
     chosen = machinable(mesh, numbers[0], numbers[1])
     area = float(mesh.areas[chosen].sum())
-    points, triangles = scattered(mesh, chosen, int(min(SAMPLES, MOST_DENSITY * area) + 1))
+    points, triangles = scattered(mesh, chosen, int(min(SAMPLES, MAX_DENSITY * area) + 1))
     return Drawn(points, mesh.normals[triangles] if normals is None else normals(points, triangles), area)
 
 
@@ -403,10 +403,10 @@ def _fixtures(height: F64, grid: Grid, setup: dict[str, Any]) -> None:
 
 
 def default_step(mesh: Any, tools: list[BruteTool]) -> float:
-    """0.05 mm, or what keeps the dilation by the widest round tool at ``MOST_WORK`` sums."""
+    """0.05 mm, or what keeps the dilation by the widest round tool at ``MAX_WORK`` sums."""
     widest = max((t.radius for t in tools if t.corner > 0), default=1.0)
     size = mesh.bounds[1, :2] - mesh.bounds[0, :2] + 4.0 * widest
-    return max(0.05, (float(size[0] * size[1]) * math.pi * widest**2 / MOST_WORK) ** 0.25)
+    return max(0.05, (float(size[0] * size[1]) * math.pi * widest**2 / MAX_WORK) ** 0.25)
 
 
 def estimate(mesh: Any, setup: dict[str, Any], step: float | None = None,

@@ -33,7 +33,7 @@ import numpy as np  # noqa: E402
 from benchmarks.foreign.foreign_cases import CASES, samples_root  # noqa: E402
 from benchmarks.writing.stepnc_family import small  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
-from output.arc_fitting import SHARE, fitted, stretches  # noqa: E402
+from output.arc_fitting import fitted, stretches  # noqa: E402
 from output.program_grid import GridArc, pieces, to_grid  # noqa: E402
 from output.workplan import Workplan  # noqa: E402
 from service import pipeline  # noqa: E402
@@ -41,6 +41,7 @@ from service.from_wire import parse_setup  # noqa: E402
 from service.stages import programs  # noqa: E402
 from tests.arc_plans import off  # noqa: E402
 from toolpath.lines import thinned  # noqa: E402
+from toolpath.scallop_budget import ARC_SHARE  # noqa: E402
 from toolpath.workingsteps import TrajectoryKind  # noqa: E402
 from verify.gcode import block_motion  # noqa: E402
 from verify.gcode.reader import read_program  # noqa: E402
@@ -230,8 +231,8 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             for job in jobs(Path(folder), asked.seeds, asked.chordal):
                 print(row(job[0], Path(folder), *job[1:]), flush=True)
-    foreign(SHARE * asked.chordal)
-    million(SHARE * asked.chordal)
+    foreign(ARC_SHARE * asked.chordal)
+    million(ARC_SHARE * asked.chordal)
 
 
 if __name__ == "__main__":

@@ -30,7 +30,7 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
 
 LIST = Path(__file__).with_name("kernel_signatures.json")
-MOST_PROCESSES = 8
+MAX_PROCESSES = 8
 """More would wait for the longest chain of kernels that call one another."""
 
 SECONDS_OF_SILENCE = 2.0
@@ -146,13 +146,13 @@ def compile_listed(report: Report, kernels: Sequence[Listed] | None = None, proc
     """Compile what is listed and not in the cache, callees before callers, the longest way to the end first.
 
     report    : called when a kernel is done, and every two seconds
-    processes : as many as this process may use cores, at most ``MOST_PROCESSES``, for None
+    processes : as many as this process may use cores, at most ``MAX_PROCESSES``, for None
     """
     kernels = read_list() if kernels is None else kernels
     left = set(to_compile(kernels))
     if not left:
         return
-    processes = min(processes or _cores(), MOST_PROCESSES, len(left))
+    processes = min(processes or _cores(), MAX_PROCESSES, len(left))
     order = _Order(kernels, left)
     started, of = monotonic(), len(left)
     with ProcessPoolExecutor(processes, multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn"),

@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 
-from output.arc_fitting import SHARE as ARCS
 from schemas.setup import Lean
 from service.stages.access_plan import ProofFrame
 from service.stages.job_part import JobPart
@@ -17,6 +16,7 @@ from service.stages.preparation import Prepared, table_height
 from service.stages.programs import access_of, fixture_boxes, turning_of
 from service.stages.wall_support import FREE_RATIO, in_turn
 from toolpath.plan_settings import Pattern, PlanSettings, ToolLean
+from toolpath.scallop_budget import ARC_SHARE
 from toolpath.stock.stock_map import StockMap
 from toolpath.workingsteps import CutDirection
 from verify.model import ProofSetup
@@ -42,7 +42,7 @@ def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
     tops = [stock.highest, float(view.part.bounds[1, 2]) + q.stock_allowance_mm]
     tops.extend(float(f[1, 2]) for f in fixture_boxes(ready, view))
     floor = float(np.ceil(10.0 * (max(tops) + inputs.clearances.rapid + 0.1)) / 10.0)
-    chord = q.chordal_tolerance_mm * (1.0 - (ARCS if inputs.machine.arcs else 0.0))
+    chord = q.chordal_tolerance_mm * (1.0 - (ARC_SHARE if inputs.machine.arcs else 0.0))
     return PlanSettings(q.scallop_height_mm, chord, q.stock_allowance_mm, ready.lift, floor + ABOVE,
                         floor, float(RAMP_ANGLE), ops.roughing, ops.finishing, CutDirection(ops.cut_direction),
                         Pattern(ops.pattern), turning_of(ready, view), rates=inputs.rates,

@@ -33,6 +33,7 @@ from service.from_wire import (
     tool_bodies,
 )
 from toolpath.plan_settings import CutData
+from toolpath.scallop_budget import ScallopBudget
 from toolpath.tool_deflection import effective_diameter
 from verify.kinematics import Kinematics
 from zones.reach.assembly import Clearances
@@ -117,6 +118,11 @@ class JobInputs:
     def rotary_limits(self) -> F64 | None:
         """(2, 2) float64, rad: least and greatest angle of the tilting and the turning axis; None where not limited."""
         return rotary_limits(self.machine)
+
+    @property
+    def budget(self) -> ScallopBudget:
+        """The shares of the allowed scallop and of the chordal tolerance."""
+        return ScallopBudget(self.quality.scallop_height_mm, self.quality.chordal_tolerance_mm)
 
     @property
     def mesh_chord(self) -> float:

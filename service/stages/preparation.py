@@ -23,7 +23,6 @@ from service.stages.blank_model import Blank
 from service.stages.job_inputs import JobInputs
 from service.stages.job_part import Progress, read_job_part
 from service.stages.sample_spacing import coarse_sets, coarse_spacing
-from toolpath.scallop_budget import ScallopBudget
 from zones.features.decomposition import decompose
 from zones.lattice import lattice_step
 from zones.machinable_area import machinable_faces
@@ -168,8 +167,7 @@ def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True
     seen_from = _seen_from(inputs, rotations, search)
     samples = planning_samples(first, decomposition, inputs, seen_from @ rotations[0].T)
     channels = ChannelPlan.of(first, decomposition)
-    quality = inputs.quality
-    lift = max(ScallopBudget(quality.scallop_height_mm, quality.chordal_tolerance_mm).reach, 1.5 * part.chord)
+    lift = max(inputs.budget.reach, 1.5 * part.chord)
     views: list[View] = []
 
     def add_view(access: Access) -> None:

@@ -12,7 +12,6 @@ from geometry.errors import InternalError, OutputError
 from geometry.mesh import F64
 from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import ToolBody
-from output.arc_fitting import SHARE as ARCS
 from output.arc_fitting import fitted
 from output.clamping_sequence import MAX_AXIS_DEVIATION, home_of
 from output.gcode.dialects import DIALECTS, Switches
@@ -98,7 +97,7 @@ def _written(ready: Prepared, access: str, work: Workplan, end: str = "",
     machine = ready.inputs.machine
     switches = Switches(machine.high_speed, machine.haas_tcp, machine.heidenhain_plane, machine.siemens_cycle800)
     if machine.arcs:
-        work = fitted(work, ARCS * ready.inputs.quality.chordal_tolerance_mm)
+        work = fitted(work, ready.inputs.budget.arcs)
     dialects = {d: DIALECTS[d](switches) for d in machine.dialects}
     first = next((d for d, control in dialects.items() if control.bounds_path), machine.dialects[0])
     index = [view.id for view in ready.views].index(access)
@@ -199,7 +198,7 @@ def turning_of(ready: Prepared, view: View) -> RotaryAxes | None:
     machine = inputs.rotary
     if machine is None or not inputs.machine.simultaneous:
         return None
-    longest, tolerance = max(inputs.gauge_lengths.values()), 0.5 * inputs.quality.chordal_tolerance_mm
+    longest, tolerance = max(inputs.gauge_lengths.values()), inputs.budget.program
 
     rate, fastest = inputs.machine.rotary_rate_deg_min, inputs.rates.rapid
 

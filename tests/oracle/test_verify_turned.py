@@ -7,7 +7,7 @@ import pytest
 
 from tests.machined_cases import mill
 from tests.oracle.turning_twin import least_left, random_moves, random_rays, seen, signed
-from verify.kernels.pose import MOST_ANGLE, PIECE, fill_piece, near_segment2, pieces, turned, view
+from verify.kernels.pose import MAX_ANGLE, PIECE, fill_piece, near_segment2, pieces, turned, view
 from verify.kernels.profile import FINE, carried, standing
 from verify.material.point_tree import CHUNK, PointTree, curve_keys
 from verify.moves import BOW, Moves
@@ -40,7 +40,7 @@ def test_points_stay_within_the_bow_of_their_chords(seed):
         a, b = rng.uniform(-20, 20, (2, 3))
         reach, bow = rng.uniform(1, 120), float(rng.choice([5e-4, 0.01]))
         n = pieces(angle, float(np.linalg.norm(b - a)), reach, bow)
-        assert (n == 1) if angle == 0.0 else angle / n <= MOST_ANGLE
+        assert (n == 1) if angle == 0.0 else angle / n <= MAX_ANGLE
         for k in sorted({0, n // 2, n - 1}):
             fill_piece(piece, a, b, axis, about, angle, k, n)
             s = (k + inner) / n

@@ -29,11 +29,11 @@ from toolpath.lines import true_runs
 from toolpath.passes.cutter_locations import LOOK, OFFS, chorded, contacts, sides, tips
 from toolpath.passes.forward_step import PassProfile
 from toolpath.poses import Axes, Blocked, angles_between
+from toolpath.scallop_budget import SWING_SHARE, TIPS_SHARE
 from zones.reach.approach_cones import assembly
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import LEVEL_TOLERANCE
 
-SWING_SHARE = 0.1  # share of the chordal tolerance that turning between two locations may add
 ROUNDS = 16  # of halving stretches between which the axis turns too much
 MAX_PARTS = 1000  # parts of one step
 FADES = 0.2  # level part of a normal: with less of it the tool tilts less
@@ -119,7 +119,7 @@ def posed(profile: PassProfile, ends: F64, tool: ToolBody, axes: Axes, blocked: 
     looks = np.linspace(0.0, profile.length, int(np.ceil(profile.length / min(LOOK, 0.25 * tool.radius))) + 1)
     ends = _turned_through(profile, np.unique(np.concatenate([ends, looks])), axes, room, ends)
     if tool.radius > tool.corner_radius:
-        ends = chorded(ends, lambda w: _located(profile, w, tool, axes)[2], 0.5 * tolerance)
+        ends = chorded(ends, lambda w: _located(profile, w, tool, axes)[2], TIPS_SHARE * tolerance)
     high = tool.stickout + sum(h.length for h in tool.holder)
     swing = min(room, min(LOOK, 0.25 * tool.radius) / high)  # of the far end of the tool between two checks
     way = _turned_through(profile, np.unique(np.concatenate([ends, looks])), axes, swing)

@@ -34,7 +34,7 @@ SEGMENTS = np.array([
 ], dtype=np.int64)
 
 HALVINGS = 5  # of a chord
-MOST_PER_CHORD = 2 ** HALVINGS
+MAX_PER_CHORD = 2 ** HALVINGS
 
 
 class TipLimits(NamedTuple):
@@ -195,7 +195,7 @@ def refine(tree: TreeArrays, limits: TipLimits, points, follows, z, tol, reach, 
     """Points put in on every chord that leaves the true boundary by more than tol.
 
     points  : (n, 2); follows : (n,) the point each is joined to, -1 for none
-    out     : (n, MOST_PER_CHORD, 2), count : (n,): the point itself and those put in behind it, in order
+    out     : (n, MAX_PER_CHORD, 2), count : (n,): the point itself and those put in behind it, in order
     """
     for k in prange(len(points)):
         out[k, 0, 0], out[k, 0, 1] = points[k, 0], points[k, 1]

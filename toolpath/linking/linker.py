@@ -37,6 +37,7 @@ from toolpath.lines import Line, dense, pieces_where, thinned
 from toolpath.linking.lead_arcs import arcs_along
 from toolpath.linking.ramp_entry import RAMP_SHARE, head_of, way_down
 from toolpath.linking.rapid_travel import Motions, Travel
+from toolpath.scallop_budget import LEAD_SHARE
 from toolpath.stock.cut_history import Depths, still_to_walk
 from toolpath.stock.engagement import UNBOUNDED, skims, within
 from toolpath.stock.stock_map import SURE_RIM, StockMap
@@ -297,7 +298,7 @@ class Linker:
             return (self.go.free(tips) and not bool(self.found.bars(tool, tips).any())
                     and self._lane(tips, MAX_OVER * self.motions.step_down))
 
-        for arc in arcs_along(self.field, at, way, length, 0.5 * self.motions.tolerance):
+        for arc in arcs_along(self.field, at, way, length, LEAD_SHARE * self.motions.tolerance):
             walked = arc if onto else np.ascontiguousarray(arc[::-1])
             if int(self.depths.were_cut(walked).sum()) <= MAX_AGAIN and free(arc):
                 return walked

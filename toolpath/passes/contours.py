@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
 from toolpath.kernels.contour import (
-    MOST_PER_CHORD,
+    MAX_PER_CHORD,
     SEGMENTS,
     TipLimits,
     chords_free,
@@ -128,10 +128,10 @@ def _traced(field: TipField, z: float, active: NDArray[np.bool_], tolerance: flo
     xy[exact] = placed
     both = exact & (follows >= 0)
     both[both] = exact[follows[both]]
-    fine, count = np.empty((len(ids), MOST_PER_CHORD, 2)), np.empty(len(ids), np.int64)
+    fine, count = np.empty((len(ids), MAX_PER_CHORD, 2)), np.empty(len(ids), np.int64)
     refine(field.tree.arrays, limits, xy, np.where(both, follows, -1), z + LEVEL_TOLERANCE, tolerance, lat.step, fine,
            count)
-    points = fine[np.arange(MOST_PER_CHORD) < count[:, None]]
+    points = fine[np.arange(MAX_PER_CHORD) < count[:, None]]
     begins = np.concatenate([[0], np.cumsum(count)])[starts]
     if not exact.all():
         beside = ~exact

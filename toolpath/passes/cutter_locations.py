@@ -21,6 +21,7 @@ from geometry.tool_body import ToolBody
 from toolpath.lines import thinned, true_runs
 from toolpath.passes.dragged_path import STEEPEST, Limit
 from toolpath.passes.forward_step import PassProfile
+from toolpath.scallop_budget import TIPS_SHARE
 
 FLAT = 1e-6  # part of a normal across the axis: with less the place is level, and a flat end touches it anywhere
 LOOK, FINE = 0.25, 0.02  # mm between checks for obstacles, and between checks at one
@@ -141,7 +142,7 @@ def lifted(profile: PassProfile, ends: F64, tool: ToolBody, limit: Limit, tolera
     limit, and other passes take what it leaves. Where the limit is higher than ``max_rise``, or jumps, the pass breaks.
     """
     if tool.radius > tool.corner_radius:
-        ends = chorded(ends, lambda w: _tips(profile, w, tool), 0.5 * tolerance)
+        ends = chorded(ends, lambda w: _tips(profile, w, tool), TIPS_SHARE * tolerance)
     looks = np.linspace(0.0, profile.length, int(np.ceil(profile.length / min(LOOK, 0.25 * tool.radius))) + 1)
     way = np.unique(np.concatenate([ends, profile.ways, looks]))
     made, high = _against(profile, way, tool, limit, off)
@@ -154,7 +155,7 @@ def lifted(profile: PassProfile, ends: F64, tool: ToolBody, limit: Limit, tolera
     way = np.unique(np.concatenate([way[np.isin(way, ends) | over], *more]))
     made, rise = _raised(profile, way, tool, limit, off)
     for _ in range(ROUNDS):
-        under = _under(made, rise, limit, 0.5 * tolerance)
+        under = _under(made, rise, limit, TIPS_SHARE * tolerance)
         if not under.any():
             break
         between = 0.5 * (way[1:] + way[:-1])[under]
@@ -164,8 +165,8 @@ def lifted(profile: PassProfile, ends: F64, tool: ToolBody, limit: Limit, tolera
         made = np.concatenate([made, tip])[order]
     whole = (rise <= (tool.radius if max_rise is None else max_rise)) & np.isfinite(rise)
     steep = np.abs(np.diff(rise)) > STEEPEST * np.diff(way)  # the pass itself may be as steep as it is
-    runs = true_runs(whole[1:] & whole[:-1] & ~steep & ~_under(made, rise, limit, 0.5 * tolerance))
-    return [thinned(made[i:j + 1], 0.5 * tolerance) for i, j in runs], True
+    runs = true_runs(whole[1:] & whole[:-1] & ~steep & ~_under(made, rise, limit, TIPS_SHARE * tolerance))
+    return [thinned(made[i:j + 1], TIPS_SHARE * tolerance) for i, j in runs], True
 
 
 def _raised(profile: PassProfile, way: F64, tool: ToolBody, limit: Limit, off: float) -> tuple[F64, F64]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from toolpath.lines import thinned, true_runs
+from toolpath.scallop_budget import TIPS_SHARE
 
 SMALLEST = 0.004  # mm: a tip path that still rises steeper than STEEPEST over this is broken
 STEEPEST = 4.0
@@ -77,8 +78,8 @@ def pieces(limit: Limit, way: F64, step: float, tolerance: float) -> list[F64]:
 
     Half of the tolerance goes to thinning. Of the other half a part is reserved for a kink between two sampled places.
     """
-    points, broken = follow(limit, way, step, KINK * 0.5 * tolerance)
-    return [thinned(points[i:j + 1], 0.5 * tolerance) for i, j in true_runs(~broken)]
+    points, broken = follow(limit, way, step, KINK * TIPS_SHARE * tolerance)
+    return [thinned(points[i:j + 1], TIPS_SHARE * tolerance) for i, j in true_runs(~broken)]
 
 
 def _places(way: F64, corners: F64, s: F64) -> F64:

@@ -26,6 +26,7 @@ from toolpath.cutter.cutter import Cutter
 from toolpath.cutter.swept_envelope import Envelope
 from toolpath.passes.dragged_path import KINK, Limit, pieces
 from toolpath.root_finding import roots
+from toolpath.scallop_budget import TIPS_SHARE
 
 I64 = NDArray[np.int64]
 
@@ -171,7 +172,7 @@ class Family(ABC):
         if cutter.outline is not None:
             arcs = cutter.outline.stack.rows[:, ARC]
             r = float(arcs[arcs > 0.0].min(initial=cutter.radius))
-        return max(min(8.0 * math.sqrt(2.0 * r * 0.5 * KINK * self.promise.chord), 0.5 * r), 0.02)
+        return max(min(8.0 * math.sqrt(2.0 * r * TIPS_SHARE * KINK * self.promise.chord), 0.5 * r), 0.02)
 
     def between(self, a: float, b: float) -> slice:
         """Samples with a < t <= b."""

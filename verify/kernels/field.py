@@ -36,7 +36,7 @@ from verify.kernels.tables import F64, I64, AxisArrays, ContactLimits, MoveArray
 LEAST_CUT = 1e-5
 NEAR = 1e-9  # mm, more than rounding of a distance
 RISE = 0.02  # mm: a tool that goes up goes no further between two looks at its bodies, where they met what stood before
-MOST_LOOKS = 128
+MAX_LOOKS = 128
 VOLUME_UNITS = 1e9
 
 
@@ -386,7 +386,7 @@ def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, tw
                     seen = _seen_tile(piece, cx, cy, cz, rad + band)
                     _look(stock, bricks, piece, tools, k, seen, True, False, 0.0, slack, trial)
                 if _any_depth(trial):
-                    n = max(n, min(math.ceil(math.sqrt(length2) / RISE), MOST_LOOKS))
+                    n = max(n, min(math.ceil(math.sqrt(length2) / RISE), MAX_LOOKS))
         for i in range(len(totals)):
             totals[i] = 0.0
         for part in range(n):

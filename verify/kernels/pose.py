@@ -21,7 +21,7 @@ from numba import njit
 
 from geometry.kernels.options import KERNEL
 
-MOST_ANGLE = 0.1
+MAX_ANGLE = 0.1
 PIECE = 31
 # A piece is 31 numbers: 0:9 tip and rows y, z at its start, 9:18 the same at its end, 18:21 row w, which both share,
 # 21:27 rows y, z half way, 27:30 the displacement seen by the tool where it does not turn, 30 the angle of the piece.
@@ -33,7 +33,7 @@ def pieces(angle, length, reach, bow):
     if angle == 0.0:
         return 1
     n = math.sqrt((angle * angle * reach + 2.0 * angle * length) / (8.0 * bow))
-    return max(1, math.ceil(max(n, angle / MOST_ANGLE)))
+    return max(1, math.ceil(max(n, angle / MAX_ANGLE)))
 
 
 @njit(**KERNEL)

@@ -4,9 +4,9 @@ import type { Mode } from "../scene/part";
 import { add, el, swatch } from "../shared/dom";
 import type { ViewHead } from "../shared/view-file";
 
-const MOST_WALLS = 8;
-const MOST_CONNECTIONS = 6;
-const MOST_ZONES = 10;
+const MAX_WALLS = 8;
+const MAX_CONNECTIONS = 6;
+const MAX_ZONES = 10;
 
 /** `drawn`: T numbers of the tools whose paths are drawn; `stock`: whether the stock is. */
 export function legendOf(h: ViewHead, mode: Mode, drawn: Set<number>, stock: boolean): (Node | null)[] {
@@ -32,14 +32,14 @@ function scale(h: ViewHead): Node[] {
 }
 
 function wallEntries(h: ViewHead): HTMLElement {
-  const ids = h.connections.slice(0, MOST_CONNECTIONS).map((c) => c.id).join(" ");
-  return entries(...h.walls.slice(0, MOST_WALLS).map((w, i) => entry(css(wallColour(i)), w.id)), more(h.walls.length - MOST_WALLS),
+  const ids = h.connections.slice(0, MAX_CONNECTIONS).map((c) => c.id).join(" ");
+  return entries(...h.walls.slice(0, MAX_WALLS).map((w, i) => entry(css(wallColour(i)), w.id)), more(h.walls.length - MAX_WALLS),
     h.connections.length ? entry(css(CONNECTION), `connection${h.connections.length > 1 ? "s" : ""} ${ids}`) : null,
     entry(css(UNNAMED), "floor and other faces"));
 }
 
 function zoneEntries(h: ViewHead): HTMLElement {
-  return entries(...h.zones.slice(0, MOST_ZONES).map((z, i) => entry(css(zoneColour(i)), z.id)), more(h.zones.length - MOST_ZONES),
+  return entries(...h.zones.slice(0, MAX_ZONES).map((z, i) => entry(css(zoneColour(i)), z.id)), more(h.zones.length - MAX_ZONES),
     h.remainder.length ? entry(REMAINDER_CSS, "remainder", true) : null, entry(css(OTHER), "in no zone"));
 }
 

@@ -4,7 +4,7 @@ import type { JobScene } from "../scene/scene";
 import { el } from "../shared/dom";
 import type { ViewHead } from "../shared/view-file";
 
-const MOST_NAMES = 40; // of walls, and of connections
+const MAX_NAMES = 40; // of walls, and of connections
 const [NAME_WIDTH, NAME_HEIGHT] = [26, 18]; // px that a name takes
 const HIDDEN_MS = 120; // from the last frame to the search for hidden names
 const AWAY = "translate(-999px, -999px)";
@@ -20,7 +20,7 @@ export class Markers {
 
   begin(h: ViewHead): void {
     for (const [list, kind] of [[h.walls, "wall"], [h.connections, "connection"]] as const)
-      for (const { id, at_mm } of list.slice(0, MOST_NAMES))
+      for (const { id, at_mm } of list.slice(0, MAX_NAMES))
         if (at_mm) {
           const node = el("span", { class: `name ${kind}` }, id);
           this.names.appendChild(node);

@@ -7,7 +7,7 @@ import { stateBadge } from "../shared/wording";
 import { JobForm } from "./job-form";
 
 const PAGE_LENGTH = 30;
-const MOST_STREAMS = 3; // a browser keeps six connections to a host, and the page needs some itself
+const MAX_STREAMS = 3; // a browser keeps six connections to a host, and the page needs some itself
 const POLL_MS = 4000;
 const KINDS: Record<string, string> = { plan: "job", zones: "dry check", verify: "verification" };
 
@@ -51,7 +51,7 @@ let streams = 0;
 
 /** Follows a job by its events, or by polling while many jobs run; returns the job as it ended. */
 async function watch(job: Job, onProgress: OnProgress, onLost: (why: string) => void): Promise<Job> {
-  if (streams < MOST_STREAMS) {
+  if (streams < MAX_STREAMS) {
     streams++;
     try {
       await follow(job, onProgress, onLost);
@@ -72,7 +72,7 @@ async function watch(job: Job, onProgress: OnProgress, onLost: (why: string) => 
     }
     if (FINAL.has(now.state)) return now;
     onProgress(now);
-    if (streams < MOST_STREAMS) return watch(now, onProgress, onLost);
+    if (streams < MAX_STREAMS) return watch(now, onProgress, onLost);
   }
 }
 

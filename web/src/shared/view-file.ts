@@ -143,7 +143,7 @@ export type Table = Record<string, Int32Array>;
 const NEWEST_VERSION = 2; // of a file that this page can read
 const MAGIC = "ZMVIEW1\n";
 
-const MOST_HEAD_BYTES = 1 << 28;
+const MAX_HEAD_BYTES = 1 << 28;
 
 /** A view file that this page cannot read; the message gives the remedy. */
 export class BrokenView extends Error {}
@@ -234,7 +234,7 @@ export async function readView(
   if (new TextDecoder().decode(start.subarray(0, 8)) !== MAGIC)
     throw new BrokenView("The view file has an unknown format. Load the page again. If that does not help, another version of zonemill made the file.");
   const length = new DataView(start.buffer).getUint32(8, true);
-  const head = JSON.parse(new TextDecoder().decode(await inflate(await bytes.take(length), MOST_HEAD_BYTES))) as ViewHead;
+  const head = JSON.parse(new TextDecoder().decode(await inflate(await bytes.take(length), MAX_HEAD_BYTES))) as ViewHead;
   if (head.version > NEWEST_VERSION) throw new BrokenView("A later version of zonemill made the view file. Open it with that version.");
   onHead(head);
   for (const entry of head.chunks) onChunk(entry, columnsOf(await inflate(await bytes.take(entry.size), bytesOf(entry.columns)), entry.columns));
