@@ -252,6 +252,9 @@ def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: Scor
     out.close, out.close_residual = close, residual[between]
     out.guard, out.edge, out.reach = guard.points, edge, reach
     out.gouge_max = max(float(-residual.min(initial=0.0)), 0.0)
+    out.notes += [f"{tools[k].id} is a {tools[k].kind.replace('_', ' ')} and cuts into the part: where the part shows "
+                  "the hole before the thread, give the diameter of that hole as diameter_mm"
+                  for k in np.unique(moves.tool[mover[deep]]) if tools[k].kind in ("tap", "thread_mill")]
     tips = tip_gouges(part.mesh, moves, tools, source, setup.gouge_tolerance + RAY_ERROR)
     out.gouge_max = max([out.gouge_max, *(f.depth for f in tips)])
     out.gouges = [*gouge_findings(points[deep], face[deep], -residual[deep], area[deep], mover[deep], source,

@@ -19,6 +19,7 @@ from service.from_wire import parse_setup
 from service.pipeline import verify_program
 from service.verification.program_first import read_first
 from tests.step_files import write_step
+from tests.time_limits import in_time
 
 CASES = Path(__file__).resolve().parents[3] / "shared" / "cases"
 NC, PLATE = CASES / "nc", CASES / "parts" / "plain_plate_300.step"
@@ -80,7 +81,7 @@ def test_the_refusal_comes_before_the_plate_is_read(tmp_path):
                           str(tmp_path / "setup.json"), "--program", str(NC / "fanuc_typical.nc")],
                          capture_output=True, text=True, check=False, cwd=Path(__file__).resolve().parents[2])
     assert got.returncode == 2 and "M98 P2000" in got.stderr and "prove" not in got.stderr
-    assert time.monotonic() - began < 10.0  # 1 s on an idle core
+    assert in_time(time.monotonic() - began, 2.0)
 
 
 @pytest.mark.slow
