@@ -3,19 +3,21 @@
 Run from the root of the checkout: ``python benchmarks/faults/planted_offsets.py [--sizes 0.3,5] [--ways +X,-Z]
 [--programs A,B] [--rows FILE]``. The programs are plans of small parts in five dialects, whole and of one operation
 each, one by hand on five axes, and, where the collection of cases lies beside the checkout, one of its programs. The
-operation on the dome also takes stock off the plane around its foot, so its setup names the face that it works on; the
-other setups name none. Offsets go along X, Y and Z, both ways, into one tool length, and into the work offset. The smallest is twice the larger of scallop and gouge
-tolerance.
+operation on the dome and the one on five axes also take stock off a plane beside their face, so their setups name the
+face; the other setups name none. Offsets go along X, Y and Z, both ways, into one tool length, and into the work offset.
+The smallest is twice the larger of scallop and gouge tolerance.
 
-Whether an offset changes anything is judged without the code under test: some sample that the right program leaves
-within tolerance must be out of it, by its residual alone. Depth and height are judged where such a sample faces along
-the offset, and where so much stock stands on it, or the offset goes into it. Right means within 10 % or 5 µm.
+Whether an offset changes anything is judged without the code under test: some samples of a face that is asked, which
+the right program leaves within tolerance, must be out of it by their residuals alone, or some sample of any face is
+gouged. Depth and height that must be found are the largest part of the offset along the normals of such samples of one
+face, if so much stock stands there, or the offset goes into it. Right means within 10 % or 5 µm.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import re
 import sys
 import tempfile
@@ -73,14 +75,14 @@ class Case:
 
 @dataclass(frozen=True)
 class Row:
-    """One planted offset: whether it changes what is cut, whether a face stands square to it, the state, and the
-    finding that is nearest to it, mm."""
+    """One planted offset: whether it changes what is cut, what it makes on an asked face (None where that is nothing, or
+    more than the stock), the state, and the finding that is nearest to that, mm."""
 
     program: str
     where: str
     size: float
     changes: bool
-    square: bool
+    expected: float | None
     state: str
     nearest: float | None
     kind: str
@@ -124,7 +126,7 @@ def cases(folder: Path, wanted: set[str]) -> Iterator[Case]:
     if not wanted or "slope-five" in wanted:
         step = write_step(shapes()["slope"][0], folder / "slope-five.step")
         setup = parse_setup(json.dumps({
-            "tools": [FLAT], "quality": {"scallop_height_mm": 0.02}, "stock": {"margin_mm": 1.0, "uncertainty_mm": 0.0},
+            "tools": [FLAT], "operations": {"faces": ["F7"]}, "quality": {"scallop_height_mm": 0.02}, "stock": {"margin_mm": 1.0, "uncertainty_mm": 0.0},
             "machine": {"kind": "5-axis", "kinematics": "table-table-AC", "tcp": True, "dialects": ["siemens"]}}))
         yield Case("slope-five", read_job_part(step, setup, _quiet), setup, five_axis_text(), ".mpf")
     if (CASES / "nc" / "pocket_ok.ngc").is_file() and (not wanted or "pocket_ok" in wanted):
@@ -142,13 +144,13 @@ def five_axis_text() -> str:
         return f"X{x:.6f} Y{y:.6f} Z{z:.6f}"
 
     axis = " ".join(f"{k}3={v:.9f}" for k, v in zip("ABC", normal, strict=True))
-    lines = ["G710 G17 G90 G94 G54", "T1 M6", "D1", "S6000 M3 M8", "SUPA G0 Z0 D0", "G54 D1", "G0 A0 C0", "TRAORI", "G54",
-             "ORIWKS", "G0 X11 Y-5 Z60", f"G0 {words(0.5, -5.0, 30.0)} {axis}"]
+    lines = ["G710 G17 G90 G94 G54", "T1 M6", "D1", "S6000 M3 M8", "SUPA G0 Z0 D0", "G54 D1", "G0 A0 C0", "TRAORI",
+             "G54", "ORIWKS", "G0 X11 Y-5 Z60", f"G0 {words(0.5, -5.0, 30.0)} {axis}"]
     for s in (0.5, 3.5, 6.5, 9.5):
         lines += [f"G0 {words(s, -5.0, 5.0)}", f"G1 {words(s, -5.0, 0.0)} F300", f"G1 {words(s, 17.0, 0.0)}",
                   f"G0 {words(s, 17.0, 5.0)}"]
-    return "\n".join([*lines, f"G0 {words(9.5, 17.0, 30.0)}", "G0 Z60 A3=0 B3=0 C3=1", "TRAFOOF", "SUPA G0 Z0 D0", "M30",
-                      ""])
+    return "\n".join([*lines, f"G0 {words(9.5, 17.0, 30.0)}", "G0 Z60 A3=0 B3=0 C3=1", "TRAFOOF", "SUPA G0 Z0 D0",
+                      "M30", ""])
 
 
 def _quiet(_stage: str, _share: float) -> None:
@@ -202,27 +204,37 @@ def planted(case: Case, sizes: tuple[float, ...]) -> Iterator[tuple[str, np.ndar
         yield "G55", np.zeros(3), case.text.replace("G54", "G55")
 
 
-def is_square(right: ProgramProof, made: ProgramProof, out: np.ndarray, by: np.ndarray) -> bool:
-    """Whether some of the samples (n,) that went out of tolerance show the whole offset (3,) mm."""
-    gouged = made.proof.residual[out] < 0.0
-    s, size = right.samples.subset(out), float(np.linalg.norm(by))
-    along = s.normals @ by / max(size, 1e-9)
-    stock = stock_on_normals(s.points, s.normals, right.frame.part.mesh.bounds, right.conditions, 100.0)
-    return bool(((along > 0.999) & (stock >= size) & ~gouged).sum() + ((along < -0.999) & gouged).sum() > CHANGED)
+def shown(right: ProgramProof, made: ProgramProof, out: np.ndarray, by: np.ndarray) -> list[float]:
+    """What an offset (3,) mm makes on the faces that are asked: for each, the largest part of it along the normals of
+    its samples that went out of tolerance (n,); faces where it is more than the stock are left out."""
+    asked = {int(f[1:]) for f in right.report["asked"]["faces"]}
+    faces = {}
+    for face in np.unique(right.samples.face[out]).tolist():
+        rows = np.flatnonzero(out & (right.samples.face == face))
+        s = right.samples.subset(rows)
+        gouged, along = made.proof.residual[rows] < 0.0, s.normals @ by
+        most = float(np.abs(along).max())
+        stock = stock_on_normals(s.points, s.normals, right.frame.part.mesh.bounds, right.conditions, 100.0)
+        near = (np.abs(along) > 0.98 * most) & np.where(along > 0.0, (stock >= most) & ~gouged, gouged)
+        if face in asked and near.sum() > CHANGED:
+            faces[face] = most
+    return list(faces.values())
 
 
 def judge(case: Case, right: ProgramProof, where: str, by: np.ndarray, text: str) -> Row:
-    """Prove a text with an offset and look for the finding that is nearest to it."""
+    """Prove a text with an offset and look for the finding that is nearest to what it makes."""
     begin, size = time.monotonic(), float(np.linalg.norm(by))
     made = case.proof(text)
     good = np.asarray(right.proof.proved, np.bool_)
     out = good & ~proved_samples(made.proof.residual, made.conditions)
+    wanted = shown(right, made, out, by)
+    harm = bool((out & (made.proof.residual < 0.0)).sum() > CHANGED)
     depths = [(abs(f.depth), str(f.kind)) for f in made.proof.findings if str(f.kind) in ("gouge", "stock_left")]
-    nearest = min(depths, key=lambda d: abs(d[0] - size), default=(None, ""))
-    fits = nearest[0] is not None and abs(nearest[0] - size) <= max(0.1 * size, 0.005)
-    changes = int(out.sum()) > CHANGED or where == "G55"
-    square = changes and is_square(right, made, out, by)
-    return Row(case.name, where, size, changes, square, made.report["state"], *nearest, fits,
+    pairs = [(abs(d - w) / max(0.1 * w, 0.005), w, d, kind) for w in wanted for d, kind in depths]
+    off, expected, nearest, kind = min(pairs, default=(math.inf, max(wanted, default=None), None, ""))
+    asked = np.isin(right.samples.face, [int(f[1:]) for f in right.report["asked"]["faces"]])
+    changes = int((out & asked).sum()) > CHANGED or harm or where == "G55"
+    return Row(case.name, where, size, changes, expected, made.report["state"], nearest, kind, off <= 1.0,
                round(time.monotonic() - begin, 2))
 
 
@@ -251,7 +263,7 @@ def main() -> None:
                     continue
                 row = judge(case, right, where, by, text)
                 rows.append(row)
-                wrong = row.changes and (row.state == "proved" or row.square and not row.right)
+                wrong = row.changes and (row.state == "proved" or row.expected is not None and not row.right)
                 if wrong or not row.changes:
                     print("  ", "WRONG" if wrong else "nothing changes", row, flush=True)
     if given.rows:
@@ -261,12 +273,12 @@ def main() -> None:
 
 def table(rows: list[Row]) -> None:
     """Print one row for each program."""
-    print("| program | offsets | change something | proved of these | square to a face | of these right |")
+    print("| program | offsets | change something | proved of these | with a depth to find | of these right |")
     print("|---|---|---|---|---|---|")
     for name in dict.fromkeys(r.program for r in rows):
         own = [r for r in rows if r.program == name]
         change = [r for r in own if r.changes]
-        square = [r for r in change if r.square]
+        square = [r for r in change if r.expected is not None]
         print(f"| {name} | {len(own)} | {len(change)} | {sum(r.state == 'proved' for r in change)} | {len(square)} | "
               f"{sum(r.right for r in square)} |")
 

@@ -69,7 +69,8 @@ def deep_findings(samples: SurfaceSamples, residual: F64, mover: I32, cutting: C
     """A finding for each face into which the cut goes farther than the depth of its gouges below the surface.
 
     The cut goes as far as the way along the normal; beside a place of the same face that stands, as far as the shortest
-    way, since a cut that passes along a face takes away whole rays below its edge.
+    way, since a cut that passes along a face takes away whole rays below its edge. Places that are cut right through
+    count only where the whole face is: what remains lies aside of them, up to 15 % farther.
 
     samples  : SurfaceSamples, n of them, frame of the proof
     residual : (n,) float64, mm, negative where gouged
@@ -85,9 +86,9 @@ def deep_findings(samples: SurfaceSamples, residual: F64, mover: I32, cutting: C
     along, way = ways_in(samples.points[tried], samples.normals[tried], cutting)
     aside = distance_aside(samples, np.flatnonzero(np.isin(samples.face, faces) & (residual >= -DEEP)), tried)
     way = np.where((aside > ASIDE * way + ASIDE_ROOM) & np.isfinite(along), along, way)
-    out = []
-    for mine, own in zip(chosen, np.split(way, np.cumsum([len(c) for c in chosen])[:-1]), strict=True):
-        known = np.flatnonzero(np.isfinite(own))
+    out, parts = [], np.cumsum([len(c) for c in chosen])[:-1]
+    for mine, own, straight in zip(chosen, np.split(way, parts), np.split(along, parts), strict=True):
+        known = np.flatnonzero(np.isfinite(own) & (np.isfinite(straight) | ~np.isfinite(straight).any()))
         if not len(known):
             continue
         order = known[np.argsort(own[known], kind="stable")]
