@@ -1,4 +1,4 @@
-"""Programs whose paths are drawn by hand: words of five axes, and tasks of the kind that manuals of controls work through.
+"""Programs whose paths are drawn by hand: words of five axes, and tasks of the kind that manuals work through.
 
 The places follow from the meaning that the manual gives each word, by rotation matrices and elementary geometry; no
 code of the reader takes part.
@@ -50,7 +50,7 @@ def _on(plane, shift, places):
 
 
 def _plane(plane, shift=(0, 0, 0)):
-    """The path of the moves that every tilted program here makes: rapids to (10, 20, 30), feeds down, along and across."""
+    """The path that every tilted program here has: a rapid to (10, 20, 30), feeds down, along and across."""
     first, down, along, across = _on(plane, shift, [(10, 20, 30), (10, 20, -2), (25, 20, -2), (25, 35, -2)])
     axis = tuple(plane[:, 2])
     return [rapid(*first, axis=axis), feed(*down, axis=axis), feed(*along, axis=axis), feed(*across, axis=axis)]
@@ -108,8 +108,8 @@ FIVE = {
     "PLANE SPATIAL": Drawn("heidenhain", HEIDENHAIN + "TRANS DATUM AXIS X+5 Y+6\nPLANE SPATIAL SPA+20 SPB+30 SPC+40 "
                            "TURN MB MAX FMAX\n" + H_PLANE, _plane(_z(40) @ _y(30) @ _x(20), (5, 6, 0)),
                            "table-table-AC"),
-    "PLANE EULER": Drawn("heidenhain", HEIDENHAIN + "L Z+0 FMAX M91\nPLANE EULER EULPR+30 EULNU+20 EULROT+50 TURN FMAX\n"
-                         + H_PLANE, _plane(_z(30) @ _x(20) @ _z(50)), "table-table-BC"),
+    "PLANE EULER": Drawn("heidenhain", HEIDENHAIN + "L Z+0 FMAX M91\nPLANE EULER EULPR+30 EULNU+20 EULROT+50 TURN "
+                         "FMAX\n" + H_PLANE, _plane(_z(30) @ _x(20) @ _z(50)), "table-table-BC"),
     "PLANE VECTOR": Drawn("heidenhain", HEIDENHAIN + "L Z+0 FMAX M91\nPLANE VECTOR BX+1 BY+0 BZ+0 NX+0 NY-0.6 NZ+0.8 "
                           "TURN FMAX\n" + H_PLANE, _plane(np.array([[1, 0, 0], [0, 0.8, -0.6], [0, 0.6, 0.8]])),
                           "table-table-AC"),
@@ -140,7 +140,8 @@ THREE = {
         "siemens", SIEMENS + "G0 X0 Y0 Z-5\nMIRROR X0\nASCALE X0.5 Y0.5\nG1 X20 Y10\nG2 X40 Y10 I10 J0\nSCALE\nMIRROR\n"
         "G1 X0 Y0\n", [rapid(0, 0, -5), feed(-10, 5, -5), arc((-15, 5), 180, -20, 5, -5), feed(0, 0, -5)]),
     "places by AC and IC": Drawn(
-        "siemens", SIEMENS + "G0 X0 Y0 Z0\nG91 G1 X10 Y=AC(5)\nX=IC(5) Y2\nG90 X=IC(-3) Y1\nG2 X20 Y9 I=AC(20) J=AC(1)\n",
+        "siemens", SIEMENS + "G0 X0 Y0 Z0\nG91 G1 X10 Y=AC(5)\nX=IC(5) Y2\nG90 X=IC(-3) Y1\nG2 X20 Y9 I=AC(20) "
+        "J=AC(1)\n",
         [rapid(0, 0, 0), *lines((10, 5, 0), (15, 7, 0), (12, 1, 0)), arc((20, 1), -90, 20, 9, 0)]),
     "fixed cycles in a row": Drawn(
         "fanuc", FANUC + "G99 G81 X10. Y10. Z-5. R2.\nG91 X10. K3\nG90 G80\n",
@@ -177,8 +178,8 @@ THREE = {
                                         for p in ([rapid(x, y, 5)] if n else []) + [rapid(x, y, 2), feed(x, y, -2),
                                                                                     rapid(x, y, 5)])]),
     "a bolt circle by LinuxCNC": Drawn(
-        "linuxcnc", "G21 G90 G17 G94\nT1 M6 G43\nS900 M3 F200\nG0 X0 Y0 Z5\nO1 sub\nO2 repeat [#4]\nG1 X[#1+#3*COS[#5]] "
-        "Y[#2+#3*SIN[#5]]\n#5=[#5+90]\nO2 endrepeat\nO1 endsub\nO1 call [10] [20] [8] [4] [45]\n",
+        "linuxcnc", "G21 G90 G17 G94\nT1 M6 G43\nS900 M3 F200\nG0 X0 Y0 Z5\nO1 sub\nO2 repeat [#4]\nG1 "
+        "X[#1+#3*COS[#5]] Y[#2+#3*SIN[#5]]\n#5=[#5+90]\nO2 endrepeat\nO1 endsub\nO1 call [10] [20] [8] [4] [45]\n",
         [rapid(0, 0, 5), *lines(*((10 + 8 * math.cos(math.radians(45 + 90 * k)),
                                    20 + 8 * math.sin(math.radians(45 + 90 * k)), 5) for k in range(4)))]),
 }

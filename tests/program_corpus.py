@@ -30,39 +30,43 @@ WORDS = {
     "O-words": r"^\s*O\S+ *(?:SUB|CALL|WHILE|REPEAT|IF)\b", "L NAME P": r"^(?:N\d+ )?(?:L\d+|WAY|POCKET_ROUGH|TWICE)\b",
     "CALL LBL, REP": r"\bCALL LBL\b", "PROC, RET, M17": r"\bPROC\b", "EXTCALL, CALL PGM": r"\bEXTCALL\b|\bCALL PGM\b",
     "# variables": r"#", "R variables": r"\bR\d+ *=|=R\d", "Q variables": r"\bQ[LR]?\d+ *= *[+\d(SQ]|FN \d",
-    "FN 0 to 13": r"\bFN \d", "jumps and loops": r"\b(?:GOTO[FBC]?|WHILE|FOR|REPEATB?|LOOP|CASE|IF)\b", "G10": r"\bG10\b",
+    "FN 0 to 13": r"\bFN \d", "jumps and loops": r"\b(?:GOTO[FBC]?|WHILE|FOR|REPEATB?|LOOP|CASE|IF)\b",
+    "G10": r"\bG10\b",
     "tool by name": r'\bT="|TOOL CALL "', "preselected tool": r"^T\d+\n(?!M0?6)", "TRANS, ATRANS": r"\bA?TRANS [XYZ]",
     "ROT, AROT, cycle 10, G68": r"\bA?ROT (?:[XYZ]|RPL)|CYCL DEF 10\.|\bG68\b",
     "MIRROR, cycle 8, G51.1, G101": r"\bA?MIRROR [XYZ]|CYCL DEF 8\.|\bG51\.1|\bG101\b",
     "SCALE, cycle 11, G51": r"\bA?SCALE [XYZ]|CYCL DEF 11\.|\bG51\b", "datum shift, G52, G92": r"\bG52\b|\bG92\b|DATUM",
     "AC( ), IC( )": r"\b(?:AC|IC)\(", "turns over 360 deg": r"\bTURN=|\bIPA[+-]\d{4}|\bG[23]\b.*\bP[2-9]",
     "RND, CHF, CHR": r"\b(?:RND|RNDM|CHF|CHR)\b", "APPR, DEP": r"\b(?:APPR|DEP)\b",
-    "canned cycles: LinuxCNC, Fanuc, Haas": r"\bG(?:73|74|76|8[1-9])\b", "canned cycles: Siemens": r"\bCYCLE8[1-9]|HOLES|G331",
+    "canned cycles: LinuxCNC, Fanuc, Haas": r"\bG(?:73|74|76|8[1-9])\b",
+    "canned cycles: Siemens": r"\bCYCLE8[1-9]|HOLES|G331",
     "canned cycles: Heidenhain": r"CYCL DEF (?:2\d\d|1\.)", "A3= B3= C3=, ORIWKS, ORIMKS": r"\bA3=|\bORI[WM]KS\b",
     "G43.4, G43.5, G234": r"\bG43\.[45]|\bG234\b", "G68.2, G53.1": r"\bG68\.2", "FUNCTION TCPM": r"FUNCTION TCPM",
     "M128": r"\bM128\b", "PLANE": r"^PLANE", "CYCLE800": r"\bCYCLE800", "LN": r"^LN\b",
     "speed and smoothing": r"\bG8\b|\bG187\b|\bCOMP(?:CAD|ON)\b|\bCYCLE832|\bG64|\bSOFT\b|\bFFWON\b|\bM120\b",
     "M140": r"\bM140\b", "functions of the machine": r"\bM(?:88|89|1\d\d|2\d\d)\b",
-    "comments": r"\(|;|^\* -|\bMSG", "line numbers": r"^\s*N?\d+ ", "% and file ends": r"^%|\x1a|\r", "encodings": r"[^\x00-\x7f]",
-    "pockets, threads, splines, probing": r"POCKET|SLOT|CYCLE97|SPLINE|\bG33\b|CYCL DEF 2[56]\d|FPOL|\bG150|\bG38|\bG5\b|G12",
+    "comments": r"\(|;|^\* -|\bMSG", "line numbers": r"^\s*N?\d+ ", "% and file ends": r"^%|\x1a|\r",
+    "encodings": r"[^\x00-\x7f]",
+    "pockets, threads, splines, probing": r"POCKET|SLOT|CYCLE97|SPLINE|\bG33\b|CYCL DEF 2[56]\d|FPOL|\bG150|\bG38|"
+                                          r"\bG5\b|G12",
 }
 """Words of the table, and how a program shows them."""
 SHOPS = {
     "Windows file": ("fanuc", "%\r\nO1 (TEIL F\u00dcR M\u00dcLLER)\r\nN10 G21 G90 G17 G54\r\nN20 T1 M6\r\nN30 S900 "
-                     "M3\r\nN40 G43 H1\r\nN50 G0 X0. Y0. Z5. (\u00d8 6)\r\nN60 G1 Z-1. F200.\r\nN70 M88\r\nN80 X5.\r\nN90 "
-                     "M30\r\n%\r\n\x1a", "cp1252", "G0 X0 Y0 Z5\nG1 Z-1 F200\nX5\n"),
-    "smooth Siemens": ("siemens", "%_N_A_MPF\n;$PATH=/_N_WKS_DIR\nN10 G710 G17 G90 G94 G54 ; \u00d6l\nN20 T=\"MILL_D10\"\n"
-                       "N30 M6\nN35 S900 M3\nN40 CYCLE832(0.005,1,0.005)\nN50 COMPCAD\nN60 SOFT\nN70 FFWON\nN80 M77\n"
+                     "M3\r\nN40 G43 H1\r\nN50 G0 X0. Y0. Z5. (\u00d8 6)\r\nN60 G1 Z-1. F200.\r\nN70 M88\r\nN80 X5.\r\n"
+                     "N90 M30\r\n%\r\n\x1a", "cp1252", "G0 X0 Y0 Z5\nG1 Z-1 F200\nX5\n"),
+    "smooth Siemens": ("siemens", "%_N_A_MPF\n;$PATH=/_N_WKS_DIR\nN10 G710 G17 G90 G94 G54 ; \u00d6l\nN20 T=\"MILL_D10\""
+                       "\nN30 M6\nN35 S900 M3\nN40 CYCLE832(0.005,1,0.005)\nN50 COMPCAD\nN60 SOFT\nN70 FFWON\nN80 M77\n"
                        "N90 G0 X0 Y0 Z5\nN100 G1 Z-1 F200\nN110 X5\nN120 COMPOF\nN130 M30\n", "utf-16",
                        "G0 X0 Y0 Z5\nG1 Z-1 F200\nX5\n"),
-    "names of Heidenhain": ("heidenhain", "0 BEGIN PGM A MM\n1 ; GR\u00d6SSE\n2 TOOL CALL \"drill 8\" Z S900 F200\n3 TOOL "
-                            "DEF 3\n4 M3\n5 L X+0 Y+0 Z+5 FMAX\n6 L Z-1 M211\n7 L X+5 M140 MB MAX\n8 END PGM A MM\n",
+    "names of Heidenhain": ("heidenhain", "0 BEGIN PGM A MM\n1 ; GR\u00d6SSE\n2 TOOL CALL \"drill 8\" Z S900 F200\n3 "
+                            "TOOL DEF 3\n4 M3\n5 L X+0 Y+0 Z+5 FMAX\n6 L Z-1 M211\n7 L X+5 M140 MB MAX\n8 END PGM A MM\n",
                             "utf-8", "G0 X0 Y0 Z5\nG1 Z-1 F200\nG0 G53 Z0\nG1 X5\n"),
-    "smooth Haas": ("haas", "%\nO1\nG21 G90 G17\nT1\nM6\nT2\nS900 M3\nG54 G43 H1\nG187 P3 E0.005\nG0 X0. Y0. Z5.\nM88\nG1 "
-                    "Z-1. F200.\nX5.\nM16\nG43 H2\nS500 M3\nG0 X1. Y1. Z5.\nM30\n%\n", "ascii",
+    "smooth Haas": ("haas", "%\nO1\nG21 G90 G17\nT1\nM6\nT2\nS900 M3\nG54 G43 H1\nG187 P3 E0.005\nG0 X0. Y0. Z5.\nM88\n"
+                    "G1 Z-1. F200.\nX5.\nM16\nG43 H2\nS500 M3\nG0 X1. Y1. Z5.\nM30\n%\n", "ascii",
                     "G0 X0 Y0 Z5\nG1 Z-1 F200\nX5\nT2 M6\nG0 X1 Y1 Z5\n"),
-    "smooth Fanuc": ("fanuc", "%\nO1\nN1 G21 G90 G17\nN2 T1 M6\nN3 S900 M3\nN4 G54 G43 H1\nN5 G5.1 Q1\nN6 G8 P1\nN7 G0 X0. Y0. "
-                     "Z5.\nN8 M210\nN9 G1 Z-1. F200.\nN10 X5.\nN11 G8 P0\nN12 G5.1 Q0\nN13 M30\n%\n", "ascii",
+    "smooth Fanuc": ("fanuc", "%\nO1\nN1 G21 G90 G17\nN2 T1 M6\nN3 S900 M3\nN4 G54 G43 H1\nN5 G5.1 Q1\nN6 G8 P1\nN7 G0 X0. "
+                     "Y0. Z5.\nN8 M210\nN9 G1 Z-1. F200.\nN10 X5.\nN11 G8 P0\nN12 G5.1 Q0\nN13 M30\n%\n", "ascii",
                      "G0 X0 Y0 Z5\nG1 Z-1 F200\nX5\n"),
 }
 """Files as they leave a post: control, text, encoding, and the moves."""
@@ -70,8 +74,8 @@ SHOPS = {
 
 @dataclass(frozen=True)
 class Program:
-    """A program of the corpus: its origin and name, control, text, and what the judge says: a plain twin, a path drawn by
-    hand, or the word that is refused; ``gaps`` as in ``tests.rs274.difference``."""
+    """A program of the corpus: its origin and name, control, text, and what the judge says: a plain twin, a path drawn
+    by hand, or the word that is refused; ``gaps`` as in ``tests.rs274.difference``."""
 
     origin: str
     name: str

@@ -1,8 +1,8 @@
 """Programs with one word that moves or cuts and is not followed: control, lines, the word as its refusal names it."""
 
 REFUSED = {
-    "EXTCALL": ("siemens", 'EXTCALL "PART"', "EXTCALL"), "a pocket of Siemens": ("siemens", "POCKET4(5,0,1,-9,20,0,0,5)",
-                                                                                 "POCKET4"),
+    "EXTCALL": ("siemens", 'EXTCALL "PART"', "EXTCALL"),
+    "a pocket of Siemens": ("siemens", "POCKET4(5,0,1,-9,20,0,0,5)", "POCKET4"),
     "slots": ("siemens", "SLOT1(5,0,1,-9)", "SLOT1"), "a thread of Siemens": ("siemens", "CYCLE97(1)", "CYCLE97"),
     "a spline of Siemens": ("siemens", "BSPLINE X1 Y1", "BSPLINE"), "a thread by G33": ("siemens", "G33 Z1 K1", "G33"),
     "another program": ("heidenhain", "CALL PGM TNC:\\A.H", "CALL PGM"),

@@ -4,8 +4,8 @@ Run from the root of the checkout: ``python benchmarks/faults/planted_offsets.py
 [--programs A,B] [--rows FILE]``. The programs are plans of small parts in five dialects, whole and of one operation
 each, one by hand on five axes, and, where the collection of cases lies beside the checkout, one of its programs. The
 operation on the dome and the one on five axes also take stock off a plane beside their face, so their setups name the
-face; the other setups name none. Offsets go along X, Y and Z, both ways, into one tool length, and into the work offset.
-The smallest is twice the larger of scallop and gouge tolerance.
+face; the other setups name none. Offsets go along X, Y and Z, both ways, into one tool length, and into the work
+offset. The smallest is twice the larger of scallop and gouge tolerance.
 
 Whether an offset changes anything is judged without the code under test: some samples of a face that is asked, which
 the right program leaves within tolerance, must be out of it by their residuals alone, or some sample of any face is
@@ -75,8 +75,8 @@ class Case:
 
 @dataclass(frozen=True)
 class Row:
-    """One planted offset: whether it changes what is cut, what it makes on an asked face (None where that is nothing, or
-    more than the stock), the state, and the finding that is nearest to that, mm."""
+    """One planted offset: whether it changes what is cut, what it makes on an asked face (None where that is nothing,
+    or more than the stock), the state, and the finding that is nearest to that, mm."""
 
     program: str
     where: str
@@ -126,7 +126,8 @@ def cases(folder: Path, wanted: set[str]) -> Iterator[Case]:
     if not wanted or "slope-five" in wanted:
         step = write_step(shapes()["slope"][0], folder / "slope-five.step")
         setup = parse_setup(json.dumps({
-            "tools": [FLAT], "operations": {"faces": ["F7"]}, "quality": {"scallop_height_mm": 0.02}, "stock": {"margin_mm": 1.0, "uncertainty_mm": 0.0},
+            "tools": [FLAT], "operations": {"faces": ["F7"]}, "quality": {"scallop_height_mm": 0.02},
+            "stock": {"margin_mm": 1.0, "uncertainty_mm": 0.0},
             "machine": {"kind": "5-axis", "kinematics": "table-table-AC", "tcp": True, "dialects": ["siemens"]}}))
         yield Case("slope-five", read_job_part(step, setup, _quiet), setup, five_axis_text(), ".mpf")
     if (CASES / "nc" / "pocket_ok.ngc").is_file() and (not wanted or "pocket_ok" in wanted):

@@ -1,8 +1,8 @@
 """Programs as shops write them: is each read as its judge has it, within 1 µm?
 
 Run from the root of the checkout: ``python benchmarks/reading/read_corpus.py [--no-samples] [--table FILE]``. The
-corpus (``tests/program_corpus.py``) has programs in five dialects, tasks of the kind that manuals work through, files as
-posts leave them, words that are refused, and the samples that LinuxCNC installs. Samples are skipped where LinuxCNC is
+corpus (``tests/program_corpus.py``) has programs in five dialects, tasks of the kind that manuals work through, files
+as posts leave them, words that are refused, and the samples that LinuxCNC installs. Samples are skipped where LinuxCNC is
 not installed, and where its interpreter refuses them, turns rotary axes, or makes fewer than three moves.
 
 With nc-gcode-interpreter (``make peers``), Siemens programs without the words that it does not follow are read by it as
@@ -30,8 +30,8 @@ try:
 except ModuleNotFoundError:
     nc_gcode_interpreter = None
 NEAR = 1e-3  # mm
-BEYOND = ("TRANS", "ROT", "MIRROR", "SCALE", "RND", "CHF", "CHR", "CYCLE", "MCALL", "PROC", "G41", "G42", "AP=", "HOLES",
-          "SUPA", "TRAORI", "REPEAT", "GOTO")
+BEYOND = ("TRANS", "ROT", "MIRROR", "SCALE", "RND", "CHF", "CHR", "CYCLE", "MCALL", "PROC", "G41", "G42", "AP=",
+          "HOLES", "SUPA", "TRAORI", "REPEAT", "GOTO")
 """Words of Siemens that nc-gcode-interpreter reads but does not follow."""
 
 
