@@ -12,20 +12,16 @@ from dataclasses import replace
 import numpy as np
 
 from geometry.errors import VerificationError
-from geometry.mesh import F64, I32
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.tool_body import ToolBody
-from verify.blank.blank import stock_on_normals
 from verify.checks.program_sequence import FramedProgram, Given, check_numbers, counted, moves_of, read_all, slides_of
 from verify.checks.repeated_passes import repeat_findings
 from verify.checks.sideways_cuts import sideways_findings
 from verify.checks.table_clearance import table_findings
 from verify.findings import (
     Source,
-    allowance_findings,
     contact_findings,
-    gouge_findings,
     ordered,
     residual_findings,
 )
@@ -53,25 +49,13 @@ from verify.program.move_times import minutes_of, spent
 from verify.program.program import Program
 from verify.progress import Report, StageProgress
 from verify.surface.asked_faces import Cutting
-from verify.surface.between_samples import ClosePoints, close_points, judged_places, settled_samples
-from verify.surface.guard_points import (
-    CLOSER_SHARE,
-    SURE,
-    closer_points,
-    closer_seeds,
-    convex_edges,
-    guard_notes,
-    guard_samples,
-)
-from verify.surface.remains import Rays, Remains, depths_both_ways
-from verify.surface.removal import residual_on_normals
+from verify.surface.between_samples import settled_samples
 from verify.surface.sample_scores import RAY_ERROR, face_proofs, proved_samples, zone_proofs
-from verify.surface.tip_gouges import tip_gouges
+from verify.surface.surface_cuts import SurfaceCuts, reach_of, surface_cuts
 from verify.surface.wall_support import supported
 from verify.surface.ways_in import deep_findings
 from verify.surface.work_done import Measured, work_done
 
-MIN_REACH = 1.0
 # shares of the work done: read, places between samples settled, residuals, support, contacts known
 READ, SETTLED, CUT, HELD, MET = 0.12, 0.15, 0.48, 0.52, 0.97
 
@@ -119,7 +103,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     moves, source = moves_of(framed, tools)
     if asked is not None:
         scored = _settled(scored, part, tools, setup, moves, threads, stages.span(READ, SETTLED))
-    cuts = _cuts(part, tools, setup, scored, moves, source, threads, stages.span(SETTLED, CUT))
+    cuts = surface_cuts(part, tools, setup, scored, moves, source, threads, stages.span(SETTLED, CUT))
     support, unheld = supported(TriangleTree(part.mesh), scored, setup, moves, tools, source, zone_ids, threads,
                                 stages.span(CUT, HELD))
     slides = slides_of(framed, tools, setup)
@@ -175,98 +159,12 @@ def _check(tools: Sequence[ToolBody], setup: ProofSetup, scored: ScoredSamples, 
                                 measured=len(scored.zone), limit=len(scored.samples))
 
 
-def _reach(setup: ProofSetup) -> float:
-    """Height above the part up to which stock is followed everywhere, mm."""
-    return max(MIN_REACH, setup.stock_allowance + 4 * setup.scallop_height)
-
-
 def _settled(scored: ScoredSamples, part: Part, tools: Sequence[ToolBody], setup: ProofSetup, moves: Moves,
              threads: int, tell: Report) -> ScoredSamples:
     """The samples with close ones in each place that a coarse one does not speak for; no zone answers for them."""
     box = part.mesh.bounds
-    samples = settled_samples(scored.samples, box, moves, tools, setup, _reach(setup), threads, tell)
+    samples = settled_samples(scored.samples, box, moves, tools, setup, reach_of(setup), threads, tell)
     return scored if samples is scored.samples else ScoredSamples(samples, np.zeros(len(samples), np.int32))
-
-
-class _Cuts:
-    """Residuals of the scored samples, and gouges anywhere."""
-
-    residual: F64
-    mover: I32
-    gouges: list[Finding]
-    allowance: list[Finding]
-    gouge_max: float
-    guard: F64
-    edge: F64
-    close: ClosePoints
-    close_residual: F64
-    reach: float
-    notes: list[str]
-
-
-def _cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: ScoredSamples, moves: Moves,
-          source: Source, threads: int, tell: Report) -> _Cuts:
-    s, guard = scored.samples, guard_samples(part.mesh)
-    tell(0.05)
-    edge, bisector, edge_face = convex_edges(part.mesh)
-    tell(0.1)
-    points = np.concatenate([s.points, guard.points, edge])
-    normals = np.concatenate([s.normals, guard.normals, bisector])
-    face = np.concatenate([s.face, guard.face, edge_face])
-    area = np.concatenate([s.area, guard.area, np.zeros(len(edge))])
-    reach = _reach(setup)
-    initial = stock_on_normals(points, normals, part.mesh.bounds, setup, reach)
-    residual, mover = residual_on_normals(points, normals, initial, moves, tools, threads=threads,
-                                          progress=lambda f: tell(0.1 + 0.6 * f))
-    places = judged_places(s, residual[:len(s)], part.mesh.bounds, moves, tools, setup, reach, threads,
-                           lambda f: tell(0.7 + 0.05 * f))
-    close = close_points(s, residual[:len(s)], places, setup)
-    if len(close.row):
-        first = stock_on_normals(close.points, close.normals, part.mesh.bounds, setup, reach)
-        left, by = residual_on_normals(close.points, close.normals, first, moves, tools, threads=threads,
-                                       progress=lambda f: tell(0.75 + 0.05 * f))
-        points, normals = np.concatenate([points, close.points]), np.concatenate([normals, close.normals])
-        face, area = np.concatenate([face, s.face[close.row]]), np.concatenate([area, np.zeros(len(left))])
-        residual, mover = np.concatenate([residual, left]), np.concatenate([mover, by])
-    between = slice(len(s) + len(guard) + len(edge), len(points))
-    left_out, even = 0, len(points)
-    near = np.flatnonzero((residual < -CLOSER_SHARE * setup.gouge_tolerance) & (mover >= 0))
-    if len(near):
-        tree = TriangleTree(part.mesh)
-        seeds, left_out = closer_seeds(points[near], residual[near], mover[near], SURE * setup.gouge_tolerance)
-        there, outward, row = closer_points(tree, seeds)
-        left, by = residual_on_normals(there, outward, np.full(len(there), reach), moves, tools, threads=threads,
-                                       progress=lambda f: tell(0.8 + 0.1 * f))
-        points, normals = np.concatenate([points, there]), np.concatenate([normals, outward])
-        face, area = np.concatenate([face, part.mesh.face_ids[row]]), np.concatenate([area, np.zeros(len(row))])
-        residual, mover = np.concatenate([residual, left]), np.concatenate([mover, by])
-    deep = np.flatnonzero((residual < -setup.gouge_tolerance) & (mover >= 0))
-    if len(deep):
-        rays = Rays(points, normals, residual)
-        residual[deep] = -depths_both_ways(Remains(tree, moves, tools, threads), rays, deep, even,
-                                           setup.gouge_tolerance, lambda f: tell(0.9 + 0.1 * f))
-    deep = deep[residual[deep] < -setup.gouge_tolerance - RAY_ERROR]
-    out = _Cuts()
-    out.notes = guard_notes(part.mesh, left_out)
-    out.residual, out.mover = residual[:len(s)], mover[:len(s)]
-    out.close, out.close_residual = close, residual[between]
-    out.guard, out.edge, out.reach = guard.points, edge, reach
-    out.gouge_max = max(float(-residual.min(initial=0.0)), 0.0)
-    out.notes += [f"{tools[k].id} is a {tools[k].kind.replace('_', ' ')} and cuts into the part: where the part shows "
-                  "the hole before the thread, give the diameter of that hole as diameter_mm"
-                  for k in np.unique(moves.tool[mover[deep]]) if tools[k].kind in ("tap", "thread_mill")]
-    tips = tip_gouges(part.mesh, moves, tools, source, setup.gouge_tolerance + RAY_ERROR)
-    out.gouge_max = max([out.gouge_max, *(f.depth for f in tips)])
-    out.gouges = [*gouge_findings(points[deep], face[deep], -residual[deep], area[deep], mover[deep], source,
-                                  setup.gouge_tolerance), *tips]
-    row = np.arange(len(residual))  # the stock on an edge belongs to two faces
-    on_faces = (row < len(s) + len(guard)) | ((row >= between.start) & (row < between.stop))
-    depth = setup.stock_allowance - residual
-    into = np.flatnonzero(on_faces & (residual >= -setup.gouge_tolerance) & (mover >= 0)
-                          & (depth > setup.gouge_tolerance + RAY_ERROR))
-    out.allowance = allowance_findings(points[into], face[into], depth[into], area[into], mover[into], source,
-                                       setup.stock_allowance, setup.gouge_tolerance)
-    return out
 
 
 def _program_findings(read: Sequence[FramedProgram]) -> list[Finding]:
@@ -292,7 +190,7 @@ def _idle_findings(read: Sequence[FramedProgram], run: StockPass, moves: Moves, 
     return out
 
 
-def _residuals(scored: ScoredSamples, cuts: _Cuts, setup: ProofSetup, zone_ids: Sequence[str]) -> list[Finding]:
+def _residuals(scored: ScoredSamples, cuts: SurfaceCuts, setup: ProofSetup, zone_ids: Sequence[str]) -> list[Finding]:
     """Findings of samples outside the budget, and of close points outside it whose sample is within."""
     s, close = scored.samples, cuts.close
     proved = proved_samples(cuts.residual, setup)
@@ -306,7 +204,7 @@ def _residuals(scored: ScoredSamples, cuts: _Cuts, setup: ProofSetup, zone_ids: 
                              np.concatenate([s.area[bad], close.area[near]]), zone_ids, setup.scallop_height)
 
 
-def _proof(findings: list[Finding], cuts: _Cuts, run: StockPass, readings: Sequence[FramedProgram], moves: Moves,
+def _proof(findings: list[Finding], cuts: SurfaceCuts, run: StockPass, readings: Sequence[FramedProgram], moves: Moves,
            source: Source, setup: ProofSetup, scored: ScoredSamples, zone_ids: Sequence[str],
            engaged: dict[int, Engagement], spacing: float, notes: tuple[str, ...], support: Support) -> Proof:
     read = [r.program for r in readings]

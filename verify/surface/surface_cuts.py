@@ -1,0 +1,175 @@
+"""What the feed moves of programs leave on the surface of a part, and where they cut into it.
+
+Rays go out from the scored samples and from guard points all over the part; then from close points on flat places that
+no coarse sample speaks for; then round all places where the part is cut, for gouges that are deepest between them.
+Coordinates are float64, mm, in the setup frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64, I32
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.part import Part
+from geometry.tool_body import ToolBody
+from verify.blank.blank import stock_on_normals
+from verify.findings import Source, allowance_findings, gouge_findings
+from verify.model import Finding, ProofSetup, ScoredSamples
+from verify.moves import Moves
+from verify.progress import Report
+from verify.surface.between_samples import ClosePoints, close_points, judged_places
+from verify.surface.guard_points import (
+    CLOSER_SHARE,
+    SURE,
+    closer_points,
+    closer_seeds,
+    convex_edges,
+    guard_notes,
+    guard_samples,
+)
+from verify.surface.remains import Rays, Remains, depths_both_ways
+from verify.surface.removal import residual_on_normals
+from verify.surface.sample_scores import RAY_ERROR
+from verify.surface.tip_gouges import tip_gouges
+
+MIN_REACH = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceCuts:
+    """Residuals of n scored samples, and cuts into the part or its allowance anywhere.
+
+    residual  : (n,) float64, mm of stock on each normal, negative where the part is cut
+    mover     : (n,) int32, index, the move that left it, -1 where none did
+    gouges, allowance : findings
+    gouge_max : mm, depth of the deepest gouge
+    guard, edge : (g, 3) and (e, 3) float64, mm, points that watch for gouges on faces and along edges, setup frame
+    close     : ClosePoints, c of them; close_residual : (c,) float64, mm of stock on their normals
+    reach     : mm, height above the part up to which stock was followed
+    notes     : to report
+    """
+
+    residual: F64
+    mover: I32
+    gouges: list[Finding]
+    allowance: list[Finding]
+    gouge_max: float
+    guard: F64
+    edge: F64
+    close: ClosePoints
+    close_residual: F64
+    reach: float
+    notes: list[str]
+
+
+@dataclass(frozen=True, eq=False)
+class _Table:
+    """Rays so far: places of the surface with their faces, and what was left on their normals."""
+
+    points: F64
+    normals: F64
+    face: I32
+    area: F64
+    residual: F64
+    mover: I32
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def __add__(self, more: _Table) -> _Table:
+        return _Table(*(np.concatenate([getattr(self, f), getattr(more, f)])
+                        for f in ("points", "normals", "face", "area", "residual", "mover")))
+
+
+@dataclass(frozen=True, eq=False)
+class _Shooting:
+    """The moves that cut rays, and the stock that stands on them before."""
+
+    bounds: F64
+    moves: Moves
+    tools: Sequence[ToolBody]
+    setup: ProofSetup
+    threads: int
+    reach: float
+
+    def rays(self, points: F64, normals: F64, face: I32, area: F64, report: Report, *, full: bool = False) -> _Table:
+        """Rays cut by all moves; full : whether stock stands on them as far as they are followed."""
+        first = np.full(len(points), self.reach) if full else stock_on_normals(points, normals, self.bounds, self.setup,
+                                                                               self.reach)
+        left, by = residual_on_normals(points, normals, first, self.moves, self.tools, threads=self.threads,
+                                       progress=report)
+        return _Table(points, normals, face, area, left, by)
+
+
+def reach_of(setup: ProofSetup) -> float:
+    """Height above the part up to which stock is followed everywhere, mm."""
+    return max(MIN_REACH, setup.stock_allowance + 4 * setup.scallop_height)
+
+
+def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, scored: ScoredSamples, moves: Moves,
+                 source: Source, threads: int, tell: Report) -> SurfaceCuts:
+    """Cut rays from samples, guard points and close points with all feed moves.
+
+    part  : Part in the setup frame; tools : those that ``Moves.tool`` refers to
+    tell  : called with the share done, 0 to 1; an exception from it ends the work
+
+    Returns SurfaceCuts; the same bytes for any number of threads.
+    """
+    s, guard = scored.samples, guard_samples(part.mesh)
+    tell(0.05)
+    edge, bisector, edge_face = convex_edges(part.mesh)
+    tell(0.1)
+    shot = _Shooting(part.mesh.bounds, moves, tools, setup, threads, reach_of(setup))
+    table = shot.rays(np.concatenate([s.points, guard.points, edge]),
+                      np.concatenate([s.normals, guard.normals, bisector]),
+                      np.concatenate([s.face, guard.face, edge_face]),
+                      np.concatenate([s.area, guard.area, np.zeros(len(edge))]), lambda f: tell(0.1 + 0.6 * f))
+    first, on_edge = len(table), len(s) + len(guard)
+    places = judged_places(s, table.residual[:len(s)], part.mesh.bounds, moves, tools, setup, shot.reach, threads,
+                           lambda f: tell(0.7 + 0.05 * f))
+    close = close_points(s, table.residual[:len(s)], places, setup)
+    if len(close.row):
+        table += shot.rays(close.points, close.normals, s.face[close.row], np.zeros(len(close.row)),
+                           lambda f: tell(0.75 + 0.05 * f))
+    even = len(table)
+    table, left_out = _deepened(table, part, shot, lambda f: tell(0.8 + 0.2 * f))
+    gouged = np.flatnonzero((table.residual < -setup.gouge_tolerance - RAY_ERROR) & (table.mover >= 0))
+    tips = tip_gouges(part.mesh, moves, tools, source, setup.gouge_tolerance + RAY_ERROR)
+    row = np.arange(len(table))  # the stock on an edge belongs to two faces, so an edge has no allowance
+    return SurfaceCuts(
+        table.residual[:len(s)], table.mover[:len(s)],
+        [*gouge_findings(table.points[gouged], table.face[gouged], -table.residual[gouged], table.area[gouged],
+                         table.mover[gouged], source, setup.gouge_tolerance), *tips],
+        _in_allowance(table, (row < on_edge) | ((row >= first) & (row < even)), setup, source),
+        max([float(-table.residual.min(initial=0.0)), 0.0, *(f.depth for f in tips)]), guard.points, edge, close,
+        table.residual[first:even], shot.reach, guard_notes(part.mesh, left_out))
+
+
+def _deepened(table: _Table, part: Part, shot: _Shooting, tell: Report) -> tuple[_Table, int]:
+    """More rays round the places that are cut, and the depths of all gouges; and how many places were left out."""
+    tolerance, even = shot.setup.gouge_tolerance, len(table)
+    near = np.flatnonzero((table.residual < -CLOSER_SHARE * tolerance) & (table.mover >= 0))
+    if not len(near):
+        return table, 0
+    tree = TriangleTree(part.mesh)
+    seeds, left_out = closer_seeds(table.points[near], table.residual[near], table.mover[near], SURE * tolerance)
+    points, normals, row = closer_points(tree, seeds)
+    table += shot.rays(points, normals, part.mesh.face_ids[row], np.zeros(len(row)), lambda f: tell(0.5 * f), full=True)
+    deep = np.flatnonzero((table.residual < -tolerance) & (table.mover >= 0))
+    rays, left = Rays(table.points, table.normals, table.residual), Remains(tree, shot.moves, shot.tools, shot.threads)
+    table.residual[deep] = -depths_both_ways(left, rays, deep, even, tolerance, lambda f: tell(0.5 + 0.5 * f))
+    return table, left_out
+
+
+def _in_allowance(table: _Table, counts: NDArray[np.bool_], setup: ProofSetup, source: Source) -> list[Finding]:
+    """Findings of cuts that leave the part whole and less than the allowance on it."""
+    depth = setup.stock_allowance - table.residual
+    into = np.flatnonzero(counts & (table.residual >= -setup.gouge_tolerance) & (table.mover >= 0)
+                          & (depth > setup.gouge_tolerance + RAY_ERROR))
+    return allowance_findings(table.points[into], table.face[into], depth[into], table.area[into], table.mover[into],
+                              source, setup.stock_allowance, setup.gouge_tolerance)
