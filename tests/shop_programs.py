@@ -24,6 +24,7 @@ LINUXCNC = {
     "fanuc calls in calls": "M98 P100 L2\nG1 X0\nM2\nO100\nG91 G1 X3\nM98 P200 L2\nG90\nM99\nO200\nG91\nG1 Y1\nM99\n",
     "called pockets": "O<pocket> sub\nG0 X#1 Y#2\nG1 Z-#3\nG3 I2\nG0 Z5\nO<pocket> endsub\nO<pocket> call [1] [2] [3]\n"
                       "O<pocket> call [11] [2] [4]\n",
+    "calls in comments": "(as M98 P7)\nG1 X1 (then M99)\nX2 ; M98\nM98 P100 (M99)\nM2\nO100\nX3\nM99\n",
     "returned values": "O<twice> sub\nO<twice> endsub [#1*2]\nO<twice> call [4]\nG1 X#<_value>\n",
     "spiral by a loop": "#1=0\nO1 while [#1 LT 36]\nG1 X[#1*COS[#1*20]] Y[#1*SIN[#1*20]]\n#1=[#1+1]\nO1 endwhile\n",
     "nested loops": "O1 repeat [3]\nO2 repeat [2]\nG91 G1 X1 Y1\nO2 endrepeat\nX-1\nG90\nO1 endrepeat\n",

@@ -2,8 +2,8 @@
 
 Run from the root of the checkout: ``python benchmarks/reading/read_corpus.py [--no-samples] [--table FILE]``. The
 corpus (``tests/program_corpus.py``) has programs in five dialects, tasks of the kind that manuals work through, files
-as posts leave them, words that are refused, and the samples that LinuxCNC installs. Samples are skipped where LinuxCNC is
-not installed, and where its interpreter refuses them, turns rotary axes, or makes fewer than three moves.
+as posts leave them, words that are refused, and the samples that LinuxCNC installs. Samples are skipped where LinuxCNC
+is not installed, and where its interpreter refuses them, turns rotary axes, or makes fewer than three moves.
 
 With nc-gcode-interpreter (``make peers``), Siemens programs without the words that it does not follow are read by it as
 well. The exit code is 1 where a program is read wrongly, or a refused word is not on the list of docs/verify.md.

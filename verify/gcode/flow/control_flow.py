@@ -22,7 +22,8 @@ MAX_BLOCKS = 5_000_000
 MAX_CALLS = 9
 """Nested calls that LinuxCNC runs."""
 MAX_KEPT = 20_000
-_CALL = re.compile(r"[mM][ \t]*0*9([89])(?![0-9])")
+_CALL = re.compile(r"[mM][ \t]*0*9([89])(?![0-9.])")
+_COMMENT = re.compile(r"\([^()]*\)|;.*")
 _LABEL = re.compile(r"\s*[oO][ \t]*0*([0-9]+)\s*(?:[;(].*)?")
 _LETTER = re.compile(r"([A-Z])([0-9.]+)")
 _O_WORD = re.compile(r"[oO][ \t]*(?:[<\[#]|[0-9]+[ \t]*[a-zA-Z])")
@@ -103,7 +104,8 @@ class Flow:
             runs += 1
             if runs > MAX_BLOCKS:
                 self._endless(at + 1)
-            if plain[at] and self._programs and (call := _CALL.search(self.lines[at])):
+            if plain[at] and self._programs and _CALL.search(self.lines[at]) and (
+                    call := _CALL.search(_COMMENT.sub(" ", self.lines[at]))):
                 self.machine.log.line = at + 1
                 try:
                     goal = self._fanuc_call(at, call[1])
@@ -136,8 +138,6 @@ class Flow:
     def _fanuc_call(self, at: int, word: str) -> int | None:
         """Line after M98 (P, L) or M99, which LinuxCNC has beside its O-words; None where M99 ends the main program."""
         text = "".join(bare(self.lines[at]).upper().split())
-        if not text.strip():
-            return at + 1
         words = {a: float(b) for a, b in _LETTER.findall(text)}
         if text != "".join(a + b for a, b in _LETTER.findall(text)) or not words.keys() <= set("NMPL"):
             raise BlockError(f"M9{word} with other words in its block: give it its own block")
