@@ -55,18 +55,18 @@ SHOPS = {
     "Windows file": ("fanuc", "%\r\nO1 (TEIL F\u00dcR M\u00dcLLER)\r\nN10 G21 G90 G17 G54\r\nN20 T1 M6\r\nN30 S900 "
                      "M3\r\nN40 G43 H1\r\nN50 G0 X0. Y0. Z5. (\u00d8 6)\r\nN60 G1 Z-1. F200.\r\nN70 M88\r\nN80 X5.\r\n"
                      "N90 M30\r\n%\r\n\x1a", "cp1252", "G0 X0 Y0 Z5\nG1 Z-1 F200\nX5\n"),
-    "smooth Siemens": ("siemens", "%_N_A_MPF\n;$PATH=/_N_WKS_DIR\nN10 G710 G17 G90 G94 G54 ; \u00d6l\nN20 T=\"MILL_D10\""
-                       "\nN30 M6\nN35 S900 M3\nN40 CYCLE832(0.005,1,0.005)\nN50 COMPCAD\nN60 SOFT\nN70 FFWON\nN80 M77\n"
-                       "N90 G0 X0 Y0 Z5\nN100 G1 Z-1 F200\nN110 X5\nN120 COMPOF\nN130 M30\n", "utf-16",
-                       "G0 X0 Y0 Z5\nG1 Z-1 F200\nX5\n"),
+    "smooth Siemens": ("siemens", "%_N_A_MPF\n;$PATH=/_N_WKS_DIR\nN10 G710 G17 G90 G94 G54 ; \u00d6l\nN20 "
+                       "T=\"MILL_D10\"\nN30 M6\nN35 S900 M3\nN40 CYCLE832(0.005,1,0.005)\nN50 COMPCAD\nN60 SOFT\n"
+                       "N70 FFWON\nN80 M77\nN90 G0 X0 Y0 Z5\nN100 G1 Z-1 F200\nN110 X5\nN120 COMPOF\nN130 M30\n",
+                       "utf-16", "G0 X0 Y0 Z5\nG1 Z-1 F200\nX5\n"),
     "names of Heidenhain": ("heidenhain", "0 BEGIN PGM A MM\n1 ; GR\u00d6SSE\n2 TOOL CALL \"drill 8\" Z S900 F200\n3 "
-                            "TOOL DEF 3\n4 M3\n5 L X+0 Y+0 Z+5 FMAX\n6 L Z-1 M211\n7 L X+5 M140 MB MAX\n8 END PGM A MM\n",
-                            "utf-8", "G0 X0 Y0 Z5\nG1 Z-1 F200\nG0 G53 Z0\nG1 X5\n"),
+                            "TOOL DEF 3\n4 M3\n5 L X+0 Y+0 Z+5 FMAX\n6 L Z-1 M211\n7 L X+5 M140 MB MAX\n8 END PGM A "
+                            "MM\n", "utf-8", "G0 X0 Y0 Z5\nG1 Z-1 F200\nG0 G53 Z0\nG1 X5\n"),
     "smooth Haas": ("haas", "%\nO1\nG21 G90 G17\nT1\nM6\nT2\nS900 M3\nG54 G43 H1\nG187 P3 E0.005\nG0 X0. Y0. Z5.\nM88\n"
                     "G1 Z-1. F200.\nX5.\nM16\nG43 H2\nS500 M3\nG0 X1. Y1. Z5.\nM30\n%\n", "ascii",
                     "G0 X0 Y0 Z5\nG1 Z-1 F200\nX5\nT2 M6\nG0 X1 Y1 Z5\n"),
-    "smooth Fanuc": ("fanuc", "%\nO1\nN1 G21 G90 G17\nN2 T1 M6\nN3 S900 M3\nN4 G54 G43 H1\nN5 G5.1 Q1\nN6 G8 P1\nN7 G0 X0. "
-                     "Y0. Z5.\nN8 M210\nN9 G1 Z-1. F200.\nN10 X5.\nN11 G8 P0\nN12 G5.1 Q0\nN13 M30\n%\n", "ascii",
+    "smooth Fanuc": ("fanuc", "%\nO1\nN1 G21 G90 G17\nN2 T1 M6\nN3 S900 M3\nN4 G54 G43 H1\nN5 G5.1 Q1\nN6 G8 P1\nN7 G0 "
+                     "X0. Y0. Z5.\nN8 M210\nN9 G1 Z-1. F200.\nN10 X5.\nN11 G8 P0\nN12 G5.1 Q0\nN13 M30\n%\n", "ascii",
                      "G0 X0 Y0 Z5\nG1 Z-1 F200\nX5\n"),
 }
 """Files as they leave a post: control, text, encoding, and the moves."""
