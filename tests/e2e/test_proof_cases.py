@@ -1,0 +1,49 @@
+"""Programs that were called proved and would do harm, and good ones that were refused (``../shared/cases/proof``)."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from service.from_wire import parse_setup
+from service.stages.job_part import read_job_part
+from service.verification.program_first import read_first
+from service.verification.program_proof import proved_program
+
+CASES = Path(__file__).resolve().parents[3] / "shared" / "cases" / "proof"
+pytestmark = [pytest.mark.slow,
+              pytest.mark.skipif(not CASES.is_dir(), reason="the collection of cases (../shared/cases) is not here")]
+HARMFUL = [  # program, part, kind of finding, its line, depth in mm or None
+    ("03-stale-length-offset-rapid.ngc", "plate", "program", 71, None),
+    ("17-g53-beyond-travel.ngc", "plate", "limit", 68, 99499.0),
+    ("30-rib-0.5x4x30-milled-off.ngc", "rib_0.5", "gouge", None, 4.0),
+    ("32-knife-edge-shortened-0.7.ngc", "knife", "gouge", None, 0.7),
+    ("34-allowance-cut-away.ngc", "plate", "allowance", None, 0.3),
+]
+GOOD = ["fa-01-g28-from-the-wall.ngc", "fa-07-g28-xyz-at-the-end.nc", "fa-09-lift-0.003-aside.ngc"]
+
+
+def verified(name, part):
+    program = CASES / name
+    setup = parse_setup(program.with_suffix(".json").read_text())
+    dialect = "fanuc" if program.suffix == ".nc" else None
+    job = read_job_part(CASES / f"{part}.step", setup, lambda _stage, _share: None)
+    read = read_first(setup, program.read_text(), ending=program.suffix, dialect=dialect)
+    return proved_program(job, read, lambda _share: None).report
+
+
+@pytest.mark.parametrize(("name", "part", "kind", "line", "depth"), HARMFUL)
+def test_harm_is_found(name, part, kind, line, depth):
+    report = verified(name, part)
+    found = [f for f in report["findings"] if f["kind"] == kind]
+    assert report["state"] == "unproved" and found, json.dumps(report["finding_counts"])
+    if line is not None:
+        assert found[0]["line"] == line
+    if depth is not None:
+        assert max(f["depth"] for f in found) == pytest.approx(depth, abs=max(0.1 * depth, 0.005))
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_good_programs_are_proved(name):
+    report = verified(name, "plate")
+    assert report["state"] == "proved" and report["findings"] == []
