@@ -72,6 +72,10 @@ class Tool(WireModel):
         description="Tip to the end of the cutting part, mm. Default: 3 x diameter_mm, but not more than "
                     "neck_length_mm and stickout_mm where they are given.")] = None
     center_cutting: Annotated[bool, Field(description="true: the end of the tool cuts to the centre.")] = True
+    ramp_angle_deg: Annotated[Number | None, Field(
+        gt=0, le=90, description="Steepest angle at which the tool may go down into stock, deg. Plans use at most 3. "
+                                 "null: 3; in a verified program 10 for a tool that cuts to its centre, in a material "
+                                 "whose specific_cutting_force_n_mm2 is at most 900.")] = None
     neck_diameter_mm: Annotated[Length | None, Field(
         description="Diameter of the relieved part, mm. Default: diameter_mm.")] = None
     neck_length_mm: Annotated[Length | None, Field(

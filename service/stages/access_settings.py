@@ -11,6 +11,7 @@ import numpy as np
 
 from schemas.setup import Lean
 from service.stages.access_plan import ProofFrame
+from service.stages.job_inputs import RAMP_ANGLE
 from service.stages.job_part import JobPart
 from service.stages.preparation import Prepared, table_height
 from service.stages.programs import access_of, fixture_boxes, turning_of
@@ -22,7 +23,6 @@ from toolpath.workingsteps import CutDirection
 from verify.model import ProofSetup
 from zones.reach.access_view import View
 
-RAMP_ANGLE = np.radians(3.0)
 STOCK_STEP = 0.08  # mm, the planner's stock lattice; wider where that would take more than STOCK_CELLS
 STOCK_CELLS = 4e6
 ABOVE = 1.0  # mm between the height rapids may go down to and the clearance plane
@@ -43,8 +43,9 @@ def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
     tops.extend(float(f[1, 2]) for f in fixture_boxes(ready, view))
     floor = float(np.ceil(10.0 * (max(tops) + inputs.clearances.rapid + 0.1)) / 10.0)
     chord = q.chordal_tolerance_mm * (1.0 - (ARC_SHARE if inputs.machine.arcs else 0.0))
+    ramp = min([RAMP_ANGLE, *inputs.ramp_angles(foreign=False).values()])
     return PlanSettings(q.scallop_height_mm, chord, q.stock_allowance_mm, ready.lift, floor + ABOVE,
-                        floor, float(RAMP_ANGLE), ops.roughing, ops.finishing, CutDirection(ops.cut_direction),
+                        floor, ramp, ops.roughing, ops.finishing, CutDirection(ops.cut_direction),
                         Pattern(ops.pattern), turning_of(ready, view), rates=inputs.rates,
                         semi_finishing=ops.semi_finishing, leaned=leaned(ops.lean))
 
@@ -76,7 +77,7 @@ def proof_setup(job: JobPart, view: View | ProofFrame, *, foreign: bool = False)
         fixtures=fixture_boxes(job, view), clearance_neck=c.neck,
         clearance_shank=c.shank, clearance_holder=c.holder, clearance_rapid=c.rapid,
         scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,
-        stock_allowance=q.stock_allowance_mm, ramp_angle=float(RAMP_ANGLE),
+        stock_allowance=q.stock_allowance_mm, ramp_angle=RAMP_ANGLE, ramp_angles=inputs.ramp_angles(foreign=foreign),
         rapid_feed=inputs.rates.rapid, acceleration=inputs.rates.acceleration,
         work_offset=access_of(job, view).work_offset,
         travel=None if machine.travel_mm is None else np.array(machine.travel_mm, dtype=np.float64),

@@ -41,6 +41,8 @@ from zones.reach.assembly import Clearances
 LINK_FEED = 3000.0  # mm/min, feed moves in air
 ENGAGEMENT_SHARE = 0.15  # of the radius of a tool, between places of the stock: at the edge 32 degrees of it
 SLOT_DEG = 180.0  # engaged angle of a slot
+RAMP_ANGLE = math.radians(3.0)
+STEEP_RAMP, SOFT = math.radians(10.0), 900.0  # in materials whose kc1.1 is no more than that many N/mm²: light metals
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +142,19 @@ class JobInputs:
         """1/min by T number: the largest speed that tool and machine allow, where one of them has a limit."""
         return {body.number: min(limits) for t, body in zip(self.tools, self.bodies, strict=True)
                 if (limits := [x for x in (t.max_rpm, self.machine.max_rpm) if x is not None])}
+
+    def ramp_angles(self, *, foreign: bool) -> dict[int, float]:
+        """Rad by T number: the steepest angle at which a tool may go down into stock, where it is not ``RAMP_ANGLE``.
+
+        foreign : whether the programs were not planned here; plans go down at ``RAMP_ANGLE`` at most
+        """
+        soft = (self.material.specific_cutting_force_n_mm2 or math.inf) <= SOFT
+        out = {}
+        for t, body in zip(self.tools, self.bodies, strict=True):
+            usual = STEEP_RAMP if foreign and soft and t.center_cutting else RAMP_ANGLE
+            angle = usual if t.ramp_angle_deg is None else math.radians(t.ramp_angle_deg)
+            out[body.number] = angle if foreign else min(angle, RAMP_ANGLE)
+        return {number: angle for number, angle in out.items() if angle != RAMP_ANGLE}
 
     @property
     def tool_lives(self) -> dict[str, float]:

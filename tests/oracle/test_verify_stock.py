@@ -98,11 +98,13 @@ def test_descents_and_end_regions():
     x = np.array([0.0, 0.0, 1.0, 2.0, 3.0, 3.0])
     p = np.column_stack([x, np.zeros(6), z])
     moves = Moves(p[:-1], p[1:], np.ones(5, bool), np.array([0, 0, 0, 0, 1], np.int32))
-    steep, earned = descents(moves, np.radians(3))
+    steep, earned = descents(moves, [TOOL, TOOL], ProofSetup(ramp_angle=np.radians(3)))
     assert steep.tolist() == [True, True, False, False, True]
     np.testing.assert_allclose(earned[:4], np.tan(np.radians(3)) * np.array([0, 0, 1, 2]), atol=1e-12)
     assert earned[4] > 1e5  # another tool begins anew
     assert end_radii([TOOL]).tolist() == [2.0]
+    wide = ProofSetup(ramp_angle=np.radians(3), ramp_angles={TOOL.number: np.radians(50)})
+    assert descents(moves, [TOOL, TOOL], wide)[0].tolist() == [True, False, False, False, True]
 
 
 def test_nearest_point_of_a_triangle():

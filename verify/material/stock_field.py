@@ -188,7 +188,7 @@ def run_field(field: DistanceField, moves: Moves, tools: Sequence[ToolBody], set
     cutters, ends = cutter_table(tools), end_radii(tools)
     bodies = Bodies(np.zeros((0, 6)), np.zeros(len(tools) + 1, np.int64)) if bare else Bodies.of(tools, setup)
     axes = moves.axes or ToolAxes.upright(len(moves))
-    sizes, (steep, earned) = bodies.arrays(cutters, ends), descents(moves, setup.ramp_angle, tools)
+    sizes, (steep, earned) = bodies.arrays(cutters, ends), descents(moves, tools, setup)
     stock, limits = field.arrays, ContactLimits(setup.clearance_rapid, setup.gouge_tolerance)
     steps, turns, free = moves.arrays, axes.arrays(bow), free_rapids(moves)
     x, y = sector_frames(moves.axes, len(moves))

@@ -127,7 +127,7 @@ def run_stock(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup:
     """
     cutters, bodies = cutter_table(tools), Bodies.of(tools, setup)
     sizes = bodies.arrays(cutters, end_radii(tools))
-    allowed = DescentArrays(*descents(moves, setup.ramp_angle, tools), ways_before(moves),
+    allowed = DescentArrays(*descents(moves, tools, setup), ways_before(moves),
                             setup.plunge_skin * 2.0 * cutters[:, 0])
     cut, under = np.zeros(len(moves), np.uint8), np.zeros(len(moves), np.uint8)
     limits, free = ContactLimits(setup.clearance_rapid, setup.gouge_tolerance), free_rapids(moves)

@@ -5,7 +5,6 @@ Tables of events are float64 rows (move, code, depth, clearance, x, y, z), mm, i
 
 from __future__ import annotations
 
-import math
 import queue
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from verify.kernels.clash import ASIDE
 from verify.kernels.engaged import WINDOW
+from verify.model import ProofSetup
 from verify.moves import Moves
 
 EVENTS = 4096
@@ -26,12 +26,11 @@ SAME = 1e-6  # mm, and rad: closer ends of moves and axes are the same
 Spare = queue.SimpleQueue[NDArray[np.int64]]
 
 
-def descents(moves: Moves, ramp_angle: float,
-             tools: Sequence[ToolBody] | None = None) -> tuple[NDArray[np.bool_], F64]:
-    """Feed moves that descend steeper than ``ramp_angle``, rad, and the depth that ramps could have removed so far.
+def descents(moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup) -> tuple[NDArray[np.bool_], F64]:
+    """Feed moves that descend steeper than their tool may, and the depth that ramps could have removed so far.
 
-    Down is along the tool axis, for a turning tool along its axis half way. Moves of ``tools`` that cut straight down
-    do not count.
+    Down is along the tool axis, for a turning tool along its axis half way. Moves of tools that cut straight down do
+    not count.
 
     Returns
     -------
@@ -39,19 +38,20 @@ def descents(moves: Moves, ramp_angle: float,
     earned : (m,) float64, mm: sideways travel of all feed moves so far that are not steep, times the tangent of the
              angle; a tool change adds ``ANOTHER_TOOL``
     """
-    d, slope = moves.end - moves.start, math.tan(ramp_angle)
+    if not len(moves):
+        return np.zeros(0, np.bool_), np.zeros(0)
+    d = moves.end - moves.start
+    slope = np.tan([setup.ramp_angles.get(t.number, setup.ramp_angle) for t in tools])[moves.tool]
     if moves.axes is None:
         rise, aside = d[:, 2], np.hypot(d[:, 0], d[:, 1])
     else:
         up = moves.axes.middle
         rise = np.einsum("ij,ij->i", d, up)
         aside = np.linalg.norm(d - rise[:, None] * up, axis=1)
-    steep = np.asarray(moves.feed & (-rise > aside * slope + 1e-9))
-    if tools is not None and len(moves):
-        steep &= ~np.array([t.cuts_down for t in tools])[moves.tool]
+    steep = moves.feed & (-rise > aside * slope + 1e-9) & ~np.array([t.cuts_down for t in tools])[moves.tool]
     earned = np.cumsum(np.where(moves.feed & ~steep, aside * slope, 0.0))
-    changed = np.concatenate([[False], moves.tool[1:] != moves.tool[:-1]]) if len(d) else np.zeros(0, np.bool_)
-    return steep, earned + ANOTHER_TOOL * np.cumsum(changed)
+    changed = np.concatenate([[False], moves.tool[1:] != moves.tool[:-1]])
+    return np.asarray(steep), np.asarray(earned + ANOTHER_TOOL * np.cumsum(changed))
 
 
 def ways_before(moves: Moves) -> F64:

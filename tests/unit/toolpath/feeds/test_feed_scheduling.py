@@ -17,6 +17,7 @@ from toolpath.linking.ramp_entry import EASE_SHARE
 from toolpath.stock.engagement import SKIN_SHARE, angles
 from toolpath.stock.stock_map import SURE_RIM, StockMap
 from verify.material.stock_pass import descents
+from verify.model import ProofSetup
 from verify.moves import Moves
 
 SLOT, FULL, AIR, LAYER = 100.0, 400.0, 3000.0, 1.0
@@ -154,6 +155,6 @@ def test_a_way_down_parted_for_its_feeds_is_no_steeper_in_the_program(share):
         points = np.round(np.vstack([parts[0], *(p[1:] for p in parts[1:])]), 4)
         still = np.zeros(len(points) - 1)
         moves = Moves(points[:-1], points[1:], still == 0.0, still.astype(np.int32))
-        assert not descents(moves, ramp)[0].any()
+        assert not descents(moves, [body], ProofSetup(ramp_angle=ramp))[0].any()
         assert np.array_equal(points[[0, -1]], np.round(way[[0, -1]], 4))
     assert count > 300
