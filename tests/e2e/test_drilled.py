@@ -28,13 +28,14 @@ SETUP = {
     "machine": {"kind": "3-axis", "dialects": ["linuxcnc"]}, "quality": {"scallop_height_mm": 0.02}}
 
 
-def program(*, deep=-5.0 - POINT, through=-9.2, chamfer=-1.6, tapped=True, tapped_at=4.0, first=True, more=()):
+def program(*, deep=-5.0 - POINT, through=-9.2, chamfer=-1.6, tapped=True, tapped_at=(4.0, -9.0), first=True, more=()):
     """A blind hole at X-4, a through hole at X0, a tapped one at X4, and the edge at X8 with a chamfer of 0.6 mm."""
     lines = ["%", "G21 G90 G17 G94 G40 G49 G54 G64 P0.001", "T1 M6", "S3000 M3", "G0 X-4 Y0", "G43 H1 Z20", "G0 Z3"]
     lines += [f"G98 G83 X-4 Y0 Z{deep:.4f} R2 Q1.5 F150", f"G81 X0 Y0 Z{through:.4f} R2", "G80", *more, "G0 Z20"]
     lines += ["T4 M6", "S3000 M3", "G0 X4 Y0", "G43 H4 Z20", "G81 X4 Y0 Z-9.5 R2 F150", "G80"] if first else []
     if tapped:
-        lines += ["T3 M6", "S500 M3", f"G0 X{tapped_at} Y0", "G43 H3 Z20", "G0 Z2", "G1 Z-9 F350", "Z2", "G0 Z20"]
+        at, low = tapped_at
+        lines += ["T3 M6", "S500 M3", f"G0 X{at} Y0", "G43 H3 Z20", "G0 Z2", f"G1 Z{low} F350", "Z2", "G0 Z20"]
     lines += ["T2 M6", "S8000 M3", "G0 X9.5 Y-12", "G43 H2 Z20", f"G0 Z{chamfer}", "G1 Y12 F400", "G0 Z20"]
     return "\n".join([*lines, "M5", "M30", "%"]) + "\n"
 
@@ -108,7 +109,7 @@ def test_a_tap_without_its_hole_plunges(verify):
 
 @pytest.mark.slow
 def test_a_thread_in_a_hole_drawn_before_it_is_a_gouge_with_a_note(verify):
-    report = verify(program(tapped_at=0.0))
+    report = verify(program(tapped_at=(0.0, -1.0)))
     found = [f for f in report["findings"] if f["kind"] == "gouge"]
     assert max(f["depth"] for f in found) == pytest.approx(0.5, abs=0.01)
     assert any("T3 is a tap" in note and "diameter of that hole" in note for note in report["proof"]["notes"])
