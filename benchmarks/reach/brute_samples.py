@@ -40,7 +40,7 @@ import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
@@ -224,9 +224,31 @@ def _near(x: float, y: float, x0: float, y0: float, side: float) -> float:
     return math.sqrt(u * u + v * v)
 
 
+class SolidArrays(NamedTuple):
+    """A solid of revolution for the kernels, mm, with the greatest radius of any of its bodies."""
+
+    radius: float
+    corner: float
+    bodies: F64
+    widest: float
+
+
+class CloudArrays(NamedTuple):
+    """A cloud for the kernels: its points by cell, the highest of each cell and of each block of cells, mm."""
+
+    points: F64
+    start: NDArray[np.int64]
+    top: F64
+    coarse: F64
+    x0: float
+    y0: float
+
+
 @njit(cache=True)
-def _entered(x, y, z, radius, corner, bodies, widest, points, start, top, coarse, x0, y0, depth):
+def _entered(x, y, z, turned, grid, depth):
     """Whether a point of the cloud is inside the solid with its tip at (x, y, z)."""
+    radius, corner, bodies, widest = turned
+    points, start, top, coarse, x0, y0 = grid
     side = FINE * BLOCK
     ny, nx = coarse.shape
     z = z + depth
@@ -253,10 +275,9 @@ def _entered(x, y, z, radius, corner, bodies, widest, points, start, top, coarse
     return False
 
 
-def _free(tips, radius, corner, bodies, widest, points, start, top, coarse, x0, y0, depth, out):
+def _free(tips, turned, grid, depth, out):
     for i in prange(len(tips)):
-        out[i] = not _entered(tips[i, 0], tips[i, 1], tips[i, 2], radius, corner, bodies, widest, points, start, top,
-                              coarse, x0, y0, depth)
+        out[i] = not _entered(tips[i, 0], tips[i, 1], tips[i, 2], turned, grid, depth)
 
 
 _free_few = njit(cache=True)(_free)
@@ -268,8 +289,8 @@ def admissible(cloud: Cloud, solid: Solid, tips: F64) -> BOOL:
     out = np.empty(len(tips), np.bool_)
     widest = max(solid.radius, float(solid.bodies[:, :2].max(initial=0.0)))
     ask = _free_many if len(tips) > FEW else _free_few
-    ask(np.ascontiguousarray(tips), solid.radius, solid.corner, solid.bodies, widest, cloud.points, cloud.start,
-        cloud.top, cloud.coarse, cloud.x0, cloud.y0, DEPTH, out)
+    grid = CloudArrays(cloud.points, cloud.start, cloud.top, cloud.coarse, cloud.x0, cloud.y0)
+    ask(np.ascontiguousarray(tips), SolidArrays(solid.radius, solid.corner, solid.bodies, widest), grid, DEPTH, out)
     return out
 
 
