@@ -25,11 +25,23 @@ EVEN = 1e-9  # mm, heights that are the same
 
 def drop_over_flats(tree: TriangleTree, x0: float, y0: float, step: float, nx: int, ny: int, radius: float,
                     corner_radius: float, large: int = LARGE) -> F64:
-    """``geometry.mesh_queries.drop.drop_grid``, to ``EVEN``, with few queries over level areas.
+    """Lowest tip height over a grid of points, with few queries over level areas.
 
-    large : number of points from which on areas are looked for
+    x0, y0 : float, mm, the first point, frame of the mesh
+    step   : float, mm, distance of neighbours
+    nx, ny : int, number of points along x and y
+    radius, corner_radius : float, mm, of the body, as in ``geometry.mesh_queries.drop.drop_tips``
+    large  : int, number of points from which on areas are looked for
 
-    Returns (ny, nx) float64, mm, the lowest tip over each point, frame of the mesh.
+    Returns
+    -------
+    (ny, nx) float64, mm
+        As ``geometry.mesh_queries.drop.drop_grid`` gives them, to ``EVEN``.
+
+    Raises
+    ------
+    GeometryError
+        As ``geometry.mesh_queries.drop.drop_grid``.
     """
     if nx * ny < large:
         return drop_grid(tree, x0, y0, step, nx, ny, radius, corner_radius)

@@ -108,8 +108,9 @@ def judged_places(samples: SurfaceSamples, residual: F64, bounds: F64, moves: Mo
 def close_points(samples: SurfaceSamples, residual: F64, places: Places, setup: ProofSetup) -> ClosePoints:
     """Points ``CLOSE`` mm apart on the places that are not settled, and the deepest points of moves there.
 
-    samples  : SurfaceSamples, setup frame; places : what ``judged_places`` says of them
+    samples  : SurfaceSamples, n of them, setup frame
     residual : (n,) float64, mm of stock on each normal after all moves
+    places   : of ``judged_places``
 
     A place that is no more than known to be uncut gets none, since its sample says so.
     """
@@ -127,9 +128,11 @@ def settled_samples(samples: SurfaceSamples, bounds: F64, moves: Moves, tools: S
                     reach: float, threads: int = 2, report: Report = silent) -> SurfaceSamples:
     """The samples with close ones in each place that is not settled whole.
 
-    samples : SurfaceSamples, whose coarse ones are of ``geometry.sampling.graded_samples`` in the frame of the proof
-    bounds  : (2, 3) float64, mm, of the part, setup frame
-    moves, tools, setup, reach, threads, report : as in ``judged_places``
+    samples : SurfaceSamples, setup frame, whose coarse ones are of ``geometry.sampling.graded_samples`` in that frame
+    bounds  : (2, 3) float64, mm, of the part
+    moves, tools, setup, threads : as in ``judged_places``
+    reach   : float, mm, height up to which stock is followed
+    report  : called with the share done, 0 to 1; an exception from it ends the work
 
     Each sample of the result stands for its own place: within the budget or not, it is so everywhere there, and its
     residual holds there to ``SAME_HEIGHT``, or to the distance of close samples. None is suspect of a gouge.
