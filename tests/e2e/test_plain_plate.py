@@ -40,6 +40,7 @@ def facing(height: float, *more: str) -> str:
                       *(line.replace("{z}", f"{height:g}") for line in FACING), *more, "M5", "M30"]) + "\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("text", "kinds"), [(facing(0.0), set()), (facing(0.02), {"stock_left"}),
                                              (facing(0.0, PIT), {"gouge"})])
 def test_a_program_is_judged_with_few_samples_as_with_many(tmp_path, monkeypatch, text, kinds):
@@ -53,7 +54,8 @@ def test_a_program_is_judged_with_few_samples_as_with_many(tmp_path, monkeypatch
         monkeypatch.setattr(sample_spacing, "LEAST_AREA", least)
         reports[name] = verify_program(path, setup, text, lambda *_: None)
     few, many = reports["few"], reports["many"]
-    assert few["state"] == many["state"] and {f["kind"] for f in few["findings"]} == kinds
+    assert few["state"] == many["state"] and few["finding_counts"] == many["finding_counts"]
+    assert kinds <= {f["kind"] for f in few["findings"]} and (kinds or not few["findings"])
     assert few["coverage"] == pytest.approx(many["coverage"], abs=2e-3) and few["asked"] == many["asked"]
     for one, other in zip(few["findings"], many["findings"], strict=True):
         assert (one["kind"], one["face"]) == (other["kind"], other["face"])
