@@ -106,13 +106,14 @@ def draw_deviation(part: Part, measured: Measured, marks: Sequence[Mark], out_pa
     """
     width, height = (SIZE[0] - GUTTER) // 2, SIZE[1] - HEADER - LEGEND
     classes = measured.classes
+    near = KeyedPoints(measured.samples.face.astype(np.int64), measured.samples.points)
     cameras = choose_views(part.mesh, measured.samples, classes != GREEN, (2 * width, 2 * height))
     sheet = Image.new("RGB", SIZE, bytes_of(WHITE))
     pen = ImageDraw.Draw(sheet)
     free = list(marks[:MAX_RINGS])
     for k, camera in enumerate(cameras):
         x = k * (width + GUTTER)
-        canvas = _painted(part, measured, classes, camera)
+        canvas = _painted(part, measured, classes, near, camera)
         sheet.paste(Image.fromarray(canvas.halved()), (x, HEADER))
         taken: list[Box] = []
         for mark in list(free):
@@ -132,10 +133,10 @@ def draw_deviation(part: Part, measured: Measured, marks: Sequence[Mark], out_pa
     sheet.save(out_path, format="PNG", optimize=False, compress_level=6)
 
 
-def _painted(part: Part, measured: Measured, classes: INT8, camera: Camera) -> Canvas:
+def _painted(part: Part, measured: Measured, classes: INT8, near: KeyedPoints, camera: Camera) -> Canvas:
     """One view: light, classes, dots of samples outside the budget, edges."""
     canvas = lit(part.mesh, np.ones((len(part.faces) + 1, 3), np.float32), camera)
-    shown = _class_of_pixels(canvas, camera, measured.samples, classes)
+    shown = _class_of_pixels(canvas, camera, near, classes)
     table = np.array([*COLOURS, PALE], np.float32)  # -1, not judged, is the last
     solid = canvas.owner > 0
     aside = solid & (shown < 0)
@@ -150,13 +151,15 @@ def _painted(part: Part, measured: Measured, classes: INT8, camera: Camera) -> C
     return canvas
 
 
-def _class_of_pixels(canvas: Canvas, camera: Camera, samples: SurfaceSamples, classes: INT8) -> INT8:
-    """(h, w): class of the nearest sample of the visible face; -1 where the face has none or no face is visible."""
+def _class_of_pixels(canvas: Canvas, camera: Camera, near: KeyedPoints, classes: INT8) -> INT8:
+    """(h, w): class of the nearest sample of the visible face; -1 where the face has none or no face is visible.
+
+    near : the samples by face
+    """
     out = np.full(canvas.owner.shape, -1, np.int8)
-    y, x = np.nonzero(np.isin(canvas.owner, samples.face) & (canvas.owner > 0))
+    y, x = np.nonzero(np.isin(canvas.owner, near.keys) & (canvas.owner > 0))
     places = camera.places(np.column_stack([x + 0.5, y + 0.5, canvas.depth[y, x]]))
-    row = KeyedPoints(samples.face.astype(np.int64), samples.points).nearest(canvas.owner[y, x].astype(np.int64),
-                                                                             places)[:, 0]
+    row = near.nearest(canvas.owner[y, x].astype(np.int64), places)[:, 0]
     out[y, x] = np.where(row >= 0, classes[row], -1)
     return out
 
