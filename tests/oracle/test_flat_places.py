@@ -6,6 +6,8 @@ a place it calls harmless must have no gouge.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -195,7 +197,7 @@ def test_a_pit_is_found_at_its_depth_wherever_it_is(radius):
     rng = np.random.default_rng(11)
     ball, flat = ToolBody("T2", 2, 2 * radius, radius, 3.0, 2 * radius, 3.0, 6.0, 30.0), TOOLS["flat"]
     ways = floor_passes(rng)
-    for x, y in rng.uniform(-6.0, 6.0, (40, 2)):
+    for x, y in rng.uniform(-6.0, 6.0, (15, 2)):
         pit = [((x, y, 1.0), (x, y, -0.012)), ((x, y, -0.012), (x, y, 1.0))]
         both = moves(*ways, *pit)
         program = Moves(both.start, both.end, both.feed, np.repeat([0, 1], [len(ways), 2]).astype(np.int32))
@@ -203,6 +205,19 @@ def test_a_pit_is_found_at_its_depth_wherever_it_is(radius):
         left, _ = residual_on_normals(samples.points, samples.normals, np.full(len(samples), 1.5), program,
                                       [flat, ball])
         assert left.min() == pytest.approx(-0.012, abs=1e-6)
+
+
+def test_a_cut_into_the_allowance_is_found_at_its_depth():
+    setup, rng = replace(SETUP, stock_allowance=0.2), np.random.default_rng(13)
+    ball = ToolBody("T2", 2, 0.4, 0.2, 3.0, 0.4, 3.0, 6.0, 30.0)
+    ways = floor_passes(rng, 0.2)
+    x, y = rng.uniform(-6.0, 6.0, 2)
+    both = moves(*ways, ((x, y, 1.0), (x, y, 0.15)))
+    program = Moves(both.start, both.end, both.feed, np.repeat([0, 1], [len(ways), 1]).astype(np.int32))
+    samples = settled_samples(lattice(), BOUNDS, program, [TOOLS["flat"], ball], setup, 1.5)
+    left, _ = residual_on_normals(samples.points, samples.normals, np.full(len(samples), 1.5), program,
+                                  [TOOLS["flat"], ball])
+    assert left.min() == pytest.approx(0.15, abs=1e-6)
 
 
 def test_a_plane_that_no_move_touches_keeps_its_coarse_samples():

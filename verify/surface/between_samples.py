@@ -59,7 +59,7 @@ class Places:
 
     row     : (n,) int64, index, the sample of each
     settled : (n,) bool: within the budget everywhere, or above it by the height of the sample +- ``SAME_HEIGHT``
-    suspect : (n,) bool: some move that passes the place reaches too deep below its plane
+    suspect : (n,) bool: some move that passes the place reaches too deep below its plane, or into the allowance
     pits    : (k, 3) float64, mm, the deepest points of such moves over their place; at most one in each
     pit_row : (k,) int64, index, the sample of each
     """
@@ -99,8 +99,9 @@ def judged_places(samples: SurfaceSamples, residual: F64, bounds: F64, moves: Mo
     low, most = _first_stock(points, normals, u, v, half, bounds, setup, reach)
     enough = state.whole | (most <= np.where(high, left + SAME_HEIGHT, budget))
     stands = np.minimum(low, -state.depth) >= np.maximum(left - SAME_HEIGHT, budget)
-    suspect = state.depth > CLOSER_SHARE * setup.gouge_tolerance
-    pit = np.flatnonzero(state.inside > CLOSER_SHARE * setup.gouge_tolerance)
+    deep = CLOSER_SHARE * setup.gouge_tolerance - setup.stock_allowance
+    suspect = state.depth > deep
+    pit = np.flatnonzero(state.inside > deep)
     pits = points[pit] + state.foot[pit, :1] * u[pit] + state.foot[pit, 1:] * v[pit]
     return Places(rows, enough & (~high | stands), suspect, pits, rows[pit])
 
