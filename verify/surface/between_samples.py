@@ -130,7 +130,7 @@ def settled_samples(samples: SurfaceSamples, bounds: F64, moves: Moves, tools: S
     """The samples with close ones in each place that is not settled whole.
 
     samples : SurfaceSamples, setup frame, whose coarse ones are of ``geometry.sampling.graded_samples`` in that frame
-    bounds  : (2, 3) float64, mm, of the part
+    bounds  : (2, 3) float64, mm, setup frame, of the part
     moves, tools, setup, threads : as in ``judged_places``
     reach   : float, mm, height up to which stock is followed
     report  : called with the share done, 0 to 1; an exception from it ends the work
