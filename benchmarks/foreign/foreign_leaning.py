@@ -70,13 +70,14 @@ def _along(p, q, t0, t1):
 
 
 @njit(**FRESH)
-def leaning(stock, origin, h, starts, ends, turns, feeds, tool, bodies, clearance, spacing, rapid, body, cut):
+def leaning(stock, origin, h, starts, ends, turns, feeds, tool, bodies, clearance, spacing, marks):
     """Run a tool of any axis through ``stock`` (nx, ny, nz) bool, points h mm apart, in place.
 
     turns : (m, 2, 2) rad, A and C at both ends of every move; the rest as in ``foreign_twin.upright``, mm
 
     Descents are not judged: points are further apart than the end of a tool is wide.
     """
+    rapid, body, _, cut = marks
     row = np.array([0.0, tool[2], tool[0], tool[0], 0.0])
     ball = tool[1] > 0.0
     for m in range(len(starts)):

@@ -37,7 +37,7 @@ from benchmarks.foreign.foreign_cases import (  # noqa: E402
     samples_root,
 )
 from benchmarks.foreign.foreign_leaning import leaning  # noqa: E402
-from benchmarks.foreign.foreign_twin import SPACING, upright  # noqa: E402
+from benchmarks.foreign.foreign_twin import SPACING, Marks, upright  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.part import Part  # noqa: E402
 from geometry.sampling import sample_surface  # noqa: E402
@@ -97,11 +97,11 @@ def run_twin(case: Foreign, moves: Paths, heights: F64, grid: tuple[F64, float])
         nx, ny, nz = np.round((box[1] - box[0]) / h).astype(int).tolist()
         stock = case.filled(first, h, (nx, ny, nz))
         leaning(stock, first, h, moves.start, moves.end, moves.turns, moves.feed, case.cutter, *after, case.spacing,
-                rapid, body, cut)
+                Marks(rapid, body, dug, cut))
     else:
         stock = np.full(heights.shape, box[1, 2])
-        upright(stock, origin, step, moves.start, moves.end, moves.feed, case.cutter, case.end, *after, SPACING, rapid,
-                body, dug, cut)
+        upright(stock, origin, step, moves.start, moves.end, moves.feed, case.cutter, case.end, *after, SPACING,
+                Marks(rapid, body, dug, cut))
     skin = case.setup.plunge_skin * case.diameter
     lines = {FindingKind.RAPID: rapid > 0, FindingKind.COLLISION: body == 2, FindingKind.RUBBING: body > 0}
     if not case.leaning:
@@ -155,7 +155,7 @@ def _dug(case: Foreign, moves: Paths, until: int) -> NDArray[np.bool_]:
     nx, ny = (np.floor((box[1, :2] - box[0, :2]) / step).astype(int) + 1).tolist()
     mark, dug, cut = np.zeros(until, np.int8), np.zeros(until), np.zeros(until)
     upright(np.full((nx, ny), box[1, 2]), box[0, :2], step, moves.start[:until], moves.end[:until], moves.feed[:until],
-            case.cutter, case.end, np.zeros((0, 5)), case.setup.clearance_rapid, SPACING, mark, mark, dug, cut)
+            case.cutter, case.end, np.zeros((0, 5)), case.setup.clearance_rapid, SPACING, Marks(mark, mark, dug, cut))
     return dug > case.setup.plunge_skin * case.diameter
 
 
@@ -165,7 +165,7 @@ def _leaning_at(case: Foreign, moves: Paths, until: int, place: F64, kind: Findi
     rapid, body, cut = np.zeros(until, np.int8), np.zeros(until, np.int8), np.zeros(until)
     stock, first = case.filled(place - NEAR, h, (n, n, n)), place - NEAR
     leaning(stock, first, h, moves.start[:until], moves.end[:until], moves.turns[:until], moves.feed[:until],
-            case.cutter, case.bodies, case.setup.clearance_rapid, SPACING, rapid, body, cut)
+            case.cutter, case.bodies, case.setup.clearance_rapid, SPACING, Marks(rapid, body, cut, cut))
     return np.asarray(rapid > 0 if kind == FindingKind.RAPID else body > 0)
 
 

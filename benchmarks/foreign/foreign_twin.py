@@ -14,9 +14,11 @@ a rapid meets stock (2) or comes nearer than its clearance (1), and the same of 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from geometry.kernels.options import KERNEL
 
@@ -202,15 +204,29 @@ def _near(c, p, q, wide, origin, h, n):
     return max(0, math.ceil((low - origin[c]) / h)), min(n - 1, math.floor((high - origin[c]) / h))
 
 
+class Marks(NamedTuple):
+    """What each move does.
+
+    rapid, body : (m,) int8, count, set to 1 or 2 where a rapid, or a body, meets something
+    dug         : (m,) float64, mm, most that steep descents have open at a node after the move
+    cut         : (m,) float64, mm³, what the move takes
+    """
+
+    rapid: NDArray[np.int8]
+    body: NDArray[np.int8]
+    dug: NDArray[np.float64]
+    cut: NDArray[np.float64]
+
+
 @njit(**KERNEL)
-def upright(height, origin, h, starts, ends, feeds, tool, end, bodies, clearance, spacing, rapid, body, dug, cut):
+def upright(height, origin, h, starts, ends, feeds, tool, end, bodies, clearance, spacing, marks):
     """Run a tool along Z through ``height`` (nx, ny) float64, mm, in place.
 
     tool : (radius, ball, flutes), mm; end : mm, radius of the region that cuts straight down; bodies : (b, 5) mm
     clearance : mm round everything in a rapid that is no lift
-    rapid, body : (m,) int8, set to 1 or 2; dug : (m,) mm, most that steep descents have open at a node after the move;
-    cut : (m,) mm³, what each move takes
+    marks : Marks of the moves, filled in
     """
+    rapid, body, dug, cut = marks
     shape = height.shape
     before, stamp, under = np.zeros(shape), np.full(shape, -1, np.int64), np.full(shape, -1, np.int64)
     open_, paid = np.zeros(shape), np.zeros(shape)
