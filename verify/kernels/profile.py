@@ -91,6 +91,10 @@ def carried(qx, qy, qz, dx, dy, dz, a, r, length, cone=0.0):
         if z - s * dz <= 0.0:
             wx, wy, wz = qx - s * dx, qy - s * dy, z - s * dz
             return math.sqrt(wx * wx + wy * wy + wz * wz) - r
+    if plan2 == 0.0 and cone == 0.0 and r <= 0.5 * length:
+        # straight along the axis: no height is better than the middle of the flutes
+        s = min(max((qz - 0.5 * length) / dz, 0.0), 1.0)
+        return _at(s, qx, qy, qz, dx, dy, dz, a, r, length, cone)
     lo, hi = 0.0, 1.0
     wide = math.sqrt(plan2 + dz * dz)
     u, v = GOLDEN, 1.0 - GOLDEN
