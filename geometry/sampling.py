@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from geometry.kernels.graded_sampling import graded_places, mark_near
-from geometry.kernels.sampling import COSINE, SINE, lattice_places
+from geometry.kernels.sampling import COSINE, SINE, graded_places, lattice_places, mark_near
 from geometry.mesh import F64, I32, TriangleMesh
 
 # Least cosine between the normals of facet and surface. Below it the facet is a sliver or folded, or the surface is

@@ -7,7 +7,7 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, blocks, prism, terraces, tool
-from verify.kernels.remains import CLOSE, SHARE
+from verify.kernels.surface.remains import CLOSE, SHARE
 from verify.moves import Moves
 from verify.surface.remains import Remains
 from verify.tool_axes import ToolAxes

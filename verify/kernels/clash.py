@@ -72,7 +72,7 @@ def _meet_point(p, x, y, z, cutter, bodies, b, grow, slack, known):
     bare = -carried(qx, qy, qz, dx, dy, dz, a, r, length, cone)
     if bare > slack:
         return grow + bare
-    return grow - beside(qx, qy, qz, dx, dy, dz, a, r, length, 0.0, grow, slack, cone) if known < grow else 0.0
+    return grow - beside(qx, qy, qz, dx, dy, dz, cutter, 0.0, grow, slack) if known < grow else 0.0
 
 
 @njit(**KERNEL)

@@ -258,8 +258,7 @@ def _meet(stock, bricks, p, body, is_cutter, cutter, grow, slack, best):
                                                    cutter.length, cutter.cone)
                                 depth = grow + bare if bare > slack else 0.0
                                 if depth == 0.0 and known_depth(best, code, grow) < grow:
-                                    depth = grow - beside(qx, qy, qz, dx, dy, dz, cutter.radius - cutter.corner,
-                                                          cutter.corner, cutter.length, v, grow, slack, cutter.cone)
+                                    depth = grow - beside(qx, qy, qz, dx, dy, dz, cutter, v, grow, slack)
                             else:
                                 # the ball of radius v round the node is stock
                                 depth = contact_of_ball(qx, qy, qz, dx, dy, dz,

@@ -49,12 +49,13 @@ def _lowest_on_cone(dz, plan, s0, miss2, a, slope):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _lowest_s(wx, wy, dx, dy, dz, plan, s0, miss2, s1, s2, a, r, cone):
+def _lowest_s(wx, wy, dx, dy, dz, s0, miss2, s1, s2, a, r, cone):
     """Where on [s1, s2] the profile over the line is lowest (a convex function of s)."""
     if dz == 0.0:
         return min(max(s0, s1), s2)
     if r <= 0.0:
         return s1 if dz > 0.0 else s2
+    plan = math.sqrt(dx * dx + dy * dy)
     if cone > 0.0:
         return min(max(_lowest_on_cone(dz, plan, s0, miss2, a, cone / r), s1), s2)
     if a <= 1e-12:
@@ -101,7 +102,7 @@ def lowest_within(x, y, ax, ay, az, dx, dy, dz, wide, a, r, cone=0.0):
     s1, s2 = max(0.0, s0 - half), min(1.0, s0 + half)
     if s1 > s2:
         return INF, 0.0
-    s = _lowest_s(wx, wy, dx, dy, dz, plan, s0, max(miss2, 0.0), s1, s2, a, r, cone)
+    s = _lowest_s(wx, wy, dx, dy, dz, s0, max(miss2, 0.0), s1, s2, a, r, cone)
     return az + s * dz + bottom(_rho(s, wx, wy, dx, dy), a, r, cone), s1
 
 

@@ -12,6 +12,7 @@ import math
 
 from numba import njit
 
+from geometry.kernels.cutter_sizes import CutterSizes
 from geometry.kernels.options import KERNEL
 
 GOLDEN = 0.3819660112501051
@@ -48,11 +49,12 @@ def _at(s, qx, qy, qz, dx, dy, dz, a, r, length, cone):
 
 
 @njit(**KERNEL)
-def beside(qx, qy, qz, dx, dy, dz, a, r, length, v, grow, slack, cone=0.0):
+def beside(qx, qy, qz, dx, dy, dz, cutter: CutterSizes, v, grow, slack):
     """How wide, mm, a cutting part must be made all round to touch a ball of v.
 
     ``grow`` where even that takes in no more of it than ``slack``, which what lies under the tip may be.
     """
+    a, r, length, cone = cutter.radius - cutter.corner, cutter.corner, cutter.length, cutter.cone
     if v - carried(qx, qy, qz, dx, dy, dz, a + grow, r, length, cone) <= slack:
         return grow
     free, hits = 0.0, grow

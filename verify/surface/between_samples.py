@@ -22,7 +22,7 @@ from geometry.mesh import F64
 from geometry.sampling import SurfaceSamples, joined, split_cells
 from geometry.tool_body import ToolBody
 from verify.blank.blank import stock_on_normals
-from verify.kernels.patches import PlaceArrays, judge_tile
+from verify.kernels.surface.patches import PlaceArrays, judge_tile
 from verify.material.tiles import CellGrid, run_tiles
 from verify.model import ProofSetup, StockKind
 from verify.moves import Moves, cutter_table

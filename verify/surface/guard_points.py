@@ -15,7 +15,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.nearest import nearest
 from geometry.mesh_queries.rays import first_hits
 from geometry.sampling import SurfaceSamples, lattice_samples
-from verify.kernels.depth import deepest
+from verify.kernels.surface.depth import deepest
 from verify.progress import Report, silent
 
 GUARD_SPACING = 0.18
@@ -179,8 +179,8 @@ def gouge_depths(tree: TriangleTree, points: F64, normals: F64, along: F64, repo
     Notes
     -----
     A cut that grazes the top of a wall removes whole rays of samples just below the top edge; the depth of a gouge is
-    its depth below the surface. It is as exact as ``verify.kernels.depth.deepest``. A ray that leaves the part within
-    1e-4 mm counts 0.
+    its depth below the surface. It is as exact as ``verify.kernels.surface.depth.deepest``. A ray that leaves the part
+    within 1e-4 mm counts 0.
     """
     out = np.zeros(len(points))
     for i in range(0, len(points), DEPTH_BATCH):

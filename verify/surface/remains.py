@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.tool_body import ToolBody
-from verify.kernels.remains import CLOSE, SHARE, distances_left
+from verify.kernels.surface.remains import CLOSE, SHARE, distances_left
 from verify.material.point_tree import curve_keys
 from verify.material.tiles import run_tiles
 from verify.moves import BOW, Moves, Progress, cutter_table

@@ -226,7 +226,7 @@ def test_one_byte_changes_the_digest_of_what_depends_on_it_only(tmp_path):
             n for n in names if changed in before.dependencies(n)}
         path.write_bytes(content)
     assert {n for n in names if "geometry.kernels.nearest" in before.dependencies(n)} == {
-        "geometry.kernels.nearest", "zones.kernels.nearby", "verify.kernels.depth"}
+        "geometry.kernels.nearest", "zones.kernels.nearby", "verify.kernels.surface.depth"}
 
 
 def test_versions_and_settings_of_the_compiler_are_in_the_digest(tree, monkeypatch):
