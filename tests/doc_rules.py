@@ -78,6 +78,8 @@ NOT_IN_CI = {
                {"tests/time_limits.py": ("ZONEMILL_LIMITS",)}),
     "soak": ("takes longer than CI waits; the same tests run once, shorter, in the slow set",
              {"tests/contract/test_service_faults.py": ("pytest.mark.soak", "pytest.mark.slow")}),
+    "kernels": ("rewrites the list of kernels; the everyday tests tell when it is due",
+                {"tests/unit/service/commands/test_kernel_compiling.py": ("make kernels",)}),
     "golden": ("rewrites the expected files; the everyday tests compare them",
                {"tests/golden_file.py": ("ZONEMILL_GOLDEN",)}),
     "bench": ("takes hours; each script is asked for its help", {}),

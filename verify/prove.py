@@ -103,7 +103,9 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     moves, source = moves_of(framed, tools)
     if asked is not None:
         scored = _settled(scored, part, tools, setup, moves, threads, stages.span(READ, SETTLED))
-    cuts = surface_cuts(part, tools, setup, scored, moves, source, threads, stages.span(SETTLED, CUT))
+    cuts = surface_cuts(part, tools, setup, scored, moves, source, threads,
+                        stages.span(READ if asked is None else SETTLED, CUT))
+    stages.tell(CUT)
     support, unheld = supported(TriangleTree(part.mesh), scored, setup, moves, tools, source, zone_ids, threads,
                                 stages.span(CUT, HELD))
     slides = slides_of(framed, tools, setup)

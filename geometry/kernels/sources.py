@@ -205,7 +205,7 @@ class Sources:
         if self._registering is None:
             self._registering = {}
             for package in PACKAGES:
-                for path in sorted((self.root / package).glob("kernels/*.py")):
+                for path in sorted((self.root / package).glob("kernels/**/*.py")):
                     other = self.name_of(path)
                     if other is not None and other not in APART and _REGISTERS.search(self._text(other)):
                         for target in self._targets(other):

@@ -26,7 +26,8 @@ HEIDENHAIN_M: dict[int, str] = _LINUXCNC | {
     98: "open contours of radius compensation", 104: "the zero of before", 112: "rounded corners",
     114: "another compensation of rotary axes", 124: "points that are left out",
     130: "coordinates that are not tilted", 136: "feed per turn", 138: "a choice of tilting axes",
-    142: "the end of shifts, mirrors and scales", 143: "the end of a basic rotation",
+    140: "a retract without MB and its length", 142: "the end of shifts, mirrors and scales",
+    143: "the end of a basic rotation",
     144: "the kinematics of the moment", 197: "other corners of radius compensation"}
 """M words that are not followed, and what they do, by control."""
 

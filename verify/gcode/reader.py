@@ -37,6 +37,7 @@ from verify.progress import Report, silent
 
 BLEND_LIMIT = 0.01
 _BINARY = re.compile("[\x00-\x08]")
+_CLOSES = re.compile(r"%$|(?:\d+\s+)?END PGM\b")  # what may stand behind the end of a program
 REPORT_LINES = 4096  # lines between two reports of progress
 
 
@@ -108,8 +109,8 @@ class Reader(BlockMotion):
     def _name_unread(self, lines: list[str], seen: bytearray) -> None:
         """Note the lines behind the end of the program that did not run."""
         end = self.log.line
-        rest = [k for k in range(end + 1, len(lines) + 1)
-                if not seen[k] and (text := lines[k - 1].split("(")[0].split(";")[0].strip()) and text != "%"]
+        bare = (lines[k - 1].split("(")[0].split(";")[0].strip() for k in range(end + 1, len(lines) + 1))
+        rest = [k for k, text in enumerate(bare, end + 1) if text and not seen[k] and not _CLOSES.match(text)]
         if rest:
             self.log.note(f"line {end} ends the program; {len(rest)} lines from {rest[0]} to {rest[-1]} stand behind "
                           "it and are not read")

@@ -210,7 +210,7 @@ def test_shapes_and_what_walks_them_are_one_state():
 
 def test_one_byte_changes_the_digest_of_what_depends_on_it_only(tmp_path):
     for name in PACKAGES[:-2]:
-        for path in (ROOT / name).glob("kernels/*.py"):
+        for path in (ROOT / name).glob("kernels/**/*.py"):
             (tmp_path / path.relative_to(ROOT)).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(path, tmp_path / path.relative_to(ROOT))
     before = Sources(tmp_path)
@@ -226,7 +226,8 @@ def test_one_byte_changes_the_digest_of_what_depends_on_it_only(tmp_path):
             n for n in names if changed in before.dependencies(n)}
         path.write_bytes(content)
     assert {n for n in names if "geometry.kernels.nearest" in before.dependencies(n)} == {
-        "geometry.kernels.nearest", "zones.kernels.nearby", "verify.kernels.surface.depth"}
+        "geometry.kernels.nearest", "zones.kernels.nearby", "verify.kernels.surface.depth",
+        "verify.kernels.surface.remains"}
 
 
 def test_versions_and_settings_of_the_compiler_are_in_the_digest(tree, monkeypatch):

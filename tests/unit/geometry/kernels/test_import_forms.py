@@ -45,8 +45,8 @@ def test_every_import_of_a_kernel_is_found():
 
 
 def test_bodies_are_registered_in_folders_of_kernels_that_are_searched():
-    searched = {p for package in PACKAGES for p in (SOURCES.root / package).glob("kernels/*.py")}
-    nested = {p for package in PACKAGES for p in (SOURCES.root / package).rglob("kernels/*.py")
+    searched = {p for package in PACKAGES for p in (SOURCES.root / package).glob("kernels/**/*.py")}
+    nested = {p for package in PACKAGES for p in (SOURCES.root / package).rglob("kernels/**/*.py")
               if "tests" not in p.parts} - searched
     assert nested == set()
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import fields as fields_of
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
-from geometry.sampling import SurfaceSamples
+from geometry.sampling import joined as together
 from geometry.tool_body import HolderFrustum
 from tests.hand_parts import as_part, ball, box_mesh, field_of, joined, samples_of, terraces, tool, view_of
 from zones.model import Connection, Decomposition
@@ -250,10 +249,6 @@ def slots(length):
         low = (up > 0) & (up < 0.3) & (s.points[:, 1] > (12 - length if k == 3 else 0.0))
         by_slot.append(s.subset(inside & low & (np.abs(s.normals[:, 0]) > 0.9) & (s.area > 0)))
     return mesh, by_slot
-
-
-def together(parts):
-    return SurfaceSamples(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields_of(SurfaceSamples)))
 
 
 @pytest.mark.parametrize("length", [0.5, 6.0])

@@ -218,7 +218,7 @@ def test_a_move_left_out_or_put_in_is_found():
 
 @pytest.mark.parametrize(("dialect", "line", "said"), [
     ("fanuc", "G0 X10", "without a decimal point"), ("fanuc", "G234 H1", "unknown word"),
-    ("fanuc", "M428", "word of LinuxCNC"), ("fanuc", "G54.1 P40", "a setup can name"),
+    ("fanuc", "M428", "of LinuxCNC) is not followed"), ("fanuc", "G54.1 P40", "a setup can name"),
     ("fanuc", "X1.; Y2.", "ends the block"),
     ("haas", "G1 X1. F100", "without a decimal point"), ("haas", "G54.1 P1", "unknown word"),
     ("haas", "S900 M3 M8", "one M word in a block"),
@@ -228,7 +228,7 @@ def test_a_move_left_out_or_put_in_is_found():
     ("siemens", "G641", "without ADIS"), ("siemens", "D2", "first cutting edge"),
     ("heidenhain", "L IX+5", "has not stated"),
     ("heidenhain", "PLANE SPATIAL SPA+10 SPB+0 SPC+0 STAY", "no rotary axes"),
-    ("heidenhain", "L X+5 M140", "unknown word"),
+    ("heidenhain", "L X+5 F100 M140", "without MB"),
     ("heidenhain", "CP PA+30 DR+", "has stated"), ("heidenhain", "CP IPA+30 Z+1 DR+", "has stated"),
     ("heidenhain", "TOOL CALL 1 X S500", "tool axis"),
 ])
