@@ -138,12 +138,9 @@ class BlockMotion(FrameWords):
         if not any(named):
             return None if turn is None else self._line_to(list(s.position), RAPID, NAN, turn)
         if not math.isnan(s.position[2]):
-            if (named[0] or named[1]) and s.tilted:
-                self.log.remark("machine_way", f"X or Y moves to a fixed place of the machine from Z{s.position[2]:g} "
-                                "with a rotary axis off 0; the proof does not know that path: send Z home first",
-                                self.log.line)
-            elif named[0] or named[1]:
-                self.stop(WAY_HOME, room=True)
+            if (named[0] or named[1]) and (s.tilted or not self.stop(WAY_HOME, room=True)):
+                self.log.remark("machine_way", f"X or Y moves to a fixed place of the machine from Z{s.position[2]:g}; "
+                                "the proof does not know where that leaves the tool: send Z home first", self.log.line)
             if turn is not None and turn != s.turn:
                 self.log.remark("machine_turn", "a rotary axis turns during a move to a fixed place of the machine "
                                 f"from Z{s.position[2]:g}; the proof does not know that path: send Z home first",

@@ -176,18 +176,22 @@ class Modes(Rotary):
         words.extend(f"{letter}0" for letter in self.rotary if letter not in self.stated_axes)
         self.assumed = tuple(words)
 
-    def stop(self, event: str, *, room: bool = False) -> None:
+    def stop(self, event: str, *, room: bool = False) -> bool:
         """Record where the program stops, if the height is known, or the place where the tool is tilted.
 
         room : whether the tool has to keep the rapid clearance there
+
+        Returns whether it was recorded; without a tool in the spindle it is not.
         """
         s = self.s
         x, y, z = self._tip()
         up = (0.0, 0.0, 1.0)
         if s.tilted and self.machine is not None:
             up = tuple(self.machine.axis(np.radians([s.turn]))[0].tolist())
-        if s.tool > 0 and not math.isnan(z if up[2] == 1.0 else x + y + z):
+        known = s.tool > 0 and not math.isnan(z if up[2] == 1.0 else x + y + z)
+        if known:
             self.log.stops.append(StopPoint(self.log.line, event, s.tool, (x, y, z), up, room))
+        return known
 
     def pause(self, event: str, tool: int) -> None:
         """Record the state of the machine where the program waits or ends."""

@@ -31,6 +31,12 @@ def test_x_and_y_go_home_from_above_everything(home, height, fine):
         assert found[0].depth == pytest.approx(11.0 - height) and found[0].limit == 11.0
 
 
+@pytest.mark.parametrize("home", ["G28", "G53 G0 X0 Y0"])
+def test_without_a_tool_no_height_is_above_everything(home):
+    text = HEAD.replace("T1 M6\nS1000 M3\nG43 H1\n", "") + f"G0 Z4\n{home}\nM30\n%\n"
+    assert [r for r in read_program(text, tools={1}).remarks if "fixed place" in r.message]
+
+
 def test_a_move_of_no_length_is_no_move():
     p = program("G0 Z5", "G91 G28 Z0", "G90")
     still = (p.start == p.end).all(axis=1)
