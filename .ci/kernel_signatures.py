@@ -79,7 +79,10 @@ def _linked(library: Any) -> set[int]:
 def main() -> None:
     with tempfile.TemporaryDirectory() as cache:
         os.environ["NUMBA_CACHE_DIR"] = cache
-        from numba.core import event
+        from numba.core import event  # numba reads the variable here
+
+        # the child that reads the part gets a cache of its own: what it compiles this process would not compile, nor see
+        os.environ["NUMBA_CACHE_DIR"] = str(Path(cache, "child"))
 
         from examples.demo import write_small
         from service.commands.kernel_compiling import LIST

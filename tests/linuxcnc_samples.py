@@ -63,3 +63,8 @@ def programs():
 def has_gaps(text):
     """Whether a program goes to the machine's own places or changes a tool, after which the reader waits for axes."""
     return re.search(r"(?i)G\s*0*(28|30|53)(?![0-9])|M\s*0*6(?![0-9])", text) is not None
+
+
+def without_own_words(text):
+    """The text without M100 to M199 and their P and Q: they move no axis."""
+    return re.sub(r"(?i)\bM1[0-9]{2}(?![0-9])(\s*[PQ]\s*[-+.0-9]+)*", "", text)
