@@ -81,7 +81,7 @@ def main() -> None:
         os.environ["NUMBA_CACHE_DIR"] = cache
         from numba.core import event  # numba reads the variable here
 
-        # the child that reads the part gets a cache of its own: what it compiles this process would not compile, nor see
+        # the child that reads the part gets a cache of its own: what it compiled this process would load, and not list
         os.environ["NUMBA_CACHE_DIR"] = str(Path(cache, "child"))
 
         from examples.demo import write_small

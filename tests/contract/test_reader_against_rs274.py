@@ -26,8 +26,8 @@ PROGRAMS = programs() if RS274 else []
 def test_samples_are_read_as_linuxcnc_reads_them(tmp_path):
     """Whatever the reader takes must run as the interpreter runs it, move by move; the rest it must refuse by line.
 
-    M100 to M199 call programs of the machine. The interpreter alone has none and refuses them; the judge reads the sample
-    without them.
+    M100 to M199 call programs of the machine. The interpreter alone has none and refuses them, so the judge reads the
+    sample without them.
     """
     moving, wrong = [], []
     for n, (name, text) in enumerate(PROGRAMS):
