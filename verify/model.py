@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64, I32, TriangleMesh
 from geometry.tool_body import ToolBody
+from verify.assumptions import Assumed
 from verify.kinematics import Kinematics
 
 if TYPE_CHECKING:  # sampling is compiled, and the readers of programs need these classes without it
@@ -82,6 +83,7 @@ class ProofSetup:
     table_known   : False: the table height is assumed and checked for tilted tools only
     free_ratio    : largest ratio of free height to thickness where a wall is finished (``verify.surface.wall_support``)
     walls_in_turn : whether a larger ratio is a finding; otherwise the proof reports the figure only
+    assumed       : what the setup leaves open and the proof takes for granted
     """
 
     stock_kind: StockKind | str = StockKind.PART_OFFSET
@@ -119,6 +121,7 @@ class ProofSetup:
     table_known: bool = False
     free_ratio: float = 10.0
     walls_in_turn: bool = True
+    assumed: tuple[Assumed, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,6 +339,7 @@ class Proof:
     error_bound : mm, largest error of a residual against the mesh the samples lie on
     support  : free height of thin walls where they were cut
     work     : what became of the work that was asked; None where none was
+    assumed  : what was taken for granted, of the setup and of the programs
     """
 
     findings: tuple[Finding, ...]
@@ -357,6 +361,7 @@ class Proof:
     notes: tuple[str, ...] = field(default=())
     support: Support = Support(0, 0, 0.0, 0.0, 0)
     work: WorkDone | None = None
+    assumed: tuple[Assumed, ...] = ()
 
     @property
     def no_findings(self) -> bool:
@@ -374,5 +379,6 @@ class Proof:
             "tools": {str(k): v for k, v in self.minutes.items()},
             "engaged_rad": {str(k): asdict(v) for k, v in self.engaged.items()}, "error_bound_mm": self.error_bound,
             "reach_mm": self.reach, "line_spacing_mm": self.line_spacing, "notes": list(self.notes),
+            "assumed": [a.as_dict() for a in self.assumed],
             "support": asdict(self.support),
         }

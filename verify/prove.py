@@ -15,6 +15,7 @@ from geometry.errors import VerificationError
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.tool_body import ToolBody
+from verify.assumptions import in_order
 from verify.checks.program_sequence import FramedProgram, Given, check_numbers, counted, moves_of, read_all, slides_of
 from verify.checks.repeated_passes import repeat_findings
 from verify.checks.sideways_cuts import sideways_findings
@@ -142,6 +143,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     stages.tell(1.0)
     proof = _proof(findings, cuts, run, framed, moves, source, setup, scored, zone_ids,
                    engagements(angle, stretches, tools), met.spacing, tuple(notes), support)
+    proof = replace(proof, assumed=in_order(setup.assumed))
     return proof if work is None else replace(proof, work=work)
 
 

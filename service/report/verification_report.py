@@ -55,7 +55,7 @@ def verification_report(job: JobPart, proof: Proof, dense: SurfaceSamples) -> tu
             "cutting_length_mm": r(proof.cutting_length, 1),
             "proof": {"samples": len(dense), "error_bound_mm": proof.error_bound,
                       "stock_line_spacing_mm": proof.line_spacing, "notes": list(proof.notes),
-                      "support": support_of(proof)},
+                      "support": support_of(proof), "assumed": [a.as_dict() for a in proof.assumed]},
             "deviation": deviation(proof), "machined": None, "files": [],
             "part": part_of(job), "version": VERSION}, entry
 

@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from schemas.setup import Lean
+from service.setup_assumptions import setup_assumptions
 from service.stages.access_plan import ProofFrame
 from service.stages.job_inputs import RAMP_ANGLE
 from service.stages.job_part import JobPart
@@ -88,7 +89,8 @@ def proof_setup(job: JobPart, view: View | ProofFrame, *, foreign: bool = False)
         table=table_height(inputs, job.blank) if tabled else None,
         table_known=machine.table_z_mm is not None, free_ratio=FREE_RATIO, walls_in_turn=in_turn(job),
         kinematics=inputs.kinematics, rotary_limits=inputs.rotary_limits,
-        rotary_rate=None if machine.rotary_rate_deg_min is None else float(np.radians(machine.rotary_rate_deg_min)))
+        rotary_rate=None if machine.rotary_rate_deg_min is None else float(np.radians(machine.rotary_rate_deg_min)),
+        assumed=setup_assumptions(inputs))
 
 
 __all__ = ["leaned", "plan_settings", "planning_stock", "proof_setup"]

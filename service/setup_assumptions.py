@@ -1,0 +1,25 @@
+"""What a proof takes for granted because the setup leaves it open."""
+
+from __future__ import annotations
+
+from service.stages.job_inputs import JobInputs
+from verify.assumptions import Assumed, AssumedKind
+
+
+def setup_assumptions(inputs: JobInputs) -> tuple[Assumed, ...]:
+    """The assumptions about machine and tools, in the order of a report."""
+    machine, out = inputs.machine, []
+    if machine.travel_mm is None:
+        out.append(Assumed(AssumedKind.TRAVEL, "long enough", "a move may run into the end of an axis",
+                           "state machine.travel_mm"))
+    if open_rpm := [t.id for t in inputs.tools if machine.max_rpm is None and t.max_rpm is None]:
+        out.append(Assumed(AssumedKind.MAX_RPM, "fast enough",
+                           f"{', '.join(open_rpm)} may turn faster than spindle or tool allow",
+                           "state machine.max_rpm, or max_rpm of each tool"))
+    if machine.table_z_mm is None:
+        out.append(Assumed(AssumedKind.TABLE, "below everything", "a tool may run into the table",
+                           "state machine.table_z_mm"))
+    return tuple(out)
+
+
+__all__ = ["setup_assumptions"]
