@@ -68,9 +68,9 @@ class Reader(BlockMotion):
         if self.s.relative and self.incremental_after_cuts and self.incremental_moved:
             log.remark("incremental", "the program switches to incremental coordinates (G91) after absolute cuts and "
                        "never switches back", line=self.incremental_line)
-        if any(self.s.shift):
+        if any(self.s.shift) or any(self.s.local):
             log.remark("shift_left", "the program ends with its zero shifted (G92, G52), and a control keeps the shift "
-                       "for the next run: cancel it with G92.1")
+                       f"for the next run: {self.cancel_shift}")
         if log.functions:
             log.notes.append(functions_note(log.functions))
         table = log.table()

@@ -158,7 +158,8 @@ class State:
     parked    : whether X or Y stand at a fixed place of the machine (G53, G28, G30)
     cycle     : words of the drilling cycle in force, and the height where its series began
     table     : mm, shift of the work offset by G10
-    shift     : mm, shift of program zero by G92 or G52
+    shift     : mm, shift of program zero by G92, and by G52 where both share one register
+    local     : mm, shift by G52 on a control with a register of its own for it
     kept      : mm, the shift that G92.3 restores
     length    : mm, by which the length offset in force differs from the length of the tool
     side      : of the cutter radius compensation in force, 1 left, -1 right, 0 off; d : its register
@@ -190,6 +191,7 @@ class State:
     ended: bool = False
     table: list[float] = field(default_factory=lambda: [0.0] * 3)
     shift: list[float] = field(default_factory=lambda: [0.0] * 3)
+    local: list[float] = field(default_factory=lambda: [0.0] * 3)
     kept: list[float] = field(default_factory=lambda: [0.0] * 3)
     length: float = 0.0
     side: int = 0
@@ -199,8 +201,9 @@ class State:
     @property
     def origin(self) -> list[float]:
         """mm, where program zero lies in the setup frame."""
-        table, shift = self.table, self.shift
-        return [table[0] + shift[0], table[1] + shift[1], table[2] + shift[2] + self.length]
+        table, shift, local = self.table, self.shift, self.local
+        return [table[0] + shift[0] + local[0], table[1] + shift[1] + local[1],
+                table[2] + shift[2] + local[2] + self.length]
 
     @property
     def length_off(self) -> bool:

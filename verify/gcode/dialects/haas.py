@@ -62,6 +62,8 @@ class HaasReader(FanucReader):
             return [f"G64 P{values['E']}"]
         if code in (5.1, 54.1):
             raise BlockError(f"unknown word G{code:g}: Haas has G187 and G154")
+        if code == 92.1:
+            raise BlockError("unknown word G92.1: Haas ends a shift with another G92, or with G52")
         return super()._code(code, values)
 
     def _after(self, codes: list[float]) -> list[str]:
