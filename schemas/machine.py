@@ -117,10 +117,11 @@ class Machine(WireModel):
         ge=1, le=1e6, description="Rapid rate, mm/min, for machining times; null: 10000.")] = None
     acceleration_mm_s2: Annotated[Number | None, Field(
         ge=1, le=1e7, description="Acceleration, mm/s2, for machining times; null: 1000.")] = None
-    rapid_motion: Annotated[Literal["linear", "dogleg"], Field(
+    rapid_motion: Annotated[Literal["linear", "dogleg"] | None, Field(
         description="Path of a rapid in several axes. linear: a straight line. dogleg: each axis moves at its own "
-                    "speed, so the path is not straight. A rapid of several axes is then a finding unless it stays "
-                    "clearance_mm.rapid above part, stock and fixtures.")] = "linear"
+                    "speed, so the path is not straight. The whole box of the move must then stay clear of part, stock "
+                    "and fixtures. null: dogleg on fanuc and haas, linear on the other controls; the report lists "
+                    "this under proof.assumed where it matters.")] = None
     ap238: Annotated[Literal["cc1", "cc2", "integrated_cnc"], Field(
         description="Form of job.stpnc. cc1: conformance class 1 of AP238, tool paths. cc2: class 2, which adds the "
                     "shapes of part and blank, strategies and setup instructions. integrated_cnc: like cc1, with the "

@@ -70,7 +70,8 @@ class ProofSetup:
     acceleration  : mm/s², for times
     travel        : (3,) float64, mm, span of the moves of a program that the machine allows in X, Y and Z, or None
     gauge_length  : mm by T number, from the spindle face to the tip; counted in Z against the travel
-    dogleg        : whether a rapid moves each axis at its own speed, so that its path is not a straight line
+    dogleg        : whether a rapid moves each axis at its own speed, so that its path is not a straight line; None: by
+                    the dialect of the programs
     max_feed      : mm/min of any feed move, or None
     max_rpm       : 1/min by T number; a tool that is absent has no limit
     max_engaged   : rad by T number, largest engaged angle of the front half of a cutter; absent: no limit
@@ -108,7 +109,7 @@ class ProofSetup:
     acceleration: float = 1000.0
     travel: F64 | None = None
     gauge_length: Mapping[int, float] = field(default_factory=dict)
-    dogleg: bool = False
+    dogleg: bool | None = None
     work_offset: str = "G54"
     max_feed: float | None = None
     max_rpm: Mapping[int, float] = field(default_factory=dict)

@@ -16,6 +16,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.tool_body import ToolBody
 from verify.assumptions import in_order
+from verify.checks.program_assumptions import program_assumptions, rapids_decided
 from verify.checks.program_sequence import FramedProgram, Given, check_numbers, counted, moves_of, read_all, slides_of
 from verify.checks.repeated_passes import repeat_findings
 from verify.checks.sideways_cuts import sideways_findings
@@ -98,6 +99,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     lines [VanHook1986], or on a grid where tools tilt or programs run with another side up.
     """
     _check(tools, setup, scored, zone_ids)
+    stated, setup = setup.dogleg is not None, rapids_decided(programs, setup)
     threads = threads or min(2, os.cpu_count() or 1)
     stages = StageProgress(progress)
     framed = read_all(programs, part, tools, setup, spindle_tool, stages.span(0.0, READ), read)
@@ -143,7 +145,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     stages.tell(1.0)
     proof = _proof(findings, cuts, run, framed, moves, source, setup, scored, zone_ids,
                    engagements(angle, stretches, tools), met.spacing, tuple(notes), support)
-    proof = replace(proof, assumed=in_order(setup.assumed))
+    proof = replace(proof, assumed=in_order(
+        [*setup.assumed, *program_assumptions(framed, tools, setup, stated)]))
     return proof if work is None else replace(proof, work=work)
 
 

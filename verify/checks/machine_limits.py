@@ -31,11 +31,14 @@ def way_findings(p: Program, bounds: F64, tools: Sequence[ToolBody], setup: Proo
 
     bounds : (2, 3) float64, mm, setup frame, of the part
     """
-    top = top_of_all(bounds, setup)
-    low = np.minimum(p.start[:, 2], p.end[:, 2])
-    if p.poses is not None:  # the holder of a tilted tool may be lower than its tip
-        low = np.minimum(low, lowest_places(p, tools, setup, leaning=True))
+    top, low = top_of_all(bounds, setup), low_places(p, tools, setup)
     return [*_blind(p, bounds, top, low, setup), *_doglegs(p, top, low, setup), *_low_stops(p, bounds, setup)]
+
+
+def low_places(p: Program, tools: Sequence[ToolBody], setup: ProofSetup) -> F64:
+    """(m,) float64, mm, lowest place of the tool on each move; the holder of a tilted tool may be lower than its tip."""
+    low = np.minimum(p.start[:, 2], p.end[:, 2])
+    return low if p.poses is None else np.minimum(low, lowest_places(p, tools, setup, leaning=True))
 
 
 def _blind(p: Program, bounds: F64, top: float, low: F64, setup: ProofSetup) -> Iterator[Finding]:

@@ -15,6 +15,7 @@ from verify.program.move_log import Log
 from verify.program.program import NAN, Pause, StopPoint
 
 INCH = 25.4
+PATH_MODES: frozenset[float] = frozenset({61, 61.1, 64})
 
 
 class Modes(Rotary):
@@ -163,6 +164,8 @@ class Modes(Rotary):
             self._length_offset(g, values)
         elif g in WORK_OFFSETS:
             self._select_zero(WORK_OFFSETS[g])
+        elif g in PATH_MODES and self.log.path_stated is None:
+            self.log.path_stated = self.log.count
 
     def _assume(self) -> None:
         """Record the modes that the first move assumes: a control keeps the modes of the program before."""

@@ -9,8 +9,9 @@ machinist should not run is a ``Remark``, and the reading goes on: length offset
 stopped, path blending beyond the tolerance, a word that no code uses.
 
 Assumptions: home (G53 Z0, G28, G30), a tool change and the start of a program are above everything; axes of unknown
-position are known again once programmed. Before the program states them, the unit is mm, the control keeps to the path
-and rotary axes stand at 0; ``Program.assumed`` lists these assumptions.
+position are known again once programmed. Before the program states them, the unit is mm and rotary axes stand at 0;
+``Program.assumed`` lists these assumptions. LinuxCNC starts in G64 without a tolerance; on other controls parameters
+decide (``Program.unbounded``).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 import numpy as np
 
 from geometry.errors import ProgramError, VerificationError
+from geometry.mesh import F64
 from verify.gcode.block_motion import BlockMotion
 from verify.gcode.block_words import Block, BlockError, parse_block, straight, used_letters
 from verify.gcode.dialects import CONTROLS, DIALECTS, LINUXCNC, translated_blocks
@@ -74,6 +76,7 @@ class Reader(BlockMotion):
         if log.functions:
             log.notes.append(functions_note(log.functions))
         table = log.table()
+        self._path_mode(table)
         speed, coolant = log.states()
         start, end, feed = (np.ascontiguousarray(table[:, k]) for k in (slice(0, 3), slice(3, 6), 7))
         return Program(log.name, start, end, table[:, 6].astype(np.int8), feed, table[:, 8].astype(np.int32),
@@ -98,6 +101,20 @@ class Reader(BlockMotion):
     def leave(self) -> None:
         """A subroutine ends: the modes that its M73 saved come back."""
         self.saved.leave(self.s)
+
+    def _path_mode(self, table: F64) -> None:
+        """Tell where the first feed move of ``table`` (m, 10) runs in a path mode that nothing states before it."""
+        first = int(np.argmax(table[:, 6] == FEED)) if len(table) else 0
+        if not len(table) or table[first, 6] != FEED:
+            return
+        if self.log.path_stated is not None and self.log.path_stated <= first:
+            return
+        if self.fits:
+            self.log.remark("blending", "neither G61 nor G64 stands before this feed move: LinuxCNC starts in G64 "
+                            "without a P, which lets the control leave the path by any amount (limit "
+                            f"P{self.blend_limit:g} mm)", line=int(table[first, 9]))
+        else:
+            self.log.unbounded = True
 
     def _finish(self) -> None:
         """Write what a contour still holds back."""

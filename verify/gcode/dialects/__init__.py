@@ -22,6 +22,10 @@ CONTROLS: dict[str, type[DialectReader]] = {
     "fanuc": FanucReader, "haas": HaasReader, "siemens": SiemensReader, "heidenhain": HeidenhainReader}
 """Readers by dialect; ``LINUXCNC`` needs none."""
 
+OWN_SPEED_RAPIDS = frozenset({"fanuc", "haas"})
+"""Controls on which each axis of a rapid moves at its own speed unless a parameter or setting says otherwise: Fanuc's
+parameter 1401#1 (LRP), Haas's setting 335. LinuxCNC, Siemens and Heidenhain interpolate rapids."""
+
 NEWS = " "
 """A block without words that keeps the next one off the fast path."""
 
@@ -96,4 +100,4 @@ def dialect_of(text: str, ending: str = "", wanted: Collection[str] = ()) -> str
     return named[0] if named else plain[0] if len(may) == 1 else LINUXCNC
 
 
-__all__ = ["CONTROLS", "DIALECTS", "ENDINGS", "LINUXCNC", "dialect_of", "translated_blocks"]
+__all__ = ["CONTROLS", "DIALECTS", "ENDINGS", "LINUXCNC", "OWN_SPEED_RAPIDS", "dialect_of", "translated_blocks"]

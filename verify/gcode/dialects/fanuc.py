@@ -29,7 +29,7 @@ _FOREIGN: dict[str, frozenset[float]] = {
 ROUNDING = "parameters of the machine set how far the control rounds corners: the error bound does not include it"
 _PLACES = "XYZABCIJKRUVW"
 _KNOWN_M = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30})
-IDLE_G: frozenset[float] = frozenset({9, 13.1, 22, 23, 25, 26, 40.1, 50.2, 61, 62, 63, 67, 69.1, 94.1, 97, 113})
+IDLE_G: frozenset[float] = frozenset({9, 13.1, 22, 23, 25, 26, 40.1, 50.2, 62, 63, 67, 69.1, 94.1, 97, 113})
 """G words without effect on a move: exact stop, modes of tapping and cutting, stroke checks, ends of modes."""
 SMOOTHING: frozenset[float] = frozenset({5, 5.1, 5.4, 8, 64, 61.1})
 REFUSED = {
@@ -64,6 +64,7 @@ class FanucReader(FanucPlanes):
         self.unbounded = True
         self.polar = False
         self.hole = False
+        self.exact = self.limited = False
 
     def order(self, lines: Sequence[str], machine: Machine) -> Iterator[tuple[int, str]]:
         """As in the base class; ``verify.gcode.flow.macro_flow`` follows subprograms, macros, jumps and variables."""
@@ -213,8 +214,14 @@ class FanucReader(FanucPlanes):
             return ["G43.4"]
         if code == 5.1 and float(values.get("Q", "-1")) not in (0.0, 1.0):
             raise BlockError("G05.1 without Q0 or Q1")
+        if code in (61, 62, 63, *SMOOTHING):
+            self.exact = code == 61
+            self.bound(self.exact or self.limited)
+        if code == 61:
+            return ["G61"]
         if code in SMOOTHING:
-            self.notes.append(ROUNDING)
+            if not self.limited:
+                self.notes.append(ROUNDING)
             return []
         if code == 76:
             self.notes.append("G76 is read without its shift at the bottom: a parameter decides its direction")

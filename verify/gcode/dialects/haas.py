@@ -56,8 +56,10 @@ class HaasReader(FanucReader):
             if "E" not in values:
                 self.notes.append("G187 without E: a setting of the machine decides how far the control rounds "
                                   "corners; the error bound does not include it")
-                self.bound(False)
+                self.limited = False
+                self.bound(self.exact)
                 return []
+            self.limited = True
             self.bound(True)
             return [f"G64 P{values['E']}"]
         if code in (5.1, 54.1):

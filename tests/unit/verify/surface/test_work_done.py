@@ -133,7 +133,7 @@ def faced(*heights):
     """Rows over the whole top at some heights, 0 being the top, each a run of its own."""
     rows = [f"X{24 * (1 if k % 2 else -1)} Y{y}\nX{24 * (-1 if k % 2 else 1)}" for k, y in enumerate(range(-16, 18, 3))]
     body = [f"G0 Z20\nX-24 Y-20\nG1 Z{z} F300\n" + "\n".join(rows) for z in heights]
-    head = ["%", "G21 G90 G17 G94 G40 G49 G54", "T1 M6", "S8000 M3", "G0 G43 H1 Z20"]
+    head = ["%", "G21 G90 G17 G94 G40 G49 G54 G61", "T1 M6", "S8000 M3", "G0 G43 H1 Z20"]
     return [*head, *"\n".join(body).split("\n"), "G0 Z20", "M5", "M30", "%"]
 
 
