@@ -99,10 +99,11 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     lines [VanHook1986], or on a grid where tools tilt or programs run with another side up.
     """
     _check(tools, setup, scored, zone_ids)
-    stated, setup = setup.dogleg is not None, rapids_decided(programs, setup)
     threads = threads or min(2, os.cpu_count() or 1)
     stages = StageProgress(progress)
     framed = read_all(programs, part, tools, setup, spindle_tool, stages.span(0.0, READ), read)
+    stated = setup.dogleg is not None
+    framed, setup = rapids_decided(framed, setup)
     moves, source = moves_of(framed, tools)
     if asked is not None:
         scored = _settled(scored, part, tools, setup, moves, threads, stages.span(READ, SETTLED))

@@ -9,11 +9,10 @@ import math
 
 import numpy as np
 
-from schemas.machine import Machine
 from schemas.setup import Lean
-from service.setup_assumptions import setup_assumptions
+from service.setup_assumptions import planned_sense, setup_assumptions
 from service.stages.access_plan import ProofFrame
-from service.stages.job_inputs import RAMP_ANGLE
+from service.stages.job_inputs import RAMP_ANGLE, JobInputs
 from service.stages.job_part import JobPart
 from service.stages.preparation import Prepared, table_height
 from service.stages.programs import access_of, fixture_boxes, turning_of
@@ -86,23 +85,26 @@ def proof_setup(job: JobPart, view: View | ProofFrame, *, foreign: bool = False)
         travel=None if machine.travel_mm is None else np.array(machine.travel_mm, dtype=np.float64),
         gauge_length=inputs.gauge_lengths,
         line_spacing=min(ProofSetup.line_spacing, inputs.engagement_spacing),
-        dogleg=_own_speeds(machine, foreign), max_feed=machine.max_feed_mm_min,
+        dogleg=_own_speeds(inputs, foreign), max_feed=machine.max_feed_mm_min,
         max_engaged=inputs.max_engaged, max_rpm=inputs.max_rpm,
         table=table_height(inputs, job.blank) if tabled else None,
         table_known=machine.table_z_mm is not None, free_ratio=FREE_RATIO, walls_in_turn=in_turn(job),
         kinematics=inputs.kinematics, rotary_limits=inputs.rotary_limits,
         rotary_rate=None if machine.rotary_rate_deg_min is None else float(np.radians(machine.rotary_rate_deg_min)),
-        assumed=setup_assumptions(inputs))
+        assumed=(*setup_assumptions(inputs), *(() if foreign else planned_sense(inputs))))
 
 
-def _own_speeds(machine: Machine, foreign: bool) -> bool | None:
+def _own_speeds(inputs: JobInputs, foreign: bool) -> bool | None:
     """Whether each axis of a rapid moves at its own speed; None: as the dialect of the program has it.
 
-    A plan is for all its controls, so one of them that moves so decides.
+    A plan on three axes is for all its controls, so one of them that moves so decides. On five axes it needs straight
+    rapids, and its header says so.
     """
+    machine = inputs.machine
     if machine.rapid_motion is not None:
         return machine.rapid_motion == "dogleg"
-    return True if not foreign and not OWN_SPEED_RAPIDS.isdisjoint(machine.dialects) else None
+    own = not foreign and not inputs.turns and not OWN_SPEED_RAPIDS.isdisjoint(machine.dialects)
+    return True if own else None
 
 
 __all__ = ["leaned", "plan_settings", "planning_stock", "proof_setup"]

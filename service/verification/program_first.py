@@ -5,15 +5,21 @@ This module imports nothing that is compiled, so that the refusal comes at once.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from geometry.errors import SetupError
+from schemas.machine import Machine
 from schemas.setup import Setup
 from service.from_wire import check_spindle_tool, gauge_lengths, machine_kinematics, tool_bodies
-from verify.gcode.dialects import dialect_of
+from service.verification.rotary_sense import assumed_sense, check_sense, sense_in_header
+from verify.assumptions import Assumed, AssumedKind
+from verify.gcode.dialects import dialect_of, dialects_left
+from verify.kinematics import Kinematics
 from verify.model import NcProgram
 from verify.program.program import Program
 from verify.program_reading import read_one
+from verify.stepnc.part21 import is_exchange_file
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +30,16 @@ class ProgramFirst:
     read   : Program, its moves in its own frame
     access : id of the access in whose frame it is read; None: that of the job
     spindle_tool : T number in the spindle before its first line; 0 for none
+    kinematics : rotary axes that it was read for; None on a machine of three axes
+    assumed : what neither setup nor program states about how it is read
     """
 
     nc: NcProgram
     read: Program
     access: str | None
     spindle_tool: int
+    kinematics: Kinematics | None = None
+    assumed: tuple[Assumed, ...] = ()
 
 
 def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_tool: int = 0,
@@ -41,7 +51,7 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
     Raises
     ------
     SetupError
-        ``no_such_access``, ``no_such_tool``.
+        ``no_such_access``, ``no_such_tool``, ``rotary_sense_open``.
     ProgramError, VerificationError
         The program cannot be read, as ``verify.program_reading.read_one``.
     """
@@ -52,11 +62,35 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
     check_spindle_tool(setup, spindle_tool)
     own = known[access] if access is not None else setup.access[0]
     nc = NcProgram("program", text, dialect=dialect or dialect_of(text, ending, setup.machine.dialects))
-    tools = tool_bodies(setup)
-    read = read_one(nc, tools, work_offset=own.work_offset, gouge_tolerance=setup.quality.gouge_tolerance_mm,
-                    kinematics=machine_kinematics(setup.machine), gauge_length=gauge_lengths(setup.tools, tools),
-                    spindle_tool=spindle_tool)
-    return ProgramFirst(nc, read, access, spindle_tool)
+    tools, machine = tool_bodies(setup), machine_kinematics(setup.machine)
+    assumed: list[Assumed] = []
+
+    def reading(of: Kinematics | None) -> Program:
+        return read_one(nc, tools, work_offset=own.work_offset, gouge_tolerance=setup.quality.gouge_tolerance_mm,
+                        kinematics=of, gauge_length=gauge_lengths(setup.tools, tools), spindle_tool=spindle_tool)
+
+    if dialect is None and not is_exchange_file(text):
+        assumed.extend(_assumed_dialect(nc.dialect, dialects_left(text, ending, _stated_dialects(setup))))
+    turned = machine if setup.machine.iso_axes is None and not is_exchange_file(text) else None
+    stated = None if turned is None else sense_in_header(text, turned)
+    read = reading(stated or machine)
+    if turned is not None and stated is None:
+        check_sense(read, turned, reading)
+    elif stated is not None and read.poses is not None:
+        assumed.append(assumed_sense(stated, "as the program says"))
+    return ProgramFirst(nc, read, access, spindle_tool, stated or machine, tuple(assumed))
+
+
+def _stated_dialects(setup: Setup) -> list[str]:
+    """The controls that the setup states; the default counts as none."""
+    return [] if setup.machine.dialects == Machine().dialects else setup.machine.dialects
+
+
+def _assumed_dialect(taken: str, others: tuple[str, ...]) -> Iterator[Assumed]:
+    if others:
+        yield Assumed(AssumedKind.DIALECT, taken, f"the program may be for {' or '.join(others)}, which read some "
+                      "words otherwise", "name the control by verify --dialect or by the ending of the file (.ngc), "
+                      "or state another one in machine.dialects")
 
 
 __all__ = ["ProgramFirst", "read_first"]

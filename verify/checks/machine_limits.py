@@ -36,7 +36,7 @@ def way_findings(p: Program, bounds: F64, tools: Sequence[ToolBody], setup: Proo
 
 
 def low_places(p: Program, tools: Sequence[ToolBody], setup: ProofSetup) -> F64:
-    """(m,) float64, mm, lowest place of the tool on each move; the holder of a tilted tool may be lower than its tip."""
+    """(m,) float64, mm, lowest place of the tool on each move: the holder of a tilted tool may be below its tip."""
     low = np.minimum(p.start[:, 2], p.end[:, 2])
     return low if p.poses is None else np.minimum(low, lowest_places(p, tools, setup, leaning=True))
 

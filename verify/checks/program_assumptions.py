@@ -16,24 +16,24 @@ from geometry.tool_body import ToolBody
 from verify.assumptions import Assumed, AssumedKind
 from verify.checks.clear_height import top_of_all
 from verify.checks.machine_limits import joints_of, low_places
-from verify.checks.program_sequence import FramedProgram, Given
+from verify.checks.program_sequence import FramedProgram
 from verify.gcode.dialects import OWN_SPEED_RAPIDS
-from verify.model import NcProgram, ProofSetup
+from verify.model import ProofSetup
 from verify.program.move_kinds import FEED
-from verify.stepnc.part21 import is_exchange_file
 
 STILL = 1e-9  # mm or rad: less is rounding
 
 
-def rapids_decided(programs: Sequence[Given], setup: ProofSetup) -> ProofSetup:
-    """The setup with the path of rapids by dialect, where it does not state one.
+def rapids_decided(read: Sequence[FramedProgram], setup: ProofSetup) -> tuple[list[FramedProgram], ProofSetup]:
+    """Programs and setup with the path of rapids by dialect, where the setup does not state one.
 
-    programs : as ``verify.prove.prove`` takes them
+    Tool centre point control needs straight rapids (on Fanuc parameter 1401#1 LRP 1), so programs that turn rotary axes
+    count as run on a control that is set so.
     """
     if setup.dogleg is not None:
-        return setup
-    controls = {p.dialect for p in programs if isinstance(p, NcProgram) and not is_exchange_file(p.text)}
-    return replace(setup, dogleg=not controls.isdisjoint(OWN_SPEED_RAPIDS))
+        return list(read), setup
+    own = any(r.program.dialect in OWN_SPEED_RAPIDS and r.program.poses is None for r in read)
+    return [replace(r, setup=replace(r.setup, dogleg=own)) for r in read], replace(setup, dogleg=own)
 
 
 def program_assumptions(read: Sequence[FramedProgram], tools: Sequence[ToolBody], setup: ProofSetup,

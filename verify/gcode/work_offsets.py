@@ -27,8 +27,9 @@ class Origins(OffsetTables):
     @property
     def cancel_shift(self) -> str:
         """What ends all shifts on this control, in words of a remark."""
-        return "cancel it with G92.1" if not self._foreign else "cancel it with G52 X0 Y0 Z0, and a G92 that sets the " \
-            "old numbers again"
+        if self._foreign:
+            return "cancel it with G52 X0 Y0 Z0, and with a G92 that sets the old numbers again"
+        return "cancel it with G92.1"
 
     def _shift_origin(self, block: Block, axes: Axes) -> None:
         """Run the word of a block that moves program zero."""
