@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.errors import VerificationError
 from geometry.mesh_queries.bvh import TriangleTree
@@ -18,7 +19,7 @@ from geometry.tool_body import ToolBody
 from verify.assumptions import in_order
 from verify.checks.program_assumptions import program_assumptions, rapids_decided
 from verify.checks.program_sequence import FramedProgram, Given, check_numbers, counted, moves_of, read_all, slides_of
-from verify.checks.repeated_passes import repeat_findings
+from verify.checks.repeated_passes import repeats
 from verify.checks.sideways_cuts import sideways_findings
 from verify.checks.table_clearance import table_findings
 from verify.findings import (
@@ -120,11 +121,12 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
     stretches, of = in_parts(moves, tools)
     angle = engaged_angles(run.engaged, stretches, tools)
+    again, springs = repeats(moves, run.cut, source, _finishes(cuts, setup, len(moves)))
     findings = [*contact_findings(run.events, moves, source, setup.clearance_rapid, skins),
                 *cuts.gouges, *_program_findings(framed), *(f for p in framed for f in p.findings(tools)),
                 *table_findings([p.program for p in framed], tools, setup),
                 *_idle_findings(framed, run, moves, source, [t for t in fine if t.cone_height <= 0.0], asked),
-                *repeat_findings(moves, run.cut, source), *sideways_findings(moves, run.cut, tools, source),
+                *again, *sideways_findings(moves, run.cut, tools, source),
                 *(box_findings(moves, slides, *dogleg_limits(part.mesh, moves, tools, setup), source)
                   if setup.dogleg else ()),
                 *engagement_findings(angle, stretches, of, source, setup.max_engaged), *unheld,
@@ -136,7 +138,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                                                error_bound([p.program for p in framed])), cutting, run.cut, source)
         findings += [*cuts.allowance, *left, *deep_findings(scored.samples, cuts.residual, cuts.mover, cutting, source)]
     notes = [f"{run.lost} contacts are not listed: the tables are full"] if run.lost else []
-    notes.extend(cuts.notes)
+    notes.extend([*cuts.notes, *springs])
     notes.extend(f"T{t.number} is so thin that a plunge may stay unseen: the stock is sampled every "
                  f"{met.spacing:.3f} mm" for t in fine)
     if met.dip > DIP + 1e-9:
@@ -195,6 +197,13 @@ def _idle_findings(read: Sequence[FramedProgram], run: StockPass, moves: Moves, 
             m = int(np.flatnonzero(own)[0])
             out.append(Finding(kind, p.program.name, int(source.line[m]), None, None, None, 0.0, 0.0,
                                "no feed move meets the stock: check the unit, the program zero and the tool"))
+    return out
+
+
+def _finishes(cuts: SurfaceCuts, setup: ProofSetup, count: int) -> NDArray[np.bool_]:
+    """(count,) bool, moves that leave a sample within the budget."""
+    out = np.zeros(count, np.bool_)
+    out[cuts.mover[(cuts.mover >= 0) & proved_samples(cuts.residual, setup)]] = True
     return out
 
 
