@@ -17,6 +17,7 @@ from verify.kinematics import Kinematics
 
 if TYPE_CHECKING:  # sampling is compiled, and the readers of programs need these classes without it
     from geometry.sampling import SurfaceSamples
+    from verify.program.program import Program
 
 
 class StockKind(StrEnum):
@@ -188,11 +189,13 @@ class Asked:
     faces : numbers of the faces that must be within tolerance; None: the faces that the program works on
     touch : Touch, what the tools of the program can touch
     facet : mm, largest distance of the facets of the part from its exact surface
+    whole : the only program of the proof, read on through an end before its last lines; None where nothing follows
     """
 
     faces: frozenset[int] | None
     touch: Touch
     facet: float = 0.0
+    whole: Program | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,13 +51,14 @@ from verify.program.arc_chords import CHORD
 from verify.program.move_times import minutes_of, spent
 from verify.program.program import Program
 from verify.progress import Report, StageProgress
-from verify.surface.asked_faces import Cutting
+from verify.surface.asked_faces import Cutting, Measured
 from verify.surface.between_samples import settled_samples
 from verify.surface.sample_scores import RAY_ERROR, face_proofs, proved_samples, zone_proofs
 from verify.surface.surface_cuts import SurfaceCuts, reach_of, surface_cuts
+from verify.surface.unread_work import unread_work
 from verify.surface.wall_support import supported
 from verify.surface.ways_in import deep_findings
-from verify.surface.work_done import Measured, work_done
+from verify.surface.work_done import work_done
 
 # shares of the work done: read, places between samples settled, residuals, support, contacts known
 READ, SETTLED, CUT, HELD, MET = 0.12, 0.15, 0.48, 0.52, 0.97
@@ -134,8 +135,10 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     work: WorkDone | None = None
     if asked is not None:
         cutting = Cutting(TriangleTree(part.mesh), setup, moves, tools, threads)
-        work, left = work_done(asked, Measured(scored.samples, cuts.residual, cuts.mover, cuts.reach,
-                                               error_bound([p.program for p in framed])), cutting, run.cut, source)
+        measured = Measured(scored.samples, cuts.residual, cuts.mover, cuts.reach,
+                            error_bound([p.program for p in framed]))
+        unread = None if asked.whole is None else unread_work(asked.whole, framed[0], measured, cutting, tools)
+        work, left = work_done(asked, measured, cutting, run.cut, source, unread)
         findings += [*cuts.allowance, *left, *deep_findings(scored.samples, cuts.residual, cuts.mover, cutting, source)]
     notes = [f"{run.lost} contacts are not listed: the tables are full"] if run.lost else []
     notes.extend([*cuts.notes, *springs])

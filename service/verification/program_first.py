@@ -18,7 +18,7 @@ from verify.gcode.dialects import dialect_of, dialects_left
 from verify.kinematics import Kinematics
 from verify.model import NcProgram
 from verify.program.program import Program
-from verify.program_reading import read_one
+from verify.program_reading import read_on, read_one
 from verify.stepnc.part21 import is_exchange_file
 
 
@@ -32,6 +32,7 @@ class ProgramFirst:
     spindle_tool : T number in the spindle before its first line; 0 for none
     kinematics : rotary axes that it was read for; None on a machine of three axes
     assumed : what neither setup nor program states about how it is read
+    whole  : the program read on through an end before its last lines; None where nothing follows its end
     """
 
     nc: NcProgram
@@ -40,6 +41,7 @@ class ProgramFirst:
     spindle_tool: int
     kinematics: Kinematics | None = None
     assumed: tuple[Assumed, ...] = ()
+    whole: Program | None = None
 
 
 def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_tool: int = 0,
@@ -65,8 +67,8 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
     tools, machine = tool_bodies(setup), machine_kinematics(setup.machine)
     assumed: list[Assumed] = []
 
-    def reading(of: Kinematics | None) -> Program:
-        return read_one(nc, tools, work_offset=own.work_offset, gouge_tolerance=setup.quality.gouge_tolerance_mm,
+    def reading(of: Kinematics | None, program: NcProgram = nc) -> Program:
+        return read_one(program, tools, work_offset=own.work_offset, gouge_tolerance=setup.quality.gouge_tolerance_mm,
                         kinematics=of, gauge_length=gauge_lengths(setup.tools, tools), spindle_tool=spindle_tool)
 
     if dialect is None and not is_exchange_file(text):
@@ -78,7 +80,8 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
         check_sense(read, turned, reading)
     elif stated is not None and read.poses is not None:
         assumed.append(assumed_sense(stated, "as the program says"))
-    return ProgramFirst(nc, read, access, spindle_tool, stated or machine, tuple(assumed))
+    whole = read_on(nc, read, lambda program: reading(stated or machine, program))
+    return ProgramFirst(nc, read, access, spindle_tool, stated or machine, tuple(assumed), whole)
 
 
 def _stated_dialects(setup: Setup) -> list[str]:

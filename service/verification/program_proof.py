@@ -51,7 +51,7 @@ def proved_program(job: JobPart, first: ProgramFirst, progress: Callable[[float]
         As ``verify.prove.prove``; the setup names faces the part does not have.
     """
     frame = program_frame(job, first.access)
-    samples, asked = asked_work(job, frame, first.read)
+    samples, asked = asked_work(job, frame, first.read, first.whole)
     conditions = proof_setup(job, frame, foreign=True)
     conditions = replace(conditions, kinematics=first.kinematics, assumed=(*conditions.assumed, *first.assumed))
     no_zone = ScoredSamples(samples, np.zeros(len(samples), np.int32))

@@ -40,6 +40,8 @@ from verify.progress import Report, silent
 BLEND_LIMIT = 0.01
 _BINARY = re.compile("[\x00-\x08]")
 _CLOSES = re.compile(r"%$|(?:\d+\s+)?END PGM\b")  # what may stand behind the end of a program
+# what begins another program or a part of one
+_OPENS = re.compile(r"[O:]\s*[0-9<]|%_N_|PROC\b|LBL\b|\d+\s+(?:BEGIN|LBL)\b", re.IGNORECASE)
 REPORT_LINES = 4096  # lines between two reports of progress
 
 
@@ -59,8 +61,7 @@ class Reader(BlockMotion):
             blocks = Flow(lines, self).blocks()
         seen = bytearray(len(lines) + 2)
         percents = self._scan(_reported(blocks, len(lines), report), seen)
-        if self.s.ended:
-            self._name_unread(lines, seen)
+        cut_off = self._name_unread(lines, seen) if self.s.ended else 0
         self._finish()
         self.stop("end of the program")
         self.pause("end of the program", self.s.tool)
@@ -84,7 +85,7 @@ class Reader(BlockMotion):
                        np.array(log.unknown, np.int64).reshape(-1, 2), tuple(log.stops), self.assumed, log.blend,
                        log.turned.minutes(np.linalg.norm(end - start, axis=1), feed),
                        log.turned.poses(len(table), self.machine), tuple(log.notes), speed, coolant, log.changes,
-                       dialect, log.unbounded, tuple(log.pauses), log.leaves, tuple(log.places))
+                       dialect, log.unbounded, tuple(log.pauses), log.leaves, tuple(log.places), cut_off)
 
     def served(self, key: int | str) -> float:
         """A parameter that the control serves (``verify.gcode.flow.system_parameters``)."""
@@ -123,14 +124,22 @@ class Reader(BlockMotion):
         except BlockError as problem:
             self.log.error(str(problem), remedy=problem.remedy)
 
-    def _name_unread(self, lines: list[str], seen: bytearray) -> None:
-        """Note the lines behind the end of the program that did not run."""
+    def _name_unread(self, lines: list[str], seen: bytearray) -> int:
+        """Note the lines behind the end of the program that did not run.
+
+        Returns the line of the end where such lines go on with the program, 0 where they begin another one.
+        """
         end = self.log.line
         bare = (lines[k - 1].split("(")[0].split(";")[0].strip() for k in range(end + 1, len(lines) + 1))
-        rest = [k for k, text in enumerate(bare, end + 1) if text and not seen[k] and not _CLOSES.match(text)]
-        if rest:
-            self.log.note(f"line {end} ends the program; {len(rest)} lines from {rest[0]} to {rest[-1]} stand behind "
-                          "it and are not read")
+        rest = [(k, text) for k, text in enumerate(bare, end + 1) if text and not seen[k] and not _CLOSES.match(text)]
+        if not rest:
+            return 0
+        first = rest[0][0]
+        other = _OPENS.match(rest[0][1])
+        what = f"{len(rest)} lines from {first} to {rest[-1][0]}"
+        self.log.note(f"line {end} ends the program; {what} stand behind it and are not read"
+                      + (f": line {first} begins another program" if other else ""))
+        return 0 if other else end
 
     def _scan(self, blocks: Iterable[tuple[int, str]], seen: bytearray) -> int:
         """Run blocks with their lines; the fast path serves plain straight moves in the plain state only.

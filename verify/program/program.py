@@ -101,6 +101,7 @@ class Program:
     assumed : words that the first move needs and the program has not stated before it
     blend   : mm, largest rounding of a corner that G64 P allows
     places  : coordinates of the machine (G53) by line: line, axis 0 to 2, and mm
+    cut_off : line that ends the program although lines of it follow, 0 where none do
     leaves  : mm, largest deviation from the path that G64 allows: ``blend`` and the tolerance Q of dropped points
     lines   : number of lines read
     remarks : words and blocks that should not be run
@@ -140,6 +141,7 @@ class Program:
     pauses: tuple[Pause, ...] = ()
     leaves: float = 0.0
     places: tuple[tuple[int, int, float], ...] = ()
+    cut_off: int = 0
 
     def __len__(self) -> int:
         return len(self.start)
