@@ -17,6 +17,7 @@ from verify.assumptions import Assumed, AssumedKind
 from verify.gcode.dialects import dialect_of, dialects_left
 from verify.kinematics import Kinematics
 from verify.model import NcProgram
+from verify.program.move_kinds import FEED
 from verify.program.program import Program
 from verify.program_reading import read_on, read_one
 from verify.stepnc.part21 import is_exchange_file
@@ -80,6 +81,10 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
         check_sense(read, turned, reading)
     elif stated is not None and read.poses is not None:
         assumed.append(assumed_sense(stated, "as the program says"))
+    if setup.machine.coolant == "flood" and not read.cools and (read.kind == FEED).any():
+        assumed.append(Assumed(AssumedKind.COOLANT, "off", "machine.coolant is flood and the program has no word for it: "
+                               "cutting data for coolant do not hold, and chips may stay",
+                               "program M8 or M9, or state machine.coolant off"))
     whole = read_on(nc, read, lambda program: reading(stated or machine, program))
     return ProgramFirst(nc, read, access, spindle_tool, stated or machine, tuple(assumed), whole)
 

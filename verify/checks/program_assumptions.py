@@ -50,6 +50,8 @@ def program_assumptions(read: Sequence[FramedProgram], tools: Sequence[ToolBody]
         else:
             yield Assumed(AssumedKind.RAPID_PATH, "linear", "where each axis moves at its own speed, a rapid of "
                           "several axes takes another path", "state machine.rapid_motion")
+    for r in read:
+        yield from r.program.open
     if any(r.program.unbounded for r in read):
         yield Assumed(AssumedKind.PATH_MODE, "the written path", "parameters of the control decide how far it rounds "
                       "corners; the error bound leaves that out", "state an exact stop (G61, G60) or a tolerance "

@@ -62,7 +62,7 @@ class Modes(Rotary):
         if s.turning:
             self.log.turns(s.tool, s.speed)
         if not {7, 8, 9}.isdisjoint(block.ms):
-            s.coolant = 9 not in block.ms
+            s.coolant, self.log.cools = 9 not in block.ms, True
         speed, coolant = s.speed if s.turning else 0.0, s.coolant
         self._in_order(lambda: self.log.runs(speed, coolant))
         if not {428, 429}.isdisjoint(block.ms):

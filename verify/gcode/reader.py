@@ -85,7 +85,8 @@ class Reader(BlockMotion):
                        np.array(log.unknown, np.int64).reshape(-1, 2), tuple(log.stops), self.assumed, log.blend,
                        log.turned.minutes(np.linalg.norm(end - start, axis=1), feed),
                        log.turned.poses(len(table), self.machine), tuple(log.notes), speed, coolant, log.changes,
-                       dialect, log.unbounded, tuple(log.pauses), log.leaves, tuple(log.places), cut_off)
+                       dialect, log.unbounded, tuple(log.pauses), log.leaves, tuple(log.places), cut_off,
+                       open=() if self.control is None else tuple(self.control.assumed), cools=log.cools)
 
     def served(self, key: int | str) -> float:
         """A parameter that the control serves (``verify.gcode.flow.system_parameters``)."""

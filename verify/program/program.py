@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64, I32
+from verify.assumptions import Assumed
 
 if TYPE_CHECKING:
     from verify.gcode.frames import Frame
@@ -67,6 +68,20 @@ class Pause:
     counted: bool
 
 
+@dataclass(frozen=True)
+class TravelPlane:
+    """A plane of a STEP-NC file to which a control may take the tool in a rapid.
+
+    line  : of the instance that names it; what : 'security plane' or 'retract plane'
+    point : (3,) mm, setup frame; normal : (3,) unit, setup frame
+    """
+
+    line: int
+    what: str
+    point: tuple[float, float, float]
+    normal: tuple[float, float, float]
+
+
 @dataclass(frozen=True, eq=False)
 class Poses:
     """Tool axes and rotary angles of moves.
@@ -101,6 +116,9 @@ class Program:
     assumed : words that the first move needs and the program has not stated before it
     blend   : mm, largest rounding of a corner that G64 P allows
     places  : coordinates of the machine (G53) by line: line, axis 0 to 2, and mm
+    planes  : security planes of a STEP-NC file, and retract planes that lie lower than the path before them ends
+    open    : what it leaves to the control
+    cools   : whether a word says that the coolant is on or off
     cut_off : line that ends the program although lines of it follow, 0 where none do
     leaves  : mm, largest deviation from the path that G64 allows: ``blend`` and the tolerance Q of dropped points
     lines   : number of lines read
@@ -142,6 +160,9 @@ class Program:
     leaves: float = 0.0
     places: tuple[tuple[int, int, float], ...] = ()
     cut_off: int = 0
+    planes: tuple[TravelPlane, ...] = ()
+    open: tuple[Assumed, ...] = ()
+    cools: bool = True
 
     def __len__(self) -> int:
         return len(self.start)

@@ -14,6 +14,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
+from verify.assumptions import Assumed, AssumedKind
 from verify.gcode.block_words import FURTHER, bare
 from verify.gcode.dialects.base import NUMBER, BlockError, Machine, zero_word
 from verify.gcode.dialects.fanuc_planes import FanucPlanes
@@ -97,8 +98,8 @@ class FanucReader(FanucPlanes):
         words = [(a, b) for a, b in words if not (a == "M" and self._idle_m(b))]
         for letter, digits in words:
             self._check(letter, digits)
-        if len(ms := [a + b for a, b in words if a == "M"]) > 1:
-            self._several(" and ".join(ms))
+        if len(ms := [b for a, b in words if a == "M"]) > 1:
+            self._several(ms)
         return self._translated(words, deleted is not None)
 
     def _translated(self, words: list[tuple[str, str]], deleted: bool) -> list[str]:
@@ -177,9 +178,16 @@ class FanucReader(FanucPlanes):
         self.function(int(number))
         return True
 
-    def _several(self, ms: str) -> None:
-        """A block has several M words, named by ``ms``."""
-        self.remarks.append(f"{ms} in one block: parameter 3404#7 decides whether the control runs both or only the "
+    def _several(self, ms: list[str]) -> None:
+        """A block has several M words, with the numbers ``ms``. Spindle and coolant together are usual."""
+        names, kinds = " and ".join(f"M{m}" for m in ms), {float(m) for m in ms}
+        if len(ms) == 2 and len(kinds & {3, 4, 5}) == 1 and len(kinds & {7, 8, 9}) == 1:
+            if not self.assumed:
+                self.assumed.append(Assumed(AssumedKind.COOLANT, f"{names} in one block both count", "where parameter "
+                                            "3404#7 is 0 the control runs only the last of them: the spindle may stand",
+                                            "give each M word its own block"))
+            return
+        self.remarks.append(f"{names} in one block: parameter 3404#7 decides whether the control runs both or only the "
                             "last; give each its own block")
 
     def _word(self, letter: str, digits: str, codes: list[float], values: dict[str, str]) -> list[str]:

@@ -29,8 +29,9 @@ class HaasReader(FanucReader):
             raise BlockError(f"F{digits} without a decimal point counts thousandths or not, depending on a setting",
                              f"write F{digits}.")
 
-    def _several(self, ms: str) -> None:
-        raise BlockError(f"{ms} in one block: Haas takes one M word in a block", "give each its own block")
+    def _several(self, ms: list[str]) -> None:
+        raise BlockError(f"{' and '.join(f'M{m}' for m in ms)} in one block: Haas takes one M word in a block",
+                         "give each its own block")
 
     def _in_seconds(self, digits: str) -> bool:
         return "." in digits

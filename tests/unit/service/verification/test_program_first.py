@@ -45,7 +45,7 @@ def test_a_sense_that_is_stated_or_without_effect_is_not_asked_for():
 
 def test_heads_are_not_asked():
     read = first("G0 A30. C90.\nG1 X10. F500.\n", "head-head-AC")
-    assert read.read.poses is not None and not read.assumed
+    assert read.read.poses is not None and {a.what for a in read.assumed} == {AssumedKind.COOLANT}
 
 
 def test_our_header_states_the_sense():
@@ -70,6 +70,14 @@ def test_a_dialect_is_not_guessed_in_silence(ending, dialects, taken, others):
     told = [a for a in read.assumed if a.what == AssumedKind.DIALECT]
     assert [(a.value, f"for {others}," in a.effect) for a in told] == ([] if others is None else [(taken, True)])
     assert not read_first(setup(**machine), PLAIN, ending=ending, dialect="fanuc").assumed
+
+
+@pytest.mark.parametrize(("word", "coolant", "told"), [
+    ("", "flood", True), ("M8\n", "flood", False), ("M9\n", "flood", False), ("", "off", False)])
+def test_coolant_that_nobody_turns_on_is_told(word, coolant, told):
+    text = f"G21 G90 G17 G94 G54 G61\nT1 M6\nG43 H1\nS900 M3\n{word}G0 X1 Y1 Z9\nG1 X2 F100\nM2\n"
+    read = read_first(setup(coolant=coolant), text, ending=".ngc")
+    assert [a.what for a in read.assumed] == ([AssumedKind.COOLANT] if told else [])
 
 
 def test_marks_and_a_byte_order_mark():
