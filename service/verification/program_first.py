@@ -82,8 +82,8 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
     elif stated is not None and read.poses is not None:
         assumed.append(assumed_sense(stated, "as the program says"))
     if setup.machine.coolant == "flood" and not read.cools and (read.kind == FEED).any():
-        assumed.append(Assumed(AssumedKind.COOLANT, "off", "machine.coolant is flood and the program has no word for it: "
-                               "cutting data for coolant do not hold, and chips may stay",
+        assumed.append(Assumed(AssumedKind.COOLANT, "off", "machine.coolant is flood and the program has no word for "
+                               "it: cutting data for coolant do not hold, and chips may stay",
                                "program M8 or M9, or state machine.coolant off"))
     whole = read_on(nc, read, lambda program: reading(stated or machine, program))
     return ProgramFirst(nc, read, access, spindle_tool, stated or machine, tuple(assumed), whole)
