@@ -148,12 +148,21 @@ class MotionRecorder:
         self.plane("security plane", point, normal, line)
 
     def plane(self, what: str, point: F64, normal: F64, line: int) -> None:
-        """Record a plane to which the control may take the tool. Arguments as ``over``; what : as ``TravelPlane``."""
+        """Record a plane to which the control may take the tool.
+
+        what   : as ``TravelPlane`` has it
+        point  : (3,) float64, mm, setup frame
+        normal : (3,) float64, unit, setup frame
+        """
         key = (what, *np.round(normal, 6).tolist(), round(float(point @ normal), 4))
         self._planes.setdefault(key, TravelPlane(line, what, _three(point), _three(normal)))
 
     def retract_to(self, point: F64, normal: F64, line: int) -> None:
-        """A retract plane behind a path, arguments as ``over``. One above the place of the tool is no way down."""
+        """Record the retract plane behind a path. One above the place of the tool is no way down.
+
+        point  : (3,) float64, mm, setup frame
+        normal : (3,) float64, unit, setup frame
+        """
         if self._here is not None and float((point - self._here[:3]) @ normal) < -SAME_PLACE:
             self.plane("retract plane", point, normal, line)
 

@@ -110,6 +110,7 @@ def dialects_left(text: str, ending: str = "", wanted: Collection[str] = ()) -> 
 
 def _candidates(text: str, ending: str) -> list[str]:
     """The dialects that marks and file name leave, the likeliest first."""
+    text = text.removeprefix("\ufeff")
     if is_conversational(text):
         return ["heidenhain"]
     if is_siemens(text):
