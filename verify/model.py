@@ -66,6 +66,7 @@ class ProofSetup:
     scallop_height, gouge_tolerance, stock_allowance : mm, the budget -gouge <= residual - allowance <= scallop
     ramp_angle    : rad, steepest descent into stock
     ramp_angles   : rad by T number, for tools that have another one
+    cores         : mm by T number, diameter at the end of a tool within which it does not cut; absent: it cuts there
     plunge_skin   : share of the tool diameter that a steeper descent may take off (``verify.material.stock_lines``)
     rapid_feed    : mm/min
     acceleration  : mm/s², for times
@@ -105,6 +106,7 @@ class ProofSetup:
     stock_allowance: float = 0.0
     ramp_angle: float = 0.0523598775598
     ramp_angles: Mapping[int, float] = field(default_factory=dict)
+    cores: Mapping[int, float] = field(default_factory=dict)
     plunge_skin: float = 0.1
     rapid_feed: float = 5000.0
     acceleration: float = 1000.0

@@ -21,6 +21,7 @@ HARMFUL = [  # program, part, kind of finding, its line, depth in mm or None
     ("09-fanuc-diagonal-rapid.nc", "plate", "rapid", 28, 4.0),
     ("15-stepnc-security-plane-in-part.stpnc", "plate", "rapid", 882, 61.5),
     ("17-g53-beyond-travel.ngc", "plate", "limit", 68, 99499.0),
+    ("25-straight-drilling-paid-in-air.ngc", "plate", "plunge", 31, 4.5),
     ("30-rib-0.5x4x30-milled-off.ngc", "rib_0.5", "gouge", None, 4.0),
     ("32-knife-edge-shortened-0.7.ngc", "knife", "gouge", None, 0.7),
     ("34-allowance-cut-away.ngc", "plate", "allowance", None, 0.3),
