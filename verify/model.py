@@ -35,6 +35,7 @@ class FindingKind(StrEnum):
     COLLISION = "collision"
     GOUGE = "gouge"
     ALLOWANCE = "allowance"
+    EXCLUDED_FACE = "excluded_face"
     RAPID = "rapid"
     PLUNGE = "plunge"
     RUBBING = "rubbing"
@@ -86,6 +87,7 @@ class ProofSetup:
     table_known   : False: the table height is assumed and checked for tilted tools only
     free_ratio    : largest ratio of free height to thickness where a wall is finished (``verify.surface.wall_support``)
     walls_in_turn : whether a larger ratio is a finding; otherwise the proof reports the figure only
+    left_alone    : by number of each face that is not to be machined, the words of the setup that say so
     assumed       : what the setup leaves open and the proof takes for granted
     """
 
@@ -125,6 +127,7 @@ class ProofSetup:
     table_known: bool = False
     free_ratio: float = 10.0
     walls_in_turn: bool = True
+    left_alone: Mapping[int, str] = field(default_factory=dict)
     assumed: tuple[Assumed, ...] = ()
 
 

@@ -124,7 +124,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     angle = engaged_angles(run.engaged, stretches, tools)
     again, springs = repeats(moves, run.cut, source, _finishes(cuts, setup, len(moves)))
     findings = [*contact_findings(run.events, moves, source, setup.clearance_rapid, skins),
-                *cuts.gouges, *_program_findings(framed), *(f for p in framed for f in p.findings(tools)),
+                *cuts.gouges, *cuts.excluded, *_program_findings(framed), *(f for p in framed for f in p.findings(tools)),
                 *table_findings([p.program for p in framed], tools, setup),
                 *_idle_findings(framed, run, moves, source, [t for t in fine if t.cone_height <= 0.0], asked),
                 *again, *sideways_findings(moves, run.cut, tools, source),

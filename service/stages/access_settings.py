@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from schemas.setup import Lean
+from service.from_wire import face_numbers
 from service.setup_assumptions import planned_sense, setup_assumptions
 from service.stages.access_plan import ProofFrame
 from service.stages.job_inputs import RAMP_ANGLE, JobInputs
@@ -92,6 +93,7 @@ def proof_setup(job: JobPart, view: View | ProofFrame, *, foreign: bool = False)
         table_known=machine.table_z_mm is not None, free_ratio=FREE_RATIO, walls_in_turn=in_turn(job),
         kinematics=inputs.kinematics, rotary_limits=inputs.rotary_limits,
         rotary_rate=None if machine.rotary_rate_deg_min is None else float(np.radians(machine.rotary_rate_deg_min)),
+        left_alone=left_alone(job),
         assumed=(*setup_assumptions(inputs), *(() if foreign else planned_sense(inputs))))
 
 
@@ -108,4 +110,12 @@ def _own_speeds(inputs: JobInputs, foreign: bool) -> bool | None:
     return True if own else None
 
 
-__all__ = ["leaned", "plan_settings", "planning_stock", "proof_setup"]
+def left_alone(job: JobPart) -> dict[int, str]:
+    """Faces that the setup does not let machine, by number, with the words that say so."""
+    ops, numbers = job.inputs.operations, {f.number for f in job.part.faces}
+    wanted = numbers if ops.faces is None else set(face_numbers(ops.faces))
+    unasked = dict.fromkeys(sorted(numbers - wanted), "operations.faces does not name it")
+    return unasked | dict.fromkeys(face_numbers(ops.exclude_faces), "operations.exclude_faces names it")
+
+
+__all__ = ["leaned", "left_alone", "plan_settings", "planning_stock", "proof_setup"]

@@ -24,6 +24,7 @@ HARMFUL = [  # program, part, kind of finding, its line, depth in mm or None
     ("25-straight-drilling-paid-in-air.ngc", "plate", "plunge", 31, 4.5),
     ("30-rib-0.5x4x30-milled-off.ngc", "rib_0.5", "gouge", None, 4.0),
     ("32-knife-edge-shortened-0.7.ngc", "knife", "gouge", None, 0.7),
+    ("39-thin-wall-rule-diluted.ngc", "thin_wall", "support", 118, 15.7),
     ("34-allowance-cut-away.ngc", "plate", "allowance", None, 0.3),
 ]
 GOOD = ["fa-01-g28-from-the-wall.ngc", "fa-03-spring-pass-after-a-lift.ngc", "fa-05-ramp-of-5-degrees.ngc",
