@@ -241,7 +241,7 @@ def wall_cut(rng: Rng) -> Case:
     way = {"step": 1.0, "slot": -1.0, "boss": -1.0, "pocket": 1.0}[part]
     if part in ("step", "slot"):
         y = float(rng.uniform(-LOW, LOW))
-    s.over(x - 0.5 * way, y)
+    s.over(x - 1.5 * way, y)
     s.rapid(z=z + 2.0)
     s.feed(z=z, feed=FEED)
     ops = [s.feed(x=x + way * d, feed=DOWN), s.feed(x=x - 0.5 * way)]
