@@ -190,8 +190,12 @@ def gouge_depths(tree: TriangleTree, points: F64, normals: F64, along: F64, repo
     return out
 
 
-def _inside(tree: TriangleTree, points: F64) -> NDArray[np.bool_]:
-    """(n,) bool: whether points (n, 3), mm, are in the part, by the first hits of two opposite oblique rays.
+def inside_part(tree: TriangleTree, points: F64) -> NDArray[np.bool_]:
+    """Whether places are in the part, by the first hits of two opposite oblique rays.
+
+    points : (n, 3) float64, mm, frame of the mesh
+
+    Returns (n,) bool.
 
     One ray that leaves the part suffices: the other may pass a hole of the mesh, or enter another solid.
     """
@@ -214,7 +218,7 @@ def _depths(tree: TriangleTree, points: F64, normals: F64, along: F64) -> F64:
     # hollow whose rims have one height; then the middle is not in the part
     leaves = np.einsum("ij,ij->i", tree.mesh.normals[hit], normals) < 0
     ends = np.flatnonzero((hit >= 0) & leaves)
-    leaves[ends] = _inside(tree, points[ends] - 0.5 * through[ends, None] * normals[ends])
+    leaves[ends] = inside_part(tree, points[ends] - 0.5 * through[ends, None] * normals[ends])
     stretch = np.minimum(along, np.where((hit >= 0) & leaves, through, 0.0))
     t, out = tree.arrays, np.empty(len(points))
     deepest(t.lower, t.upper, t.child, t.first, t.size, t.corners, np.ascontiguousarray(points),

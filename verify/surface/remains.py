@@ -23,7 +23,7 @@ from verify.material.point_tree import curve_keys
 from verify.material.tiles import run_tiles
 from verify.moves import BOW, Moves, Progress, cutter_table
 from verify.progress import Report, silent
-from verify.surface.guard_points import gouge_depths
+from verify.surface.guard_points import gouge_depths, inside_part
 from verify.tool_axes import ToolAxes
 
 WHOLE = 0.99  # of the way along a ray: a gouge that deep is measured by its ray
@@ -140,6 +140,15 @@ class Rays(NamedTuple):
     residual: F64
 
 
+def _ends(tree: TriangleTree, rays: Rays, rows: NDArray[np.int64]) -> F64:
+    """(m, 3) places at which rays (k,) meet what is left; without rays whose cut goes out at the far side of an edge."""
+    there = rays.points[rows] + np.minimum(rays.residual[rows], 0.0)[:, None] * rays.normals[rows]
+    cut = np.flatnonzero(rays.residual[rows] < -CLOSE)
+    kept = np.ones(len(rows), np.bool_)
+    kept[cut] = inside_part(tree, there[cut])
+    return there[kept]
+
+
 def depths_both_ways(left: Remains, rays: Rays, deep: NDArray[np.int64], even: int, tolerance: float,
                      tell: Report = silent) -> F64:
     """Depth of gouges: removed places to the surface, or surface that is gone to what is left [Hausdorff1914].
@@ -161,7 +170,7 @@ def depths_both_ways(left: Remains, rays: Rays, deep: NDArray[np.int64], even: i
         return depth
     ends = np.ones(len(rays.points), np.bool_)
     ends[deep[~whole]] = False
-    there = (rays.points + np.minimum(rays.residual, 0.0)[:, None] * rays.normals)[ends]
+    there = _ends(left.tree, rays, np.flatnonzero(ends))
     size = float(np.linalg.norm(np.diff(left.tree.mesh.bounds, axis=0)))
 
     def second(rows: NDArray[np.int64], first: float, last: float) -> NDArray[np.int64]:

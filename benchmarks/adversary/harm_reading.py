@@ -1,0 +1,272 @@
+"""Harm by what a control reads: offsets, modes, units, registers, ends; and by speeds and feeds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from benchmarks.adversary.adversary_case import REFUSED, SAFE, Case, Op, Script, made, number
+from benchmarks.adversary.adversary_parts import BALL, FEED, FLAT, OUT, PARTS, rows, spread
+from benchmarks.adversary.harm_surface import base, choice
+
+Rng = np.random.Generator
+LEVEL = ("plate", "rib", "step", "slot", "floor", "boss", "pocket")
+LINUXCNC = ["%", "G21 G17 G90 G94 G40 G49 G80 G64 P0.001 Q0", "G54"]
+
+
+def _raw_change(s: Script, *lines: str) -> list[Op]:
+    return [s.raw(line) for line in lines]
+
+
+def _without_first(s: Script, *lines: str) -> list[Op]:
+    """Put lines in place of the first tool change."""
+    ops = _raw_change(Script(), *lines)
+    s.ops = [*ops, *s.ops[1:]]
+    return ops
+
+
+def wrong_length_offset(rng: Rng) -> Case:
+    """The length offset of another tool."""
+    part = choice(rng, *LEVEL)
+    s = PARTS[part].program()
+    ops = _without_first(s, "T1 M6", "G43 H2", "S6000 M3")
+    return made("wrong length offset", part, s, ("program",), [ops[1]], word="offset")
+
+
+def no_length_offset(rng: Rng) -> Case:
+    """No length offset at all."""
+    part = choice(rng, *LEVEL)
+    s = PARTS[part].program()
+    _without_first(s, "T1 M6", "S6000 M3")
+    return made("no length offset", part, s, ("program", REFUSED), None)
+
+
+def no_spindle(rng: Rng) -> Case:
+    """The spindle never turns, or stops before the last row."""
+    part = choice(rng, *LEVEL)
+    s = PARTS[part].program()
+    if rng.random() < 0.5:
+        _without_first(s, "T1 M6", "G43 H1")
+    else:
+        s.ops.insert(len(s.ops) - 6, Op("raw", text="M5"))
+    return made("no spindle", part, s, ("program",), None)
+
+
+def stale_length_in_rapid(rng: Rng) -> Case:
+    """A longer tool comes down in a rapid under the length of the one before it."""
+    longer = float(rng.uniform(15.0, 40.0))
+    tools = [FLAT, {**FLAT, "id": "T2", "number": 2, "stickout_mm": 40.0 + longer}]
+    s = base("plate")
+    _raw_change(s, "M5", "G53 G0 Z0", "T2 M6", "S6000 M3")
+    s.rapid(float(rng.uniform(2, 26)), float(rng.uniform(-6, 6)))
+    ops = [s.rapid(z=PARTS["plate"].top + float(rng.uniform(1.5, 5.0)))]
+    _raw_change(s, "G43 H2")
+    s.rapid(z=SAFE)
+    return made("stale length in rapid", "plate", s, ("program", "rapid", "collision"), ops, None, {"tools": tools})
+
+
+def shift_by_g92(rng: Rng) -> Case:
+    """A shift by G92 that stays: the part is cut that much aside."""
+    part, by = choice(rng, "step", "boss"), float(np.round(rng.uniform(0.05, 2.0), 3))
+    s = PARTS[part].program()
+    way = 1.0 if part == "step" else -1.0
+    here = s.ops[1]
+    s.ops.insert(2, Op("raw", text=f"G92 X{(here.x or 0.0) - way * by:.4f}"))
+    return made("shift by G92", part, s, ("gouge",), None, by, what=f"{by} aside")
+
+
+def fanuc_g92_g52(rng: Rng) -> Case:
+    """Fanuc: G52 X0 does not take back what G92 shifted."""
+    by, dialect = float(np.round(rng.uniform(0.05, 2.0), 3)), choice(rng, "fanuc", "haas")
+    s = PARTS["step"].program()
+    here = s.ops[1]
+    s.ops[2:2] = [Op("raw", text=f"G92 X{number((here.x or 0.0) - by, dialect)}"), Op("raw", text="G52 X0.")]
+    kinds = ("gouge", "program", REFUSED)
+    return made("G92 before G52", "step", s, kinds, None, None, {"machine": {"dialects": [dialect]}}, dialect,
+                what=f"{by} aside")
+
+
+def no_path_mode(rng: Rng) -> Case:
+    """LinuxCNC with neither G61 nor G64 P: it begins in G64, which rounds corners without a bound."""
+    part = choice(rng, *LEVEL)
+    s = PARTS[part].program()
+    s.head = ["%", "G21 G17 G90 G94 G40 G49 G80" + (" G64" if rng.random() < 0.5 else ""), "G54"]
+    return made("no path tolerance", part, s, ("program", "limit"), None)
+
+
+def wide_path_mode(rng: Rng) -> Case:
+    """A path tolerance far over the gouge tolerance."""
+    part = choice(rng, *LEVEL)
+    s = PARTS[part].program()
+    s.head = ["%", f"G21 G17 G90 G94 G40 G49 G80 G64 P{rng.uniform(0.02, 1.0):.3f}", "G54"]
+    return made("wide path tolerance", part, s, ("program", "limit"), None)
+
+
+def machine_move_too_far(rng: Rng) -> Case:
+    """A move in machine coordinates far beyond the travel."""
+    s = base("plate")
+    axis, far = "XYZ"[int(rng.integers(3))], float(np.round(rng.uniform(900, 99999), 1))
+    ops = [s.raw("G53 G0 Z0"), s.raw(f"G53 G0 {axis}-{far}")]
+    setup = {"machine": {"travel_mm": [500.0, 500.0, 500.0]}}
+    return made("machine move too far", "plate", s, ("limit",), [ops[1]], None, setup, what=f"{axis}-{far}")
+
+
+def stray_end(rng: Rng) -> Case:
+    """M2 before the last rows: what only they cut is left."""
+    part = choice(rng, "step", "slot", "boss")
+    s = PARTS[part].program()
+    cut = len(s.ops) - int(rng.integers(4, 10))
+    s.ops.insert(cut, Op("raw", text="M2"))
+    s.ops.insert(cut, Op("rapid", z=SAFE))
+    return made("stray end", part, s, ("stock_left",), None)
+
+
+def stray_early_end(rng: Rng) -> Case:
+    """M2 right after the top is faced; levels under it are only cut behind that."""
+    part = choice(rng, "step", "slot", "boss", "rib")
+    s = PARTS[part].program()
+    first = next(k for k, op in enumerate(s.ops) if k > 5 and op.kind == "rapid" and op.z == SAFE)
+    s.ops.insert(first + 1, Op("raw", text="M2"))
+    return made("stray early end", part, s, ("stock_left",), None)
+
+
+def fanuc_dogleg(rng: Rng) -> Case:
+    """Fanuc: a rapid in two axes that is free on the straight line, and not where each axis runs at its own speed."""
+    dialect = choice(rng, "fanuc", "haas")
+    s = base("plate")
+    s.over(14.0, 0.0)
+    s.rapid(z=PARTS["plate"].top + 2.0)
+    ops = [s.rapid(x=-float(rng.uniform(350, 450)), z=float(rng.uniform(-10.0, 0.0)))]
+    s.rapid(z=SAFE)
+    return made("dogleg rapid", "plate", s, ("rapid",), ops, None, {"machine": {"dialects": [dialect]}}, dialect)
+
+
+def sense_of_rotary_axes(rng: Rng) -> Case:
+    """Rotary words on a Fanuc, and a setup that does not state which way its table turns."""
+    dialect = choice(rng, "fanuc", "haas")
+    s = PARTS["plate"].program()
+    turn = float(np.round(rng.uniform(10, 60), 1))
+    s.ops.insert(2, Op("raw", text=f"G0 A{number(turn, dialect)} C{number(2 * turn, dialect)}"))
+    s.ops.insert(3, Op("raw", text="G0 A0. C0."))
+    machine = {"dialects": [dialect], "kind": "5-axis", "kinematics": "table-table-AC",
+               "pivots_mm": [[0.0, 0.0, -50.0], [0.0, 0.0, -50.0]]}
+    return made("sense of rotary axes", "plate", s, (REFUSED,), None, None, {"machine": machine}, dialect)
+
+
+def inch(rng: Rng) -> Case:
+    """G20 where the numbers are mm."""
+    part = choice(rng, *LEVEL)
+    s = PARTS[part].program()
+    s.head = ["%", "G20 G17 G90 G94 G40 G49 G80 G64 P0.0001 Q0", "G54"]
+    machine = {"travel_mm": [300.0, 300.0, 300.0]}
+    return made("inch for mm", part, s, ("limit", "gouge", "stock_left", "nothing_cut", "program"), None, None,
+                {"machine": machine})
+
+
+def wrong_zero(rng: Rng) -> Case:
+    """Another work offset than that of the setup."""
+    part = choice(rng, *LEVEL)
+    s = PARTS[part].program()
+    s.head = [*LINUXCNC[:2], f"G{55 + int(rng.integers(4))}"]
+    return made("wrong zero", part, s, ("program", REFUSED), None)
+
+
+def incremental_left_on(rng: Rng) -> Case:
+    """G91 for one row, never taken back."""
+    part = choice(rng, "step", "slot", "boss")
+    s = PARTS[part].program()
+    s.ops.insert(int(rng.integers(8, len(s.ops) // 2)), Op("raw", text="G91"))
+    kinds = ("gouge", "rapid", "limit", "plunge", "stock_left", "program", "collision", REFUSED)
+    return made("G91 left on", part, s, kinds, None)
+
+
+def block_delete(rng: Rng) -> Case:
+    """A lift that is skipped where the switch of the panel is on."""
+    part = choice(rng, "step", "slot", "boss")
+    s = PARTS[part].program()
+    k = next(k for k in range(len(s.ops) - 2, 0, -1) if s.ops[k].kind == "rapid" and s.ops[k].z == SAFE
+             and s.ops[k + 1].kind == "rapid")
+    s.ops[k] = Op("raw", text=f"/G0 Z{SAFE:g}")
+    return made("block delete", part, s, ("program", REFUSED), [s.ops[k]])
+
+
+def pasted_twice(rng: Rng) -> Case:
+    """The whole cutting pasted in twice."""
+    part = choice(rng, "step", "slot", "boss", "plate")
+    s = PARTS[part].program()
+    s.ops += PARTS[part].program().ops[1:]
+    return made("pasted twice", part, s, ("program",), None)
+
+
+def over_limit(rng: Rng) -> Case:
+    """Faster than the spindle, the tool, or the feed of the machine."""
+    part = choice(rng, *LEVEL)
+    s = PARTS[part].program()
+    what = choice(rng, "spindle", "tool", "feed")
+    setup: dict[str, Any] = {"spindle": {"machine": {"max_rpm": 5000.0}},
+                             "tool": {"tools": [{**FLAT, "max_rpm": 5900.0}, BALL]},
+                             "feed": {"machine": {"max_feed_mm_min": 450.0}}}[what]
+    return made("over a limit", part, s, ("limit",), None, None, setup, what=what)
+
+
+def chip_too_thick(rng: Rng) -> Case:
+    """A chip a tooth that no cutter bears: hardly turning, or far too fast a feed."""
+    part = choice(rng, "plate", "step", "slot")
+    s = PARTS[part].program()
+    speed, feed = (int(rng.integers(1, 100)), 2000.0) if rng.random() < 0.5 else (3000, float(rng.uniform(2e4, 6e4)))
+    s.ops[0].speed = speed
+    for op in s.ops:
+        if op.feed is not None and op.feed >= FEED:
+            op.feed = feed
+    return made("chip too thick", part, s, ("load",), None, what=f"S{speed} F{feed:.0f}")
+
+
+def deep_slot(rng: Rng) -> Case:
+    """A slot many diameters deep in one pass, in titanium, at a feed for aluminium."""
+    long = {**FLAT, "flute_length_mm": 30, "stickout_mm": 60}
+    s, deep = Script(group="harm"), float(rng.uniform(18.0, 26.0))
+    top = PARTS["plate"].top
+    x0, y0, x1, y1, _ = PARTS["plate"].size
+    s.tool(1)
+    s.rapid(1.0, -OUT)
+    s.rapid(z=SAFE + 20.0)
+    s.rapid(z=top + deep + 2.0)
+    s.feed(z=top, feed=3000.0)
+    rows(s, spread(1.0, 27.0, 4.0), top)
+    s.rapid(z=SAFE + 20.0)
+    setup = {"tools": [long, BALL], "material": "Ti-6Al-4V",
+             "stock": {"box_mm": [[x0, y0, 0.0], [x1, y1, top + deep]]}}
+    return made("deep slot", "plate", s, ("load", "deflection"), None, None, setup, what=f"{deep:.1f} deep")
+
+
+def surface_speed(rng: Rng) -> Case:
+    """A speed in titanium that burns the cutter."""
+    part = choice(rng, "plate", "step")
+    s = PARTS[part].program()
+    s.ops[0].speed = int(rng.integers(60_000, 90_000))
+    for op in s.ops:
+        if op.feed is not None and op.feed >= FEED:
+            op.feed = 3000.0
+    return made("surface speed", part, s, ("load", "limit"), None, None, {"material": "Ti-6Al-4V"})
+
+
+def below_at_end(rng: Rng) -> Case:
+    """The program ends, or changes the tool, with the tip below the top of the part."""
+    part = choice(rng, "step", "slot")
+    s = PARTS[part].program()
+    last = max(k for k, op in enumerate(s.ops) if op.kind == "rapid" and op.z == SAFE)
+    del s.ops[last:]
+    s.foot = ["M5", "M2", "%"]
+    return made("ends in the part", part, s, ("program",), None)
+
+
+MECHANISMS = {"wrong length offset": wrong_length_offset, "no length offset": no_length_offset,
+              "no spindle": no_spindle, "stale length in rapid": stale_length_in_rapid, "shift by G92": shift_by_g92,
+              "G92 before G52": fanuc_g92_g52, "no path tolerance": no_path_mode,
+              "wide path tolerance": wide_path_mode, "machine move too far": machine_move_too_far,
+              "stray end": stray_end, "stray early end": stray_early_end, "dogleg rapid": fanuc_dogleg,
+              "sense of rotary axes": sense_of_rotary_axes, "inch for mm": inch, "wrong zero": wrong_zero,
+              "G91 left on": incremental_left_on, "block delete": block_delete, "pasted twice": pasted_twice,
+              "over a limit": over_limit, "chip too thick": chip_too_thick, "deep slot": deep_slot,
+              "surface speed": surface_speed, "ends in the part": below_at_end}
