@@ -54,6 +54,20 @@ def test_heads_are_not_asked():
     assert read.read.poses is not None and {a.what for a in read.assumed} == {AssumedKind.COOLANT}
 
 
+@pytest.mark.parametrize(("word", "gauge", "asked"), [("G43", None, True), ("G43", 90, False), ("G43.4", None, False)])
+def test_a_gauge_length_is_asked_for_where_the_head_tilts_without_a_kept_tip(word, gauge, asked):
+    tool = {"id": "T1", "kind": "ball", "diameter_mm": 6, **({} if gauge is None else {"gauge_length_mm": gauge})}
+    machine = {"kind": "5-axis", "kinematics": "head-head-AC", "pivots_mm": [[0, 0, 100]]}
+    own = parse_setup(json.dumps({"tools": [tool], "machine": machine}))
+    text = HEAD.replace("G43.4", word) + "G0 A30.\nG1 X10. F500.\nM30\n"
+    if not asked:
+        assert read_first(own, text, dialect="fanuc").read.poses is not None
+        return
+    with pytest.raises(SetupError) as caught:
+        read_first(own, text, dialect="fanuc")
+    assert caught.value.code == "no_gauge_length" and caught.value.subjects == ("T1",)
+
+
 def test_our_header_states_the_sense():
     """A program of ours says which way it counts; that the machine counts so too stays an assumption."""
     read = first("G0 A30.\nG1 X10. F500.\n", head="(TABLE AXES: A ISO 841, C RIGHT-HANDED)\n")
