@@ -199,6 +199,36 @@ def needle(rng: Rng) -> Case:
     return made("needle", part, s, ("gouge",), ops, depth, setup, what=f"after T{number}, {scale} x {tolerance}")
 
 
+def small_ball(rng: Rng) -> Case:
+    """A pit of a small ball on a curved face."""
+    tolerance, scale, d = scale_of(rng, 0.2)
+    radius = float(rng.choice([0.1, 0.25, 0.5]))
+    tool = {**BALL, "id": "T3", "number": 3, "diameter_mm": 2 * radius, "flute_length_mm": 4.0,
+            "shank_diameter_mm": 3.0, "stickout_mm": 30.0}
+    s = base("cylinder")
+    s.tool(3, 12000)
+    p, n = contact("cylinder", rng)
+    ops = dip(s, *(p + (radius - d) * n - [0.0, 0.0, radius]).tolist(), feed=60.0)
+    setup = {**quality(tolerance), "tools": [FLAT, BALL, tool]}
+    return made("small ball", "cylinder", s, ("gouge",), ops, d, setup, what=f"R{radius}, {scale} x {tolerance}")
+
+
+def rim_pit(rng: Rng) -> Case:
+    """The rim of a flat pressed into a cylinder or a slope from above: a lens far narrower than the tool."""
+    part, (tolerance, scale, d) = choice(rng, "cylinder", "slope"), scale_of(rng, 0.4)
+    s = base(part)
+    s.tool(1)
+    y = float(rng.uniform(-LOW, LOW))
+    if part == "cylinder":
+        low, dx = PARTS[part].top - BOW_RADIUS, float(rng.uniform(1.0, 6.0))
+        x = 12.0 + (dx + R) * float(rng.choice([-1.0, 1.0]))
+        tip = low + math.sqrt((BOW_RADIUS - d) ** 2 - dx * dx)
+    else:
+        a, x = math.radians(SLOPE_DEG), float(rng.uniform(7.0, 18.0))
+        tip = PARTS[part].top - (x - R) * math.tan(a) - d / math.cos(a)
+    return made("rim pit", part, s, ("gouge",), dip(s, x, y, tip), d, quality(tolerance), what=f"{scale} x {tolerance}")
+
+
 def contact_normal(part: str, x: float) -> tuple[float, float, float]:
     """The normal of a slope or a cylinder at x, mm."""
     if part == "cylinder":
@@ -416,7 +446,8 @@ def many_dips(rng: Rng) -> Case:
 
 
 MECHANISMS = {"pit level": pit_level, "pit slope": pit_slope, "pit cylinder": pit_cylinder, "groove": groove,
-              "needle": needle, "edge notch": edge_notch, "wall cut": wall_cut, "rib top": rib_top,
+              "needle": needle, "small ball": small_ball,
+              "rim pit": rim_pit, "edge notch": edge_notch, "wall cut": wall_cut, "rib top": rib_top,
               "rib side": rib_side, "rib off": rib_off, "rib gap": rib_gap, "floor dip": floor_dip,
               "floor through": floor_through, "wedge short": wedge_short, "wedge shaved": wedge_shaved,
               "allowance": allowance, "excluded face": excluded_face, "side cut": side_cut, "many dips": many_dips}

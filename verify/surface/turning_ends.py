@@ -1,0 +1,144 @@
+"""Where ends of cutters press deepest into the part: rays there see pits and lenses that lie between the guard points.
+
+A cut that is narrow to all sides ends where the path turns: down and up, in and out. So the end of the tool is looked
+at wherever a feed move ends at a corner of the path, and all along the moves of tools thinner than the guard points
+lie apart. Coordinates are float64, mm, in the setup frame.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.nearest import nearest
+from geometry.tool_body import ToolBody
+from verify.moves import Moves
+from verify.surface.guard_points import CLOSER_SHARE, GUARD_SPACING, inside_part
+from verify.tool_axes import square_to
+
+CORNER = math.cos(math.radians(45.0))  # of the angle by which a path turns at a corner
+STEP = 0.1  # mm between places of thin tools
+AROUND = 16  # places round the rim of an end
+ROUNDS = 4  # of the search round the deepest of them
+LIFT, LIFT_SHARE = 0.05, 0.25  # mm, and of the radius: a second rim over the sharp one, for walls
+BATCH = 4096  # poses
+INT = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Feet:
+    """Places of the surface over the deepest points of ends, with the normals that lead to these.
+
+    points, normals : (n, 3) float64, mm and unit, setup frame; triangle : (n,) int64, index
+    """
+
+    points: F64
+    normals: F64
+    triangle: INT
+
+
+def turning_feet(tree: TriangleTree, moves: Moves, tools: Sequence[ToolBody], tolerance: float) -> Feet:
+    """Places of the surface into which ends of cutters press where paths turn.
+
+    tree      : TriangleTree of the part
+    tools     : those that ``Moves.tool`` refers to
+    tolerance : mm, gouge tolerance; ends that press in by less than 0.4 of it give nothing
+
+    Notes
+    -----
+    The deepest place on a rim of radius R is searched from 16 places round it, to R / 300. A ball has one sphere.
+    """
+    found = [_pressed(tree, *_poses(moves, k, tool, tree.mesh.bounds), tool, CLOSER_SHARE * tolerance)
+             for k, tool in enumerate(tools) if tool.cone_height <= 0.0]
+    none = np.zeros((0, 3))
+    return Feet(np.concatenate([none, *(f.points for f in found)]), np.concatenate([none, *(f.normals for f in found)]),
+                np.concatenate([np.zeros(0, np.int64), *(f.triangle for f in found)]))
+
+
+def _poses(moves: Moves, k: int, tool: ToolBody, bounds: F64) -> tuple[F64, F64]:
+    """Tips and axes, (n, 3) mm and unit, at which the end of a tool is looked at."""
+    way = moves.end - moves.start
+    length = np.linalg.norm(way, axis=1)
+    way = way / np.maximum(length, 1e-12)[:, None]
+    feed = moves.feed & (moves.tool == k) & (length > 0.0)
+    joined = feed[:-1] & feed[1:] & (np.einsum("ij,ij->i", way[:-1], way[1:]) > CORNER)
+    ends = np.flatnonzero(feed & ~np.append(joined, False))
+    starts = np.flatnonzero(feed & ~np.append(False, feed[:-1]))
+    row, share = np.concatenate([ends, starts]), np.concatenate([np.ones(len(ends)), np.zeros(len(starts))])
+    if tool.radius < GUARD_SPACING:
+        own = np.flatnonzero(feed)
+        count = np.ceil(length[own] / STEP).astype(np.int64)
+        nth = np.arange(int(count.sum())) - np.repeat(np.cumsum(count) - count, count)
+        row = np.concatenate([row, np.repeat(own, count)])
+        share = np.concatenate([share, nth / np.repeat(np.maximum(count, 1), count)])
+    tip = moves.start[row] + share[:, None] * (moves.end - moves.start)[row]
+    axis = np.tile([0.0, 0.0, 1.0], (len(row), 1))
+    if moves.axes is not None:
+        turn = (share * moves.axes.angle[row])[:, None]
+        axis = np.cos(turn) * moves.axes.axis[row] + np.sin(turn) * np.cross(moves.axes.about[row],
+                                                                              moves.axes.axis[row])
+    near = ((tip > bounds[0] - 2.0 * tool.radius) & (tip < bounds[1] + 2.0 * tool.radius)).all(axis=1)
+    both = np.unique(np.round(np.column_stack([tip, axis])[near], 7), axis=0)
+    return both[:, :3], both[:, 3:]
+
+
+def _pressed(tree: TriangleTree, tip: F64, axis: F64, tool: ToolBody, least: float) -> Feet:
+    """The deepest place of each pose (n, 3) that presses in by more than ``least`` mm."""
+    out = []
+    for i in range(0, len(tip), BATCH):
+        out += [_deepest(tree, tip[i:i + BATCH], axis[i:i + BATCH], tool, lift, least) for lift in _lifts(tool)]
+    none = np.zeros((0, 3))
+    return Feet(np.concatenate([none, *(f.points for f in out)]), np.concatenate([none, *(f.normals for f in out)]),
+                np.concatenate([np.zeros(0, np.int64), *(f.triangle for f in out)]))
+
+
+def _lifts(tool: ToolBody) -> tuple[float, ...]:
+    return (0.0,) if tool.corner_radius > 0.0 else (0.0, min(LIFT, LIFT_SHARE * tool.radius))
+
+
+def _deepest(tree: TriangleTree, tip: F64, axis: F64, tool: ToolBody, lift: float, least: float) -> Feet:
+    x = square_to(axis)
+    y = np.cross(axis, x)
+    ring, ball = tool.radius - tool.corner_radius, tool.corner_radius
+    middle = tip + (ball + lift) * axis
+
+    def depth(rows: INT, angle: F64) -> tuple[F64, F64, F64, INT]:
+        """How deep the end presses in at angles (k,) rad of poses; feet, ways out, triangles."""
+        at = middle[rows] + ring * (np.cos(angle)[:, None] * x[rows] + np.sin(angle)[:, None] * y[rows])
+        far, triangle, foot = nearest(tree, at, ball if ball > 0.0 else np.inf)
+        met = triangle >= 0
+        inside = met & (np.einsum("ij,ij->i", at - foot, tree.mesh.normals[triangle]) < 0.0)
+        doubtful = np.flatnonzero(inside & (far > least))
+        inside[doubtful] = inside_part(tree, at[doubtful])
+        deep = np.where(met, ball + np.where(inside, far, -far), -np.inf)
+        way = np.where(inside[:, None], foot - at, at - foot) / np.maximum(far, 1e-12)[:, None]
+        flat = far < 1e-9
+        way[flat] = tree.mesh.normals[triangle[flat]]
+        return deep, foot, way, triangle
+
+    n, around = len(tip), 1 if ring <= 0.0 else AROUND
+    every = np.repeat(np.arange(n), around)
+    angle = np.tile(2.0 * math.pi * np.arange(around) / around, n)
+    deep, foot, way, triangle = depth(every, angle)
+    best = np.arange(n) * around + deep.reshape(n, around).argmax(axis=1)
+    rough = ring * (1.0 - math.cos(math.pi / around))  # by which the rim may be deeper between two places
+    rows = np.flatnonzero(deep[best] > least - rough)
+    deep, foot, way, triangle, angle = deep[best], foot[best], way[best], triangle[best], angle[best]
+    span = math.pi / around
+    for _ in range(ROUNDS if around > 1 else 0):
+        for side in (-span, span):
+            turned = angle[rows] + side
+            found = depth(rows, turned)
+            better = found[0] > deep[rows]
+            at = rows[better]
+            deep[at], foot[at], way[at], triangle[at] = (f[better] for f in found)
+            angle[at] = turned[better]
+        span *= 0.5
+    rows = rows[deep[rows] > least]
+    return Feet(foot[rows], way[rows], triangle[rows])
