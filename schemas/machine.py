@@ -31,11 +31,14 @@ class Machine(WireModel):
                     "first. Required on a 5-axis machine, null on a 3-axis machine. A table turns the part by Rz(C) "
                     "and then Rx(A) or Ry(B), as LinuxCNC's xyzac-trt does. A head turns the tool by Rx(A) or Ry(B) "
                     "and then Rz(C).")] = None
-    iso_axes: Annotated[list[Literal["A", "B", "C"]], Field(
+    iso_axes: Annotated[list[Literal["A", "B", "C"]] | None, Field(
         max_length=2, description="Letters of the table axes that follow ISO 841. At a positive angle of such an axis "
                                   "the tool turns right-handed as seen from the table, so the table itself turns "
                                   "left-handed. Any other table axis turns the table right-handed, as in LinuxCNC. "
-                                  "This holds for planned programs, verified programs and rotary_deg.")] = []
+                                  "This holds for planned programs, verified programs and rotary_deg. null: not "
+                                  "stated. Planned programs then take [], their header says so, and the report lists "
+                                  "it under proof.assumed. A program of others that turns a table axis gives the error "
+                                  "rotary_sense_open.")] = None
     tcp: Annotated[bool, Field(
         description="true: the control keeps the tool tip during rotary moves. false: programs contain positions of "
                     "the linear joints, and pivots_mm is required. No effect on a 3-axis machine. Verified programs "
@@ -117,10 +120,12 @@ class Machine(WireModel):
         ge=1, le=1e6, description="Rapid rate, mm/min, for machining times; null: 10000.")] = None
     acceleration_mm_s2: Annotated[Number | None, Field(
         ge=1, le=1e7, description="Acceleration, mm/s2, for machining times; null: 1000.")] = None
-    rapid_motion: Annotated[Literal["linear", "dogleg"], Field(
+    rapid_motion: Annotated[Literal["linear", "dogleg"] | None, Field(
         description="Path of a rapid in several axes. linear: a straight line. dogleg: each axis moves at its own "
-                    "speed, so the path is not straight. A rapid of several axes is then a finding unless it stays "
-                    "clearance_mm.rapid above part, stock and fixtures.")] = "linear"
+                    "speed, so the path is not straight. The whole box of the move must then stay clear of part, stock "
+                    "and fixtures. null: dogleg on fanuc and haas, linear on other controls and in programs that "
+                    "turn rotary axes, because tool centre point control needs it. The report lists the path under "
+                    "proof.assumed where it matters.")] = None
     ap238: Annotated[Literal["cc1", "cc2", "integrated_cnc"], Field(
         description="Form of job.stpnc. cc1: conformance class 1 of AP238, tool paths. cc2: class 2, which adds the "
                     "shapes of part and blank, strategies and setup instructions. integrated_cnc: like cc1, with the "
@@ -153,7 +158,7 @@ class Machine(WireModel):
         if self.kinematics is None:
             raise ValueError("machine.kinematics is needed where machine.kind is '5-axis', such as 'table-table-AC'")
         tables = {"table-table": self.kinematics[-2:], "head-table": "C"}.get(self.kinematics[:-3], "")
-        if wrong := [letter for letter in self.iso_axes if letter not in tables]:
+        if wrong := [letter for letter in self.iso_axes or () if letter not in tables]:
             raise ValueError(f"machine.iso_axes: {', '.join(wrong)} is no axis of a table of {self.kinematics}")
         for letter, limits in zip(self.kinematics[-2:], self.rotary_deg or (), strict=False):
             if limits[0] >= limits[1]:

@@ -11,8 +11,8 @@ from schemas.zones import Remainder, Share, ZoneFacts, Zones
 
 Findings = Annotated[list[Any], Field(
     description="Findings of the proof, then those of the whole job; empty in state proved. kind: collision, gouge, "
-                "allowance, rapid, plunge, rubbing, engagement, support, limit, program, residual or stock_left; of "
-                "the whole job: nothing_cut or coverage. message: the finding in one sentence. program, line: place "
+                "allowance, excluded_face, rapid, plunge, rubbing, engagement, support, limit, program, residual or "
+                "stock_left; of the whole job: nothing_cut or coverage. message: the finding in one sentence. program, line: place "
                 "in the programs; line 0: no line causes it. zone, face: ids, or null. point: worst place, mm, setup "
                 "frame, or null. tip: the tool tip there, or null. depth, limit: measured and allowed value, in the "
                 "unit of message. near: true: nothing touches, and depth is the distance. count, area: number and "

@@ -17,6 +17,8 @@ VERIFIED_KINDS = ("drill", "tap", "chamfer", "thread_mill")
 POINT_ANGLES = {"drill": 118.0, "chamfer": 90.0}
 """Default of ``point_angle_deg``, deg."""
 LENGTH_EPSILON = 1e-9
+CORE_SHARE = 0.3
+"""Default of ``core_diameter_mm`` as a share of the diameter."""
 
 Length = Annotated[Number, Field(ge=1e-3, le=2000)]
 
@@ -72,6 +74,10 @@ class Tool(WireModel):
         description="Tip to the end of the cutting part, mm. Default: 3 x diameter_mm, but not more than "
                     "neck_length_mm and stickout_mm where they are given.")] = None
     center_cutting: Annotated[bool, Field(description="true: the end of the tool cuts to the centre.")] = True
+    core_diameter_mm: Annotated[Number | None, Field(
+        gt=0, le=2000, description="With center_cutting false: diameter at the end of the tool within which it does "
+                                   "not cut, mm. null: 0.3 of diameter_mm. Such a tool goes straight down into no "
+                                   "stock, and on no helix that is narrower than its core.")] = None
     ramp_angle_deg: Annotated[Number | None, Field(
         gt=0, le=90, description="Steepest angle at which the tool may go down into stock, deg. Plans use at most 3. "
                                  "null: 3; in a verified program 10 for a tool that cuts to its centre, in a material "
@@ -195,6 +201,13 @@ class Tool(WireModel):
             self.gauge_length_mm = self.stickout_mm + sum(s.length_mm for s in self.holder)
 
     @property
+    def core_mm(self) -> float:
+        """Diameter at the end within which the tool does not cut, mm; 0 where it cuts to its centre."""
+        if self.center_cutting:
+            return 0.0
+        return CORE_SHARE * self.diameter_mm if self.core_diameter_mm is None else self.core_diameter_mm
+
+    @property
     def gauge_given(self) -> bool:
         """Whether the setup gives the gauge length; otherwise it is the default."""
         return self._gauge_given
@@ -209,6 +222,9 @@ class Tool(WireModel):
         if _given(self.neck_diameter_mm) > self.diameter_mm + LENGTH_EPSILON:
             raise ValueError(f"tool {self.id}: neck_diameter_mm {self.neck_diameter_mm:g} is larger than diameter_mm "
                              f"{self.diameter_mm:g}; a neck is relieved")
+        if self.core_diameter_mm is not None and (self.center_cutting or self.core_diameter_mm >= self.diameter_mm):
+            raise ValueError(f"tool {self.id}: core_diameter_mm belongs to a tool with center_cutting false, and is "
+                             f"less than diameter_mm {self.diameter_mm:g}")
         if _given(self.flute_length_mm) < self.corner_radius_mm - LENGTH_EPSILON:
             raise ValueError(f"tool {self.id}: flute_length_mm {self.flute_length_mm:g} is shorter than the corner "
                              f"radius {self.corner_radius_mm:g}, so the rounded end would not cut")

@@ -213,7 +213,8 @@ def machine_kinematics(machine: Machine) -> Kinematics | None:
 def _sense(machine: Machine) -> tuple[int, int]:
     """For the tilting and the turning axis: 1 where a positive angle turns the table right-handed, else -1."""
     tilting = (machine.kinematics or "AC")[-2]
-    return -1 if tilting in machine.iso_axes else 1, -1 if "C" in machine.iso_axes else 1
+    named = machine.iso_axes or []
+    return -1 if tilting in named else 1, -1 if "C" in named else 1
 
 
 def rotary_machine(machine: Machine) -> RotaryMachine | None:

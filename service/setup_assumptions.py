@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from service.stages.job_inputs import JobInputs
+from service.verification.rotary_sense import assumed_sense
 from verify.assumptions import Assumed, AssumedKind
 
 
@@ -22,4 +23,12 @@ def setup_assumptions(inputs: JobInputs) -> tuple[Assumed, ...]:
     return tuple(out)
 
 
-__all__ = ["setup_assumptions"]
+def planned_sense(inputs: JobInputs) -> tuple[Assumed, ...]:
+    """The sense of the table axes that a plan has taken, where the setup leaves it open."""
+    machine = inputs.kinematics
+    if machine is None or inputs.machine.iso_axes is not None or not machine.table_letters:
+        return ()
+    return (assumed_sense(machine, "as the programs say"),)
+
+
+__all__ = ["planned_sense", "setup_assumptions"]

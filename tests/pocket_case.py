@@ -52,7 +52,8 @@ def scored(part: Part) -> ScoredSamples:
 
 def program(step: float = 0.5) -> list[str]:
     """Layers entered along a ramp of 2 degrees, rows, then once round the walls."""
-    out = ["%", "G21 G90 G17 G94 G40 G49 G54", "T1 M6", "S8000 M3", "G0 G43 H1 Z20", "X-7 Y0", "Z1.5", "G1 Z0.5 F300"]
+    out = ["%", "G21 G90 G17 G94 G40 G49 G54 G61",
+           "T1 M6", "S8000 M3", "G0 G43 H1 Z20", "X-7 Y0", "Z1.5", "G1 Z0.5 F300"]
     for z in np.arange(0.5 - step, DEPTH - 1e-9, -step):
         out += [f"(layer {z:.3f})", f"G1 X7 Y0 Z{z:.3f} F400", "X-7"]
         rows = [0.0, 2.0, 4.0, 2.0, 0.0, -2.0, -4.0]

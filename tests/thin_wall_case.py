@@ -51,7 +51,8 @@ def in_turn(depth: float, left: float = 0.0) -> list[Cut]:
 
 def program(cuts: Iterable[Cut]) -> str:
     """The top of the wall, then the cuts, each in two passes along Y that come from air."""
-    out = ["%", "G21 G90 G17 G94 G40 G49 G54", "T1 M6", "S8000 M3", "G0 G43 H1 Z20", "X6.25 Y-4", "G1 Z12 F800", "Y20",
+    out = ["%", "G21 G90 G17 G94 G40 G49 G54 G61",
+           "T1 M6", "S8000 M3", "G0 G43 H1 Z20", "X6.25 Y-4", "G1 Z12 F800", "Y20",
            "G0 Z20"]
     for side, z, left in cuts:
         x, away = (LEFT - 2.0 - left, -3.4) if side == "left" else (RIGHT + 2.0 + left, 3.4)

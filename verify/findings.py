@@ -5,7 +5,7 @@ Arrays are float64, lengths are mm, and points are in the setup frame unless a d
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -149,6 +149,30 @@ def allowance_findings(points: F64, face: I32, depth: F64, area: F64, mover: I32
     """
     text = f"cuts {{:.4f}} mm into the stock allowance of {allowance:g} mm"
     return _cut_findings(FindingKind.ALLOWANCE, text, points, face, depth, area, mover, source, tolerance)
+
+
+def excluded_findings(points: F64, face: I32, taken: F64, area: F64, mover: I32, source: Source,
+                      why: Mapping[int, str], tolerance: float) -> list[Finding]:
+    """Findings of faces that are brought to size although the setup does not let machine them, by face and program.
+
+    points : (n, 3) float64, mm, setup frame
+    face   : (n,) int32, index, face number
+    taken  : (n,) float64, mm of stock taken off each face; tolerance : mm
+    area   : (n,) float64, mm²
+    mover  : (n,) int32, index, the move that brought each place to size
+    why    : words of the setup by face number
+    """
+    out = []
+    _, groups = np.unique(np.column_stack([source.program[mover], face]), axis=0, return_inverse=True)
+    for rows in worst_of(groups.reshape(-1), taken):
+        r, m = rows[0], mover[rows[0]]
+        total = float(area[rows].sum())
+        out.append(Finding(
+            FindingKind.EXCLUDED_FACE, source.names[source.program[m]], int(source.line[m]), None, f"F{face[r]}",
+            _point(points[r]), float(taken[r]), tolerance,
+            f"T{source.tool[m]} takes {taken[r]:.4f} mm of stock off F{face[r]}, down to the face; {why[int(face[r])]} "
+            f"({total:.3g} mm²{_span(source.line[mover[rows]])})", len(rows), total))
+    return out
 
 
 def _cut_findings(kind: FindingKind, text: str, points: F64, face: I32, depth: F64, area: F64, mover: I32,

@@ -74,6 +74,12 @@ class Kinematics:
         return self.kind[-2:]
 
     @property
+    def table_letters(self) -> str:
+        """The words of the axes that turn the table, the tilting axis first."""
+        return "".join(letter for letter, head in zip(self.letters, (self.tilts_head, self.turns_head), strict=True)
+                       if not head)
+
+    @property
     def tilts_head(self) -> bool:
         """Whether the tilting axis carries the tool, not the part."""
         return self.kind.startswith("head")

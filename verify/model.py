@@ -17,6 +17,7 @@ from verify.kinematics import Kinematics
 
 if TYPE_CHECKING:  # sampling is compiled, and the readers of programs need these classes without it
     from geometry.sampling import SurfaceSamples
+    from verify.program.program import Program
 
 
 class StockKind(StrEnum):
@@ -34,6 +35,7 @@ class FindingKind(StrEnum):
     COLLISION = "collision"
     GOUGE = "gouge"
     ALLOWANCE = "allowance"
+    EXCLUDED_FACE = "excluded_face"
     RAPID = "rapid"
     PLUNGE = "plunge"
     RUBBING = "rubbing"
@@ -65,12 +67,14 @@ class ProofSetup:
     scallop_height, gouge_tolerance, stock_allowance : mm, the budget -gouge <= residual - allowance <= scallop
     ramp_angle    : rad, steepest descent into stock
     ramp_angles   : rad by T number, for tools that have another one
+    cores         : mm by T number, diameter at the end of a tool within which it does not cut; absent: it cuts there
     plunge_skin   : share of the tool diameter that a steeper descent may take off (``verify.material.stock_lines``)
     rapid_feed    : mm/min
     acceleration  : mm/s², for times
     travel        : (3,) float64, mm, span of the moves of a program that the machine allows in X, Y and Z, or None
     gauge_length  : mm by T number, from the spindle face to the tip; counted in Z against the travel
-    dogleg        : whether a rapid moves each axis at its own speed, so that its path is not a straight line
+    dogleg        : whether a rapid moves each axis at its own speed, so that its path is not a straight line; None: by
+                    the dialect of the programs
     max_feed      : mm/min of any feed move, or None
     max_rpm       : 1/min by T number; a tool that is absent has no limit
     max_engaged   : rad by T number, largest engaged angle of the front half of a cutter; absent: no limit
@@ -83,6 +87,7 @@ class ProofSetup:
     table_known   : False: the table height is assumed and checked for tilted tools only
     free_ratio    : largest ratio of free height to thickness where a wall is finished (``verify.surface.wall_support``)
     walls_in_turn : whether a larger ratio is a finding; otherwise the proof reports the figure only
+    left_alone    : by number of each face that is not to be machined, the words of the setup that say so
     assumed       : what the setup leaves open and the proof takes for granted
     """
 
@@ -103,12 +108,13 @@ class ProofSetup:
     stock_allowance: float = 0.0
     ramp_angle: float = 0.0523598775598
     ramp_angles: Mapping[int, float] = field(default_factory=dict)
+    cores: Mapping[int, float] = field(default_factory=dict)
     plunge_skin: float = 0.1
     rapid_feed: float = 5000.0
     acceleration: float = 1000.0
     travel: F64 | None = None
     gauge_length: Mapping[int, float] = field(default_factory=dict)
-    dogleg: bool = False
+    dogleg: bool | None = None
     work_offset: str = "G54"
     max_feed: float | None = None
     max_rpm: Mapping[int, float] = field(default_factory=dict)
@@ -121,6 +127,7 @@ class ProofSetup:
     table_known: bool = False
     free_ratio: float = 10.0
     walls_in_turn: bool = True
+    left_alone: Mapping[int, str] = field(default_factory=dict)
     assumed: tuple[Assumed, ...] = ()
 
 
@@ -187,11 +194,13 @@ class Asked:
     faces : numbers of the faces that must be within tolerance; None: the faces that the program works on
     touch : Touch, what the tools of the program can touch
     facet : mm, largest distance of the facets of the part from its exact surface
+    whole : the only program of the proof, read on through an end before its last lines; None where nothing follows
     """
 
     faces: frozenset[int] | None
     touch: Touch
     facet: float = 0.0
+    whole: Program | None = None
 
 
 @dataclass(frozen=True, eq=False)

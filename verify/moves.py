@@ -47,6 +47,23 @@ class Moves:
         axes = None if self.axes is None else self.axes.only(chosen)
         return Moves(self.start[chosen], self.end[chosen], self.feed[chosen], self.tool[chosen], axes)
 
+    def parted(self, count: NDArray[np.int64]) -> tuple[Moves, NDArray[np.int64]]:
+        """Each move in even pieces.
+
+        count : (m,) int64, dimensionless, pieces of each move
+
+        Returns the p pieces as moves, and (p,) int64, index, the move of each.
+        """
+        of = np.repeat(np.arange(len(self)), count)
+        pieces = count[of]
+        nth = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
+        share, way = nth / pieces, (self.end - self.start)[of]
+        # the last piece ends where the move does, to the last digit
+        ends = np.where((nth + 1 == pieces)[:, None], self.end[of],
+                        self.start[of] + ((nth + 1) / pieces)[:, None] * way)
+        axes = None if self.axes is None else self.axes.parted(of, share, pieces)
+        return Moves(self.start[of] + share[:, None] * way, ends, self.feed[of], self.tool[of], axes), of
+
 
 def cutter_table(tools: Sequence[ToolBody]) -> F64:
     """Sizes of the cutting parts of k tools, as rows of ``geometry.kernels.cutter_sizes.CutterSizes``.

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
+from geometry.errors import CamError
 from geometry.tool_body import ToolBody
+from verify.gcode.program_text import cleaned
 from verify.gcode.reader import Program, read_program
 from verify.kinematics import Kinematics
 from verify.model import NcProgram
 from verify.progress import Report, silent
 from verify.stepnc.part21 import is_exchange_file
 
+_END = re.compile(r"M0*(?:2|30)(?![0-9.])", re.IGNORECASE)
+MAX_ENDS = 8  # ends within one text that are read through
 BLEND = 0.001  # mm, deviation that G64 may allow; the error bound includes it
 BLEND_SHARE = 0.1  # of the gouge tolerance: allowed instead where that is more
 
@@ -38,3 +44,30 @@ def read_one(nc: NcProgram, tools: Sequence[ToolBody], *, work_offset: str = "G5
         blend_limit=max(BLEND, BLEND_SHARE * gouge_tolerance), kinematics=kinematics,
         gauge_length=gauge_length, spindle_tool=spindle_tool, report=report, dialect=nc.dialect,
         radii={t.number: t.radius for t in tools}, names={t.id: t.number for t in tools})
+
+
+def read_on(nc: NcProgram, read: Program, reading: Callable[[NcProgram], Program]) -> Program | None:
+    """The program read on through ends that stand before its last lines.
+
+    read    : the program as it runs; reading : reads another text in the same way
+
+    Returns None where no lines follow an end, or where they cannot be read so.
+    """
+    whole, lines = read, cleaned(nc.text).split("\n")
+    for _ in range(MAX_ENDS):
+        if not whole.cut_off:
+            break
+        end = _END.search(lines[whole.cut_off - 1])
+        if end is None:
+            return None
+        lines[whole.cut_off - 1] = _END.sub("", lines[whole.cut_off - 1])
+        last = next(k for k in range(len(lines), 0, -1) if lines[k - 1].strip() not in ("", "%"))
+        for text in (lines, [*lines[:last], end[0]]):  # the last lines may have an end of their own, or none
+            try:
+                whole = reading(replace(nc, text="\n".join(text)))
+                break
+            except CamError:
+                continue
+        else:
+            return None
+    return None if whole is read or len(whole) <= len(read) else whole

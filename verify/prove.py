@@ -10,14 +10,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.errors import VerificationError
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.tool_body import ToolBody
 from verify.assumptions import in_order
+from verify.checks.program_assumptions import program_assumptions, rapids_decided
 from verify.checks.program_sequence import FramedProgram, Given, check_numbers, counted, moves_of, read_all, slides_of
-from verify.checks.repeated_passes import repeat_findings
+from verify.checks.repeated_passes import repeats
 from verify.checks.sideways_cuts import sideways_findings
 from verify.checks.table_clearance import table_findings
 from verify.findings import (
@@ -49,13 +51,14 @@ from verify.program.arc_chords import CHORD
 from verify.program.move_times import minutes_of, spent
 from verify.program.program import Program
 from verify.progress import Report, StageProgress
-from verify.surface.asked_faces import Cutting
+from verify.surface.asked_faces import Cutting, Measured
 from verify.surface.between_samples import settled_samples
 from verify.surface.sample_scores import RAY_ERROR, face_proofs, proved_samples, zone_proofs
 from verify.surface.surface_cuts import SurfaceCuts, reach_of, surface_cuts
+from verify.surface.unread_work import unread_work
 from verify.surface.wall_support import supported
 from verify.surface.ways_in import deep_findings
-from verify.surface.work_done import Measured, work_done
+from verify.surface.work_done import work_done
 
 # shares of the work done: read, places between samples settled, residuals, support, contacts known
 READ, SETTLED, CUT, HELD, MET = 0.12, 0.15, 0.48, 0.52, 0.97
@@ -101,6 +104,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     threads = threads or min(2, os.cpu_count() or 1)
     stages = StageProgress(progress)
     framed = read_all(programs, part, tools, setup, spindle_tool, stages.span(0.0, READ), read)
+    stated = setup.dogleg is not None
+    framed, setup = rapids_decided(framed, setup)
     moves, source = moves_of(framed, tools)
     if asked is not None:
         scored = _settled(scored, part, tools, setup, moves, threads, stages.span(READ, SETTLED))
@@ -117,11 +122,12 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
     stretches, of = in_parts(moves, tools)
     angle = engaged_angles(run.engaged, stretches, tools)
+    again, springs = repeats(moves, run.cut, source, _finishes(cuts, setup, len(moves)))
     findings = [*contact_findings(run.events, moves, source, setup.clearance_rapid, skins),
-                *cuts.gouges, *_program_findings(framed), *(f for p in framed for f in p.findings(tools)),
+                *cuts.gouges, *cuts.excluded, *_program_findings(framed), *(f for p in framed for f in p.findings(tools)),
                 *table_findings([p.program for p in framed], tools, setup),
                 *_idle_findings(framed, run, moves, source, [t for t in fine if t.cone_height <= 0.0], asked),
-                *repeat_findings(moves, run.cut, source), *sideways_findings(moves, run.cut, tools, source),
+                *again, *sideways_findings(moves, run.cut, tools, source),
                 *(box_findings(moves, slides, *dogleg_limits(part.mesh, moves, tools, setup), source)
                   if setup.dogleg else ()),
                 *engagement_findings(angle, stretches, of, source, setup.max_engaged), *unheld,
@@ -129,11 +135,13 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     work: WorkDone | None = None
     if asked is not None:
         cutting = Cutting(TriangleTree(part.mesh), setup, moves, tools, threads)
-        work, left = work_done(asked, Measured(scored.samples, cuts.residual, cuts.mover, cuts.reach,
-                                               error_bound([p.program for p in framed])), cutting, run.cut, source)
+        measured = Measured(scored.samples, cuts.residual, cuts.mover, cuts.reach,
+                            error_bound([p.program for p in framed]))
+        unread = None if asked.whole is None else unread_work(asked.whole, framed[0], measured, cutting, tools)
+        work, left = work_done(asked, measured, cutting, run.cut, source, unread)
         findings += [*cuts.allowance, *left, *deep_findings(scored.samples, cuts.residual, cuts.mover, cutting, source)]
     notes = [f"{run.lost} contacts are not listed: the tables are full"] if run.lost else []
-    notes.extend(cuts.notes)
+    notes.extend([*cuts.notes, *springs])
     notes.extend(f"T{t.number} is so thin that a plunge may stay unseen: the stock is sampled every "
                  f"{met.spacing:.3f} mm" for t in fine)
     if met.dip > DIP + 1e-9:
@@ -143,7 +151,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     stages.tell(1.0)
     proof = _proof(findings, cuts, run, framed, moves, source, setup, scored, zone_ids,
                    engagements(angle, stretches, tools), met.spacing, tuple(notes), support)
-    proof = replace(proof, assumed=in_order(setup.assumed))
+    proof = replace(proof, assumed=in_order(
+        [*setup.assumed, *program_assumptions(framed, tools, setup, stated)]))
     return proof if work is None else replace(proof, work=work)
 
 
@@ -191,6 +200,13 @@ def _idle_findings(read: Sequence[FramedProgram], run: StockPass, moves: Moves, 
             m = int(np.flatnonzero(own)[0])
             out.append(Finding(kind, p.program.name, int(source.line[m]), None, None, None, 0.0, 0.0,
                                "no feed move meets the stock: check the unit, the program zero and the tool"))
+    return out
+
+
+def _finishes(cuts: SurfaceCuts, setup: ProofSetup, count: int) -> NDArray[np.bool_]:
+    """(count,) bool, moves that leave a sample within the budget."""
+    out = np.zeros(count, np.bool_)
+    out[cuts.mover[(cuts.mover >= 0) & proved_samples(cuts.residual, setup)]] = True
     return out
 
 

@@ -61,6 +61,15 @@ class ToolAxes:
         """The axes where ``chosen``, (m,) bool, is true, or those of its rows, (k,) int64, index."""
         return ToolAxes(self.axis[chosen], self.about[chosen], self.angle[chosen])
 
+    def parted(self, of: NDArray[np.int64], share: F64, count: NDArray[np.int64]) -> ToolAxes:
+        """The axes of pieces of moves.
+
+        of    : (k,) int64, index, the move of each piece; count : (k,) int64, dimensionless, pieces of that move
+        share : (k,) float64, dimensionless, 0 to 1, where in its move each piece begins
+        """
+        turn, axis, about = (share * self.angle[of])[:, None], self.axis[of], self.about[of]
+        return ToolAxes(np.cos(turn) * axis + np.sin(turn) * np.cross(about, axis), about, self.angle[of] / count)
+
     @classmethod
     def upright(cls, count: int) -> ToolAxes:
         """``count`` moves of a tool along +Z."""

@@ -43,6 +43,11 @@ class Bodies:
             first.append(len(rows))
         return cls(np.array(rows, dtype=np.float64).reshape(-1, 6), np.array(first, dtype=np.int64))
 
+    @classmethod
+    def none(cls, tools: Sequence[ToolBody]) -> Bodies:
+        """No rows: only the cutting parts of the tools are there."""
+        return cls(np.zeros((0, 6)), np.zeros(len(tools) + 1, np.int64))
+
     def arrays(self, cutters: F64, ends: F64) -> ToolArrays:
         """The tools for kernels.
 

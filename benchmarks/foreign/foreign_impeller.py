@@ -83,7 +83,8 @@ def setup_file(case: Foreign) -> dict[str, object]:
             "holder": [{"diameter_mm": h.diameter, "diameter_top_mm": h.diameter_top, "length_mm": h.length}
                        for h in t.holder]}
     return {"access": [{"id": "A1", "direction": [0, 0, 1], "work_offset": "G54"}], "tools": [tool],
-            "machine": {"kind": "5-axis", "kinematics": "table-table-AC", "tcp": True, "dialects": ["linuxcnc"]},
+            "machine": {"kind": "5-axis", "kinematics": "table-table-AC", "iso_axes": [], "tcp": True,
+                        "dialects": ["linuxcnc"]},
             "stock": {"kind": "cylinder", "margin_mm": 0.0, "uncertainty_mm": 0.0,
                       "cylinder_mm": {"x": x, "y": y, "bottom": bottom, "diameter": 2.0 * radius, "height": height}},
             "quality": {"scallop_height_mm": 0.05, "chordal_tolerance_mm": 0.005, "gouge_tolerance_mm": 0.01},

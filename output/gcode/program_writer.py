@@ -413,7 +413,8 @@ def _heights(plan: Workplan, d: Dialect) -> list[str]:
              + " ".join(f"{letter}{decimal(float(np.degrees(v)), 4)}" for letter, v in
                         zip(c.machine.letters, c.machine.words(c.machine.follow(f.rotation[2:], np.zeros(2))[0]),
                             strict=True))
-             + ", or tilted the other way with C half a turn on; and whole turns of C" for name, f in c.frames.items())]
+             + ", or tilted the other way with C half a turn on; and whole turns of C" for name, f in c.frames.items()),
+           *_table_axes(c)]
     if c.machine.tcp:
         return [*out, d.tcp_words]
     pivots = "; ".join(" ".join(decimal(v, 4) for v in p) for p in c.machine.pivots or ())
@@ -421,6 +422,14 @@ def _heights(plan: Workplan, d: Dialect) -> list[str]:
     head = f" and gauge lengths {long}" if c.machine.tilts_head else ""
     return [*out, "XYZ are linear joints where rotary axes stand off 0",
             f"Made only for pivots {pivots} mm{head}"]
+
+
+def _table_axes(c: Clamping) -> list[str]:
+    """Header line: which way a positive angle turns the table. A reader of the program may rely on its words."""
+    letters = {"table-table": c.machine.letters, "head-table": "C"}.get(c.machine.kind[:-3], "")
+    words = [f"{letter} {'right-handed' if sense > 0 else 'ISO 841'}"
+             for letter, sense in zip(c.machine.letters, c.machine.sense, strict=True) if letter in letters]
+    return [f"Table axes: {', '.join(words)}"] if words else []
 
 
 def lowest_tip(plan: Workplan) -> float:

@@ -10,9 +10,10 @@ import math
 import numpy as np
 
 from schemas.setup import Lean
-from service.setup_assumptions import setup_assumptions
+from service.from_wire import face_numbers
+from service.setup_assumptions import planned_sense, setup_assumptions
 from service.stages.access_plan import ProofFrame
-from service.stages.job_inputs import RAMP_ANGLE
+from service.stages.job_inputs import RAMP_ANGLE, JobInputs
 from service.stages.job_part import JobPart
 from service.stages.preparation import Prepared, table_height
 from service.stages.programs import access_of, fixture_boxes, turning_of
@@ -21,6 +22,7 @@ from toolpath.plan_settings import Pattern, PlanSettings, ToolLean
 from toolpath.scallop_budget import ARC_SHARE
 from toolpath.stock.stock_map import StockMap
 from toolpath.workingsteps import CutDirection
+from verify.gcode.dialects import OWN_SPEED_RAPIDS
 from verify.model import ProofSetup
 from zones.reach.access_view import View
 
@@ -79,18 +81,41 @@ def proof_setup(job: JobPart, view: View | ProofFrame, *, foreign: bool = False)
         clearance_shank=c.shank, clearance_holder=c.holder, clearance_rapid=c.rapid,
         scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,
         stock_allowance=q.stock_allowance_mm, ramp_angle=RAMP_ANGLE, ramp_angles=inputs.ramp_angles(foreign=foreign),
+        cores=inputs.cores,
         rapid_feed=inputs.rates.rapid, acceleration=inputs.rates.acceleration,
         work_offset=access_of(job, view).work_offset,
         travel=None if machine.travel_mm is None else np.array(machine.travel_mm, dtype=np.float64),
         gauge_length=inputs.gauge_lengths,
         line_spacing=min(ProofSetup.line_spacing, inputs.engagement_spacing),
-        dogleg=machine.rapid_motion == "dogleg", max_feed=machine.max_feed_mm_min,
+        dogleg=_own_speeds(inputs, foreign), max_feed=machine.max_feed_mm_min,
         max_engaged=inputs.max_engaged, max_rpm=inputs.max_rpm,
         table=table_height(inputs, job.blank) if tabled else None,
         table_known=machine.table_z_mm is not None, free_ratio=FREE_RATIO, walls_in_turn=in_turn(job),
         kinematics=inputs.kinematics, rotary_limits=inputs.rotary_limits,
         rotary_rate=None if machine.rotary_rate_deg_min is None else float(np.radians(machine.rotary_rate_deg_min)),
-        assumed=setup_assumptions(inputs))
+        left_alone=left_alone(job),
+        assumed=(*setup_assumptions(inputs), *(() if foreign else planned_sense(inputs))))
 
 
-__all__ = ["leaned", "plan_settings", "planning_stock", "proof_setup"]
+def _own_speeds(inputs: JobInputs, foreign: bool) -> bool | None:
+    """Whether each axis of a rapid moves at its own speed; None: as the dialect of the program has it.
+
+    A plan on three axes is for all its controls, so one of them that moves so decides. On five axes it needs straight
+    rapids, and its header says so.
+    """
+    machine = inputs.machine
+    if machine.rapid_motion is not None:
+        return machine.rapid_motion == "dogleg"
+    own = not foreign and not inputs.turns and not OWN_SPEED_RAPIDS.isdisjoint(machine.dialects)
+    return True if own else None
+
+
+def left_alone(job: JobPart) -> dict[int, str]:
+    """Faces that the setup does not let machine, by number, with the words that say so."""
+    ops, numbers = job.inputs.operations, {f.number for f in job.part.faces}
+    wanted = numbers if ops.faces is None else set(face_numbers(ops.faces))
+    unasked = dict.fromkeys(sorted(numbers - wanted), "operations.faces does not name it")
+    return unasked | dict.fromkeys(face_numbers(ops.exclude_faces), "operations.exclude_faces names it")
+
+
+__all__ = ["leaned", "left_alone", "plan_settings", "planning_stock", "proof_setup"]

@@ -157,6 +157,15 @@ class JobInputs:
         return {number: angle for number, angle in out.items() if angle != RAMP_ANGLE}
 
     @property
+    def cores(self) -> dict[int, float]:
+        """Mm by T number: diameter at the end within which a tool does not cut, of tools that do not cut to the centre.
+
+        Drills, taps and thread mills are left out.
+        """
+        return {body.number: t.core_mm for t, body in zip(self.tools, self.bodies, strict=True)
+                if not t.center_cutting and not body.named}
+
+    @property
     def tool_lives(self) -> dict[str, float]:
         """Minutes in cut by tool id, of the tools whose life is limited."""
         return {t.id: t.life_min for t in self.tools if t.life_min is not None}

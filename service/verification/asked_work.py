@@ -23,10 +23,12 @@ from zones.reach.access_view import access_rotation, turned, turned_samples
 AXES = 200  # tool axes of a program that count as directions it sees the part from
 
 
-def asked_work(job: JobPart, frame: ProofFrame, program: Program) -> tuple[SurfaceSamples, Asked]:
+def asked_work(job: JobPart, frame: ProofFrame, program: Program,
+               whole: Program | None = None) -> tuple[SurfaceSamples, Asked]:
     """Samples of the machinable area in the frame of the proof, and the work that is asked there.
 
     frame   : of the proof; program : as it was read
+    whole   : the same program read on through an end before its last lines, or None
 
     The machinable area is what the accesses of the setup see, and what the tool axes of the program see.
 
@@ -36,6 +38,7 @@ def asked_work(job: JobPart, frame: ProofFrame, program: Program) -> tuple[Surfa
         The setup names faces the part does not have.
     """
     inputs, ops = job.inputs, job.inputs.operations
+    program = whole or program
     given = [access_rotation(a.direction) for a in job.accesses]
     directions = np.vstack([[r[2] for r in given], _axes(program) @ frame.rotation])
     first = turned(job.part, given[0])
@@ -49,7 +52,7 @@ def asked_work(job: JobPart, frame: ProofFrame, program: Program) -> tuple[Surfa
     table = table_height(inputs, job.blank) if inputs.turns else None
     asked = frozenset[int]() if not ops.finishing else None if ops.faces is None else frozenset(face_numbers(ops.faces))
     return samples, Asked(asked, ToolTouch(job.part, inputs, frame.rotation, table, axis_lines(program, inputs.bodies)),
-                          max(job.part.chord, job.part.deviation))
+                          max(job.part.chord, job.part.deviation), whole)
 
 
 def _axes(program: Program) -> F64:

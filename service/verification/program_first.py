@@ -5,15 +5,22 @@ This module imports nothing that is compiled, so that the refusal comes at once.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from geometry.errors import SetupError
+from schemas.machine import Machine
 from schemas.setup import Setup
 from service.from_wire import check_spindle_tool, gauge_lengths, machine_kinematics, tool_bodies
-from verify.gcode.dialects import dialect_of
+from service.verification.rotary_sense import assumed_sense, check_sense, sense_in_header
+from verify.assumptions import Assumed, AssumedKind
+from verify.gcode.dialects import dialect_of, dialects_left
+from verify.kinematics import Kinematics
 from verify.model import NcProgram
+from verify.program.move_kinds import FEED
 from verify.program.program import Program
-from verify.program_reading import read_one
+from verify.program_reading import read_on, read_one
+from verify.stepnc.part21 import is_exchange_file
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +31,18 @@ class ProgramFirst:
     read   : Program, its moves in its own frame
     access : id of the access in whose frame it is read; None: that of the job
     spindle_tool : T number in the spindle before its first line; 0 for none
+    kinematics : rotary axes that it was read for; None on a machine of three axes
+    assumed : what neither setup nor program states about how it is read
+    whole  : the program read on through an end before its last lines; None where nothing follows its end
     """
 
     nc: NcProgram
     read: Program
     access: str | None
     spindle_tool: int
+    kinematics: Kinematics | None = None
+    assumed: tuple[Assumed, ...] = ()
+    whole: Program | None = None
 
 
 def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_tool: int = 0,
@@ -41,7 +54,7 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
     Raises
     ------
     SetupError
-        ``no_such_access``, ``no_such_tool``.
+        ``no_such_access``, ``no_such_tool``, ``rotary_sense_open``.
     ProgramError, VerificationError
         The program cannot be read, as ``verify.program_reading.read_one``.
     """
@@ -52,11 +65,40 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
     check_spindle_tool(setup, spindle_tool)
     own = known[access] if access is not None else setup.access[0]
     nc = NcProgram("program", text, dialect=dialect or dialect_of(text, ending, setup.machine.dialects))
-    tools = tool_bodies(setup)
-    read = read_one(nc, tools, work_offset=own.work_offset, gouge_tolerance=setup.quality.gouge_tolerance_mm,
-                    kinematics=machine_kinematics(setup.machine), gauge_length=gauge_lengths(setup.tools, tools),
-                    spindle_tool=spindle_tool)
-    return ProgramFirst(nc, read, access, spindle_tool)
+    tools, machine = tool_bodies(setup), machine_kinematics(setup.machine)
+    assumed: list[Assumed] = []
+
+    def reading(of: Kinematics | None, program: NcProgram = nc) -> Program:
+        return read_one(program, tools, work_offset=own.work_offset, gouge_tolerance=setup.quality.gouge_tolerance_mm,
+                        kinematics=of, gauge_length=gauge_lengths(setup.tools, tools), spindle_tool=spindle_tool)
+
+    if dialect is None and not is_exchange_file(text):
+        assumed.extend(_assumed_dialect(nc.dialect, dialects_left(text, ending, _stated_dialects(setup))))
+    turned = machine if setup.machine.iso_axes is None and not is_exchange_file(text) else None
+    stated = None if turned is None else sense_in_header(text, turned)
+    read = reading(stated or machine)
+    if turned is not None and stated is None:
+        check_sense(read, turned, reading)
+    elif stated is not None and read.poses is not None:
+        assumed.append(assumed_sense(stated, "as the program says"))
+    if setup.machine.coolant == "flood" and not read.cools and (read.kind == FEED).any():
+        assumed.append(Assumed(AssumedKind.COOLANT, "off", "machine.coolant is flood and the program has no word for "
+                               "it: cutting data for coolant do not hold, and chips may stay",
+                               "program M8 or M9, or state machine.coolant off"))
+    whole = read_on(nc, read, lambda program: reading(stated or machine, program))
+    return ProgramFirst(nc, read, access, spindle_tool, stated or machine, tuple(assumed), whole)
+
+
+def _stated_dialects(setup: Setup) -> list[str]:
+    """The controls that the setup states; the default counts as none."""
+    return [] if setup.machine.dialects == Machine().dialects else setup.machine.dialects
+
+
+def _assumed_dialect(taken: str, others: tuple[str, ...]) -> Iterator[Assumed]:
+    if others:
+        yield Assumed(AssumedKind.DIALECT, taken, f"the program may be for {' or '.join(others)}, which read some "
+                      "words otherwise", "name the control by verify --dialect or by the ending of the file (.ngc), "
+                      "or state another one in machine.dialects")
 
 
 __all__ = ["ProgramFirst", "read_first"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -51,8 +51,9 @@ def proved_program(job: JobPart, first: ProgramFirst, progress: Callable[[float]
         As ``verify.prove.prove``; the setup names faces the part does not have.
     """
     frame = program_frame(job, first.access)
-    samples, asked = asked_work(job, frame, first.read)
+    samples, asked = asked_work(job, frame, first.read, first.whole)
     conditions = proof_setup(job, frame, foreign=True)
+    conditions = replace(conditions, kinematics=first.kinematics, assumed=(*conditions.assumed, *first.assumed))
     no_zone = ScoredSamples(samples, np.zeros(len(samples), np.int32))
     proof = prove([first.nc], frame.part, job.inputs.bodies, conditions, no_zone, [], progress,
                   spindle_tool=first.spindle_tool, read=[first.read], asked=asked)

@@ -121,12 +121,24 @@ def test_faces_of_the_setup_are_asked_whether_the_program_works_on_them_or_not(v
     whole = verify(right())
     side = max(whole["remainder"][0]["patches"], key=lambda p: p["area_mm2"])["face"]
     top = top_of(whole)
-    report = verify(right(), operations={"faces": [top, side]})
-    assert report["state"] == "clean"
-    assert report["asked"] == {"by": "setup", "faces": sorted([top, side], key=lambda f: int(f[1:]))}
+    wanted = sorted({*whole["asked"]["faces"], top, side}, key=lambda f: int(f[1:]))
+    report = verify(right(), operations={"faces": wanted})
+    assert report["state"] == "clean" and report["asked"] == {"by": "setup", "faces": wanted}
     assert set(left(report)) == {side} and left(report)[side][0] == pytest.approx(1.0, abs=0.005)
-    report = verify(right(), operations={"exclude_faces": [top]})
-    assert report["state"] == "proved" and top not in report["asked"]["faces"]
+
+
+@pytest.mark.slow
+def test_a_face_that_the_setup_excludes_is_not_asked_and_not_to_be_cut(verify):
+    top, height = top_of(verify(right())), 2.0
+    cut = verify(right(), operations={"exclude_faces": [top]})
+    assert top not in cut["asked"]["faces"] and cut["finding_counts"] == {"excluded_face": 1}
+    (found,) = cut["findings"]
+    assert found["face"] == top and found["depth"] == pytest.approx(height, abs=0.005) and found["line"] > 0
+    unasked = verify(right(), operations={"faces": [top]})
+    assert unasked["state"] == "unproved" and {f["kind"] for f in unasked["findings"]} == {"excluded_face"}
+    assert "operations.faces does not name it" in unasked["findings"][0]["message"]
+    kept = verify(higher(right(), 0.2), operations={"exclude_faces": [top]})
+    assert "excluded_face" not in kept["finding_counts"]
 
 
 @pytest.mark.slow

@@ -36,7 +36,7 @@ PIT = "G0 X3.1 Y-2.3\nG1 Z-0.05 F100\nG0 Z10"
 
 def facing(height: float, *more: str) -> str:
     """Level passes 4 mm apart over a plate of 30 x 20 mm, by a flat end of 6 mm."""
-    return "\n".join(["G21 G90 G17 G40 G54 G94", "T1 M6", "G43 H1", "S5000 M3",
+    return "\n".join(["G21 G90 G17 G40 G54 G94 G61", "T1 M6", "G43 H1", "S5000 M3",
                       *(line.replace("{z}", f"{height:g}") for line in FACING), *more, "M5", "M30"]) + "\n"
 
 

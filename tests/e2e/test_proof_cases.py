@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from geometry.errors import SetupError
 from service.from_wire import parse_setup
 from service.stages.job_part import read_job_part
 from service.verification.program_first import read_first
@@ -15,12 +16,18 @@ pytestmark = [pytest.mark.slow,
               pytest.mark.skipif(not CASES.is_dir(), reason="the collection of cases (../shared/cases) is not here")]
 HARMFUL = [  # program, part, kind of finding, its line, depth in mm or None
     ("03-stale-length-offset-rapid.ngc", "plate", "program", 71, None),
+    ("05-no-path-mode-linuxcnc.ngc", "boss", "program", 9, None),
+    ("07-fanuc-g92-then-g52-zero.nc", "plate", "program", 31, None),
+    ("09-fanuc-diagonal-rapid.nc", "plate", "rapid", 28, 4.0),
+    ("15-stepnc-security-plane-in-part.stpnc", "plate", "rapid", 882, 61.5),
     ("17-g53-beyond-travel.ngc", "plate", "limit", 68, 99499.0),
+    ("25-straight-drilling-paid-in-air.ngc", "plate", "plunge", 31, 4.5),
     ("30-rib-0.5x4x30-milled-off.ngc", "rib_0.5", "gouge", None, 4.0),
     ("32-knife-edge-shortened-0.7.ngc", "knife", "gouge", None, 0.7),
+    ("39-thin-wall-rule-diluted.ngc", "thin_wall", "support", 118, 15.7),
     ("34-allowance-cut-away.ngc", "plate", "allowance", None, 0.3),
 ]
-GOOD = ["fa-01-g28-from-the-wall.ngc", "fa-05-ramp-of-5-degrees.ngc",
+GOOD = ["fa-01-g28-from-the-wall.ngc", "fa-03-spring-pass-after-a-lift.ngc", "fa-05-ramp-of-5-degrees.ngc",
         "fa-07-g28-xyz-at-the-end.nc", "fa-09-lift-0.003-aside.ngc"]
 
 
@@ -48,3 +55,19 @@ def test_harm_is_found(name, part, kind, line, depth):
 def test_good_programs_are_proved(name):
     report = verified(name, "plate")
     assert report["state"] == "proved" and report["findings"] == []
+
+
+def test_the_sense_of_rotary_axes_is_asked_for():
+    """With the table counted as ISO 841 has it, the program gouges; nobody says how this table counts."""
+    name = "12-iso-axes-default.nc"
+    with pytest.raises(SetupError) as caught:
+        verified(name, "block")
+    assert caught.value.code == "rotary_sense_open" and caught.value.measured == ["A"]
+    assert "machine.iso_axes" in caught.value.remedy
+
+
+def test_faces_behind_a_stray_end_are_left():
+    report = verified("45-stray-m2.ngc", "plate")
+    assert report["state"] == "clean" and report["finding_counts"].keys() == {"stock_left"}
+    assert max(f["depth"] for f in report["findings"]) == pytest.approx(4.0, abs=1e-3)
+    assert any("40 lines from 29 to 70 stand behind it" in n for n in report["proof"]["notes"])

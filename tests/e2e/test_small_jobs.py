@@ -31,7 +31,7 @@ def run(command, part, folder, setup, *more):
     return CliRunner().invoke(app, [command, str(part), "--setup", str(path), *more])
 
 
-AIR_ONLY = """G21 G90 G94 G17 G54
+AIR_ONLY = """G21 G90 G94 G17 G54 G61
 T1 M6
 G43 H1
 S3000 M3
@@ -57,7 +57,7 @@ def test_a_program_that_cuts_nothing_is_not_proved(part, tmp_path, text):
 
 def test_verify_keeps_the_least_coverage_asked_for(part, tmp_path):
     program = tmp_path / "p.ngc"
-    program.write_text("G21 G90 G94 G17 G54\nT1 M6\nG43 H1\nS3000 M3\nG0 Z30\nG0 X-4 Y-4\nG0 Z6\nG1 Z4.2 F100\n"
+    program.write_text("G21 G90 G94 G17 G54 G61\nT1 M6\nG43 H1\nS3000 M3\nG0 Z30\nG0 X-4 Y-4\nG0 Z6\nG1 Z4.2 F100\n"
                        "G1 X20 F300\nG1 Y3\nG1 X-4\nG0 Z30\nM5\nM30\n")
     free = json.loads(run("verify", part, tmp_path, SETUP, "--program", str(program)).stdout)
     assert "coverage" not in free["finding_counts"]

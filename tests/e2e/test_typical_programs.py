@@ -37,7 +37,8 @@ def setup_text(dialect, kinematics=None):
     setup = json.loads((NC / "plate_setup.json").read_text())
     setup["machine"] = {"kind": "3-axis", "dialects": [dialect]}
     if kinematics:
-        setup |= {"machine": {"kind": "5-axis", "kinematics": kinematics, "dialects": [dialect]}, "tools": [FLAT]}
+        setup |= {"machine": {"kind": "5-axis", "kinematics": kinematics, "dialects": [dialect],
+                              "iso_axes": []}, "tools": [FLAT]}
     return json.dumps(setup)
 
 

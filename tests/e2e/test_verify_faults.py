@@ -291,7 +291,7 @@ def test_tool_lengths_count_in_the_travel_of_z():
 
 def test_what_is_taken_for_granted_is_told():
     lines = program()
-    lines[1] = "G90"
+    lines[1] = "G90 G61"
     proof = run(lines)
     assert proof.no_findings
     assert proof.notes == ("pocket.ngc does not state G21, G17, G94, G54 before its first move; the proof assumes it",)

@@ -17,7 +17,7 @@ cq = pytest.importorskip("cadquery")
 FLAT = {"id": "T1", "kind": "flat", "diameter_mm": 4, "flute_length_mm": 8, "stickout_mm": 20}
 SETUP = {"tools": [FLAT], "quality": {"scallop_height_mm": 0.05}, "stock": {"margin_mm": 0.5, "uncertainty_mm": 0.0}}
 # one slot of 4 mm over the step, whose floor is at z = 2, in one pass along the foot of its wall
-SLOT = ("G21 G90 G94 G17 G54\nT1 M6\nG43 H1\nS3000 M3\nG0 Z30\nG0 X6 Y-4\nG1 Z{z} F300\nG1 Y16\nG0 Z30\nM5\nM30\n")
+SLOT = ("G21 G90 G94 G17 G54 G61\nT1 M6\nG43 H1\nS3000 M3\nG0 Z30\nG0 X6 Y-4\nG1 Z{z} F300\nG1 Y16\nG0 Z30\nM5\nM30\n")
 
 
 @pytest.fixture(scope="module")

@@ -115,6 +115,34 @@ def test_where_the_blank_is_thinner_than_the_wall_half_of_it_counts(margin):
     assert run(program([*whole("left"), *whole("right")]), setup=near_net).counts == {"support": 1}
 
 
+def divided(text: str, parts: int) -> str:
+    """A program whose feed moves along Y come in so many blocks each."""
+    out = []
+    for line in text.splitlines():
+        steps = [f"Y{-4 + 24 * (k + 1) / parts:.4f}" for k in range(parts)] if line == "Y20" else [line]
+        out += steps
+    return "\n".join(out) + "\n"
+
+
+def diluted(text: str, count: int) -> str:
+    """A program with so many short feed moves beside the wall before its end, where everything is cut."""
+    idle = ["G0 X4 Y1", "G1 Z2 F800", *(f"Y{1.0 + 0.01 * (k % 100):.2f}" for k in range(count)), "G0 Z20"]
+    head, _, tail = text.partition("M5\n")
+    return head + "\n".join(idle) + "\nM5\n" + tail
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("depth", [6.0, 5.0])
+def test_how_a_program_is_divided_into_blocks_changes_nothing(depth):
+    text = program(in_turn(depth))
+    usual = run(text)
+    for other in (run(divided(text, 30)), run(diluted(text, 3000)), run(divided(text, 30), setup=SETUP, threads=1)):
+        found = {k: n for k, n in other.counts.items() if k == "support"}
+        assert found == usual.counts and other.support.places == usual.support.places
+        assert other.support.most == pytest.approx(usual.support.most, abs=0.1)
+        assert other.support.over == pytest.approx(usual.support.over, abs=0.02 * usual.support.places)
+
+
 def test_threads_do_not_change_a_byte():
     text = program(in_turn(6.0))
     one, two = (run(text, threads=n) for n in (1, 2))

@@ -47,7 +47,8 @@ def test_nodes_hold_the_distance_to_what_was_cut(kind):
     for m in range(len(moves)):
         want = np.minimum(want, least_distance(p, moves, m, tool, 41))
     assert np.abs(field.values.ravel() - np.clip(want, -h, h)).max() <= BOW + 1e-4
-    assert ((run.taken > 0) == run.cut).all() and run.taken.sum() == pytest.approx(LEFT - field.volume, abs=1e-3)
+    assert ((run.ways.volume > 0) == run.cut).all()
+    assert run.ways.volume.sum() == pytest.approx(LEFT - field.volume, abs=1e-3)
 
 
 @pytest.mark.parametrize("step", [0.5, 0.13461225148968145, 0.3])
@@ -66,7 +67,7 @@ def test_volumes_taken_say_which_move_took_what():
     run = run_field(stock_field(MESH, block(), 0.2), moves, [tool], block(), bare=True)
     assert run.cut.tolist() == [True, False, False, False, True]
     # the last goes down to half a millimetre lower; over a place its disc is lowest where it leaves, pi R / 4 later
-    np.testing.assert_allclose(run.taken[[0, 4]], [48.0, 48.0 * (0.25 + 0.5 / 18.0 * np.pi / 2.0)], rtol=0.01)
+    np.testing.assert_allclose(run.ways.volume[[0, 4]], [48.0, 48.0 * (0.25 + 0.5 / 18.0 * np.pi / 2.0)], rtol=0.01)
 
 
 def slot(tool, depth=4.0, lean=0.0):
@@ -110,10 +111,11 @@ def test_tiles_and_threads_change_no_byte(monkeypatch, tile, threads):
         return field, run, deepest
     (one, first, met), (other, second, also) = cut(64, 2), cut(tile, threads)
     assert one.values.tobytes() == other.values.tobytes() and met == also and len(met) > 10
-    np.testing.assert_allclose(first.taken, second.taken, atol=1e-7)
+    np.testing.assert_allclose(first.ways.volume, second.ways.volume, atol=1e-7)
     if tile == 64:
         assert first.events.tobytes() == second.events.tobytes()
-        assert first.taken.tobytes() == second.taken.tobytes()
+        assert first.ways.volume.tobytes() == second.ways.volume.tobytes()
+        assert first.ways.depth.tobytes() == second.ways.depth.tobytes()
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -55,7 +55,8 @@ def test_another_side_up_is_the_same_proof(turn):
 
 
 def test_limits_and_ways_are_told_in_the_frame_of_the_proof():
-    lines = ["G21 G90 G17 G94 G54", "T1 M6", "S1000 M3", "G43 H1", "G0 X0 Y0", "Z40", "G1 Z38 F9000", "G0 Z5", "M30"]
+    lines = ["G21 G90 G17 G94 G54 G61",
+             "T1 M6", "S1000 M3", "G43 H1", "G0 X0 Y0", "Z40", "G1 Z38 F9000", "G0 Z5", "M30"]
     proof = prove([NcProgram("low", text(lines), FLIP)], PART, [TOOL], replace(SETUP, max_feed=5000.0), NOBODY, [])
     limit = next(f for f in proof.findings if f.kind == FindingKind.LIMIT)
     assert limit.line == 7 and limit.point == (0.0, 0.0, -38.0)
@@ -67,7 +68,8 @@ def test_stock_is_carried_from_one_program_to_the_next():
     """A long tool goes where a short one has been: alone its neck meets the stock, after the other it does not."""
     short = replace(TOOL, id="T2", number=2, flute_length=2.0, neck_diameter=4.0, neck_length=20.0)
     first = text(program())
-    way = ["%", "G21 G90 G17 G94 G40 G49 G54", "T2 M6", "S8000 M3", "G0 G43 H2 Z20", "X-7 Y0", "Z1.5", "G1 Z-4 F300",
+    way = ["%", "G21 G90 G17 G94 G40 G49 G54 G61",
+           "T2 M6", "S8000 M3", "G0 G43 H2 Z20", "X-7 Y0", "Z1.5", "G1 Z-4 F300",
            "G1 X7", "G0 Z20", "M5", "M30", "%"]
     second = text(way)
     for turn in (None, np.eye(3)):

@@ -13,7 +13,7 @@ from verify.model import ProofSetup
 
 PART = block()
 BALL = ToolBody("B1", 1, 6.0, 3.0, 10.0, 5.8, 20.0, 6.0, 30.0)
-GROOVE = "\n".join(["%", "G21 G90 G17 G94 G40 G49 G54", "T1 M6", "S8000 M3", "G0 G43 H1 Z20", "X-30 Y0", "Z-2",
+GROOVE = "\n".join(["%", "G21 G90 G17 G94 G40 G49 G54 G61", "T1 M6", "S8000 M3", "G0 G43 H1 Z20", "X-30 Y0", "Z-2",
                     "G1 X30 F600", "G0 Z20", "M30", "%", ""])
 
 

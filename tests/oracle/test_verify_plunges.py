@@ -13,7 +13,7 @@ NOBODY = ScoredSamples(scored(PART).samples, np.zeros(len(scored(PART).zone), np
 
 
 def proved(tool, *lines, turn=None):
-    head = ["%", "G21 G90 G17 G94 G40 G49 G54", "T1 M6", "S8000 M3", "G0 G43 H1 Z20"]
+    head = ["%", "G21 G90 G17 G94 G40 G49 G54 G61", "T1 M6", "S8000 M3", "G0 G43 H1 Z20"]
     body = [*head, *lines, "G0 Z20", "M5", "M30", "%"]
     return prove([NcProgram("p", text(body), turn)], PART, (tool,), SETUP, NOBODY, (), threads=2)
 

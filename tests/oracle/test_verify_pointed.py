@@ -194,7 +194,7 @@ def test_the_volume_of_a_drilled_hole(angle):
     field = stock_field(box_mesh((-5, -4, -9), (5, 4, 0)), BLANK, 0.1)
     run = run_field(field, feed(4.0 * axis, -5.0 * axis, axis), [DRILL], BLANK)
     want = math.pi * 1.5**2 * (5.0 - 0.9 + 0.9 / 3.0)
-    assert run.taken is not None and run.taken.sum() == pytest.approx(want, rel=0.005)
+    assert run.ways.volume.sum() == pytest.approx(want, rel=0.005)
     assert len(run.events) == 0
 
 

@@ -12,7 +12,7 @@ from verify.program.move_times import minutes_of
 PART = block()
 # looks along -X of the part: its X is Y of the part, its Y is Z, its Z is X
 ASIDE = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
-SLOT = ["%", "G21 G90 G17 G94 G40 G49 G54", "T1 M6", "S8000 M3", "G0 G43 H1 Z40", "X-9 Y-5", "Z24",
+SLOT = ["%", "G21 G90 G17 G94 G40 G49 G54 G61", "T1 M6", "S8000 M3", "G0 G43 H1 Z40", "X-9 Y-5", "Z24",
         "G1 Z18 F300", "G1 X9", "G0 Z40", "M5", "M30", "%"]
 GIVEN = [NcProgram("pocket", text(program(2.5))), NcProgram("slot", text(SLOT), turn=ASIDE)]
 

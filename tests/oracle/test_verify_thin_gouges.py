@@ -22,7 +22,7 @@ def deepest(part, tolerance, *lines):
     samples = samples_of(part.mesh, 25.0)
     setup = ProofSetup(stock_kind="box", margin=0.5, uncertainty=0.0, gouge_tolerance=tolerance,
                        clearance_rapid=0.2)
-    head = ["%", "G21 G90 G17 G94 G40 G49 G54", "T1 M6", "S8000 M3", "G0 G43 H1 Z20"]
+    head = ["%", "G21 G90 G17 G94 G40 G49 G54 G61", "T1 M6", "S8000 M3", "G0 G43 H1 Z20"]
     body = [*head, *lines, "G0 Z20", "M5", "M30", "%"]
     proof = prove([NcProgram("p", text(body), None)], part, (FLAT,), setup,
                   ScoredSamples(samples, np.zeros(len(samples), np.int32)), ())

@@ -25,7 +25,7 @@ from toolpath.linking.rapid_travel import Motions
 from toolpath.stock.cut_history import Depths
 from toolpath.stock.stock_map import StockMap
 from toolpath.workingsteps import TrajectoryKind
-from verify.checks.repeated_passes import WINDOW, repeat_findings
+from verify.checks.repeated_passes import WINDOW, repeats
 from verify.findings import Source
 from verify.material.stock_lines import blank, run_stock
 from verify.model import ProofSetup, StockKind
@@ -88,7 +88,7 @@ def judged(made, mesh, body, block):
     setup = ProofSetup(stock_kind=StockKind.BOX, stock_box=block, ramp_angle=RAMP)
     run = run_stock(blank(mesh, 0.07, setup), moves, [body], setup)
     lines = np.arange(1, len(moves) + 1, dtype=np.int32)
-    return moves, run, repeat_findings(moves, run.cut, Source(("p",), none, lines, none))
+    return moves, run, repeats(moves, run.cut, Source(("p",), none, lines, none))[0]
 
 
 @pytest.mark.parametrize("seed", [5, 9, 14])

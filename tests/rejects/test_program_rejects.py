@@ -9,7 +9,7 @@ from verify.gcode.reader import read_program
 from verify.program import move_log
 from verify.program.move_log import MAX_MOVES_A_BLOCK
 
-HEAD = "%\nG21 G90 G17 G94 G40 G49 G54\nT1 M6\nS1000 M3\nG0 X0 Y0\nG43 H1 Z10\n"
+HEAD = "%\nG21 G90 G17 G94 G40 G49 G54 G61\nT1 M6\nS1000 M3\nG0 X0 Y0\nG43 H1 Z10\n"
 TAIL = "M30\n%\n"
 
 

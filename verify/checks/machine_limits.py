@@ -31,11 +31,15 @@ def way_findings(p: Program, bounds: F64, tools: Sequence[ToolBody], setup: Proo
 
     bounds : (2, 3) float64, mm, setup frame, of the part
     """
-    top = top_of_all(bounds, setup)
+    top, low = top_of_all(bounds, setup), low_places(p, tools, setup)
+    return [*_blind(p, bounds, top, low, setup), *_doglegs(p, top, low, setup), *_low_stops(p, bounds, setup),
+            *_low_planes(p, bounds, setup)]
+
+
+def low_places(p: Program, tools: Sequence[ToolBody], setup: ProofSetup) -> F64:
+    """(m,) float64, mm, lowest place of the tool on each move: the holder of a tilted tool may be below its tip."""
     low = np.minimum(p.start[:, 2], p.end[:, 2])
-    if p.poses is not None:  # the holder of a tilted tool may be lower than its tip
-        low = np.minimum(low, lowest_places(p, tools, setup, leaning=True))
-    return [*_blind(p, bounds, top, low, setup), *_doglegs(p, top, low, setup), *_low_stops(p, bounds, setup)]
+    return low if p.poses is None else np.minimum(low, lowest_places(p, tools, setup, leaning=True))
 
 
 def _blind(p: Program, bounds: F64, top: float, low: F64, setup: ProofSetup) -> Iterator[Finding]:
@@ -100,6 +104,22 @@ def _low_stops(p: Program, bounds: F64, setup: ProofSetup) -> Iterator[Finding]:
                 f"{at:.3f} mm along its axis, where stock and fixtures reach {top:.3f} mm"
             yield Finding(FindingKind.PROGRAM, p.name, stop.line, None, None, None, top - at, top,
                           f"{stop.event} with T{stop.tool} at {along}: retract the tool first")
+
+
+def _low_planes(p: Program, bounds: F64, setup: ProofSetup) -> Iterator[Finding]:
+    """Planes of a STEP-NC file that part, blank and fixtures reach, or come nearer to than the rapid clearance.
+
+    A control may take the tool to such a plane and along it, although the paths of the file stay above.
+    """
+    for plane in p.planes:
+        normal = np.array(plane.normal)
+        top, at = _top_along(normal, bounds, setup), float(np.array(plane.point) @ normal)
+        limit = top + setup.clearance_rapid
+        if at < limit - 1e-6:
+            where = f"Z{at:.3f}" if plane.normal[2] > 1.0 - 1e-9 else f"{at:.3f} mm along its normal"
+            yield Finding(FindingKind.RAPID, p.name, plane.line, None, None, plane.point, limit - at, limit,
+                          f"the {plane.what} at {where} is {abs(top - at):.3f} mm {'under' if at < top else 'over'} "
+                          f"the top of part, stock and fixtures ({top:.3f}): a control goes there in a rapid")
 
 
 def limit_findings(read: Sequence[Program], setup: ProofSetup) -> list[Finding]:

@@ -1,4 +1,8 @@
-"""Parts of a program that run a second time and remove nothing: a zone pasted twice, a pass not deleted."""
+"""Parts of a program that run a second time and remove nothing.
+
+A pass over ground that it has finished before is a spring pass, and a note. What is no finishing pass, as a layer that
+is pasted twice, and a whole program that is pasted twice, are findings.
+"""
 
 from __future__ import annotations
 
@@ -15,29 +19,68 @@ from verify.moves import Moves
 MIN_LINES = 4
 WINDOW = 8
 ROUND = 1e-6  # mm, rad: closer moves are the same
+FINISHED = 0.5  # share of the length of a pass that has to leave places within the budget
+MAX_NOTES = 8
 
 
-def repeat_findings(moves: Moves, cut: NDArray[np.bool_], source: Source) -> list[Finding]:
-    """One finding for each run of feed moves over at least 4 lines that repeats an earlier one and removes no stock.
+def repeats(moves: Moves, cut: NDArray[np.bool_], source: Source,
+            finishes: NDArray[np.bool_] | None = None) -> tuple[list[Finding], list[str]]:
+    """Findings and notes on runs of feed moves over at least 4 lines that repeat earlier ones and remove no stock.
 
-    cut : (m,) bool, moves that removed stock
-
-    A closed level path that is repeated at once, a spring pass, is not a finding.
+    cut      : (m,) bool, moves that removed stock
+    finishes : (m,) bool, moves that leave some place of the part within its budget; None: none do
     """
-    return [Finding(FindingKind.PROGRAM, source.names[source.program[a]], int(source.line[a]), None, None,
-                    tuple(round(float(v), 6) for v in moves.end[a]), 0.0, 0.0,  # type: ignore[arg-type]
-                    f"T{source.tool[a]}: lines {source.line[a]} to {source.line[b]} repeat lines "
-                    f"{source.line[a - shift]} to {source.line[b - shift]} and remove no stock", b - a + 1)
-            for a, b, shift in _runs(moves, cut)
-            if source.line[b] - source.line[a] + 1 >= MIN_LINES and not _spring(moves, a, b, shift)]
+    length = np.linalg.norm(moves.end - moves.start, axis=1)
+    done = np.zeros(len(moves), np.bool_) if finishes is None else finishes
+    findings, notes = [], []
+    for group in _groups(moves, cut):
+        whole = _whole(moves, group)
+        for a, b, shift in group:
+            if source.line[b] - source.line[a] + 1 < MIN_LINES:
+                continue
+            both = done[a:b + 1] | done[a - shift:b + 1 - shift]
+            spring = _ring(moves, a, b) and len(group) == 1
+            words = (f"T{source.tool[a]}: lines {source.line[a]} to {source.line[b]} repeat lines "
+                     f"{source.line[a - shift]} to {source.line[b - shift]} and remove no stock")
+            fine = length[a:b + 1][both].sum() >= FINISHED * length[a:b + 1].sum()
+            if fine and (spring or not whole):
+                notes.append(f"{source.names[source.program[a]]}, {words}: a pass over finished ground")
+            elif spring and shift == b - a + 1:
+                continue
+            else:
+                place = tuple(round(float(v), 6) for v in moves.end[a])
+                findings.append(Finding(FindingKind.PROGRAM, source.names[source.program[a]], int(source.line[a]),
+                                        None, None, place, 0.0, 0.0, words, b - a + 1))  # type: ignore[arg-type]
+    if len(notes) > MAX_NOTES:
+        notes[MAX_NOTES - 1:] = [f"{notes[MAX_NOTES - 1]} (and {len(notes) - MAX_NOTES} more such passes)"]
+    return findings, notes
 
 
-def _spring(moves: Moves, a: int, b: int, shift: int) -> bool:
-    """Whether moves a..b repeat a closed level path at once."""
+def _groups(moves: Moves, cut: NDArray[np.bool_]) -> list[list[tuple[int, int, int]]]:
+    """Runs one after the other that repeat the same part: between them are rapids, or moves too few to be a run."""
+    out: list[list[tuple[int, int, int]]] = []
+    for run in _runs(moves, cut):
+        if out and out[-1][-1][2] == run[2]:
+            out[-1].append(run)
+        else:
+            out.append([run])
+    return out
+
+
+def _whole(moves: Moves, group: list[tuple[int, int, int]]) -> bool:
+    """Whether all feed moves before a group, but for a few on the way, run again in it."""
+    first, last, shift = group[0][0], group[-1][1], group[0][2]
+    before = int(moves.feed[:first - shift].sum())
+    between = int(moves.feed[last - shift + 1:first].sum())
+    return before < WINDOW and between < WINDOW
+
+
+def _ring(moves: Moves, a: int, b: int) -> bool:
+    """Whether moves a..b are a closed level path."""
     way = moves.end[a:b + 1] - moves.start[a:b + 1]
     up = np.array([0.0, 0.0, 1.0]) if moves.axes is None else moves.axes.axis[a]
     closed = np.linalg.norm(moves.end[b] - moves.start[a]) < 1e-3
-    return bool(shift == b - a + 1 and closed and np.abs(way @ up).max() < 1e-6)
+    return bool(closed and np.abs(way @ up).max() < 1e-6)
 
 
 def _runs(moves: Moves, cut: NDArray[np.bool_]) -> Iterator[tuple[int, int, int]]:

@@ -48,6 +48,8 @@ def difference(proved: Program, other: Program) -> str:
         return f"{other.name} dwells {other.dwell:g} s, {proved.name} {proved.dwell:g} s"
     if taken := [word for word in other.assumed if word not in proved.assumed]:
         return f"{other.name} does not state {', '.join(taken)} before its first move"
+    if left := [a for a in other.open if a not in proved.open]:
+        return f"{other.name} leaves it to the control whether {left[0].value}"
     if other.unbounded and other.dialect in CONTROLS and CONTROLS[other.dialect].bounds_path:
         return f"{other.name} does not bound the deviation from the path"
     if not (other.unbounded or proved.unbounded) and other.leaves > proved.leaves + 1e-12:

@@ -15,6 +15,7 @@ from verify.program.move_log import Log
 from verify.program.program import NAN, Pause, StopPoint
 
 INCH = 25.4
+PATH_MODES: frozenset[float] = frozenset({61, 61.1, 64})
 
 
 class Modes(Rotary):
@@ -61,7 +62,7 @@ class Modes(Rotary):
         if s.turning:
             self.log.turns(s.tool, s.speed)
         if not {7, 8, 9}.isdisjoint(block.ms):
-            s.coolant = 9 not in block.ms
+            s.coolant, self.log.cools = 9 not in block.ms, True
         speed, coolant = s.speed if s.turning else 0.0, s.coolant
         self._in_order(lambda: self.log.runs(speed, coolant))
         if not {428, 429}.isdisjoint(block.ms):
@@ -163,6 +164,8 @@ class Modes(Rotary):
             self._length_offset(g, values)
         elif g in WORK_OFFSETS:
             self._select_zero(WORK_OFFSETS[g])
+        elif g in PATH_MODES and self.log.path_stated is None:
+            self.log.path_stated = self.log.count
 
     def _assume(self) -> None:
         """Record the modes that the first move assumes: a control keeps the modes of the program before."""

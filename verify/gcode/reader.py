@@ -9,8 +9,9 @@ machinist should not run is a ``Remark``, and the reading goes on: length offset
 stopped, path blending beyond the tolerance, a word that no code uses.
 
 Assumptions: home (G53 Z0, G28, G30), a tool change and the start of a program are above everything; axes of unknown
-position are known again once programmed. Before the program states them, the unit is mm, the control keeps to the path
-and rotary axes stand at 0; ``Program.assumed`` lists these assumptions.
+position are known again once programmed. Before the program states them, the unit is mm and rotary axes stand at 0;
+``Program.assumed`` lists these assumptions. LinuxCNC starts in G64 without a tolerance; on other controls parameters
+decide (``Program.unbounded``).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 import numpy as np
 
 from geometry.errors import ProgramError, VerificationError
+from geometry.mesh import F64
 from verify.gcode.block_motion import BlockMotion
 from verify.gcode.block_words import Block, BlockError, parse_block, straight, used_letters
 from verify.gcode.dialects import CONTROLS, DIALECTS, LINUXCNC, translated_blocks
@@ -38,6 +40,8 @@ from verify.progress import Report, silent
 BLEND_LIMIT = 0.01
 _BINARY = re.compile("[\x00-\x08]")
 _CLOSES = re.compile(r"%$|(?:\d+\s+)?END PGM\b")  # what may stand behind the end of a program
+# what begins another program or a part of one
+_OPENS = re.compile(r"[O:]\s*[0-9<]|%_N_|PROC\b|LBL\b|\d+\s+(?:BEGIN|LBL)\b", re.IGNORECASE)
 REPORT_LINES = 4096  # lines between two reports of progress
 
 
@@ -57,8 +61,7 @@ class Reader(BlockMotion):
             blocks = Flow(lines, self).blocks()
         seen = bytearray(len(lines) + 2)
         percents = self._scan(_reported(blocks, len(lines), report), seen)
-        if self.s.ended:
-            self._name_unread(lines, seen)
+        cut_off = self._name_unread(lines, seen) if self.s.ended else 0
         self._finish()
         self.stop("end of the program")
         self.pause("end of the program", self.s.tool)
@@ -68,12 +71,13 @@ class Reader(BlockMotion):
         if self.s.relative and self.incremental_after_cuts and self.incremental_moved:
             log.remark("incremental", "the program switches to incremental coordinates (G91) after absolute cuts and "
                        "never switches back", line=self.incremental_line)
-        if any(self.s.shift):
+        if any(self.s.shift) or any(self.s.local):
             log.remark("shift_left", "the program ends with its zero shifted (G92, G52), and a control keeps the shift "
-                       "for the next run: cancel it with G92.1")
+                       f"for the next run: {self.cancel_shift}")
         if log.functions:
             log.notes.append(functions_note(log.functions))
         table = log.table()
+        self._path_mode(table)
         speed, coolant = log.states()
         start, end, feed = (np.ascontiguousarray(table[:, k]) for k in (slice(0, 3), slice(3, 6), 7))
         return Program(log.name, start, end, table[:, 6].astype(np.int8), feed, table[:, 8].astype(np.int32),
@@ -81,7 +85,8 @@ class Reader(BlockMotion):
                        np.array(log.unknown, np.int64).reshape(-1, 2), tuple(log.stops), self.assumed, log.blend,
                        log.turned.minutes(np.linalg.norm(end - start, axis=1), feed),
                        log.turned.poses(len(table), self.machine), tuple(log.notes), speed, coolant, log.changes,
-                       dialect, log.unbounded, tuple(log.pauses), log.leaves, tuple(log.places))
+                       dialect, log.unbounded, tuple(log.pauses), log.leaves, tuple(log.places), cut_off,
+                       open=() if self.control is None else tuple(self.control.assumed), cools=log.cools)
 
     def served(self, key: int | str) -> float:
         """A parameter that the control serves (``verify.gcode.flow.system_parameters``)."""
@@ -99,6 +104,20 @@ class Reader(BlockMotion):
         """A subroutine ends: the modes that its M73 saved come back."""
         self.saved.leave(self.s)
 
+    def _path_mode(self, table: F64) -> None:
+        """Tell where the first feed move of ``table`` (m, 10) runs in a path mode that nothing states before it."""
+        first = int(np.argmax(table[:, 6] == FEED)) if len(table) else 0
+        if not len(table) or table[first, 6] != FEED:
+            return
+        if self.log.path_stated is not None and self.log.path_stated <= first:
+            return
+        if self.fits:
+            self.log.remark("blending", "neither G61 nor G64 stands before this feed move: LinuxCNC starts in G64 "
+                            "without a P, which lets the control leave the path by any amount (limit "
+                            f"P{self.blend_limit:g} mm)", line=int(table[first, 9]))
+        else:
+            self.log.unbounded = True
+
     def _finish(self) -> None:
         """Write what a contour still holds back."""
         try:
@@ -106,14 +125,22 @@ class Reader(BlockMotion):
         except BlockError as problem:
             self.log.error(str(problem), remedy=problem.remedy)
 
-    def _name_unread(self, lines: list[str], seen: bytearray) -> None:
-        """Note the lines behind the end of the program that did not run."""
+    def _name_unread(self, lines: list[str], seen: bytearray) -> int:
+        """Note the lines behind the end of the program that did not run.
+
+        Returns the line of the end where such lines go on with the program, 0 where they begin another one.
+        """
         end = self.log.line
         bare = (lines[k - 1].split("(")[0].split(";")[0].strip() for k in range(end + 1, len(lines) + 1))
-        rest = [k for k, text in enumerate(bare, end + 1) if text and not seen[k] and not _CLOSES.match(text)]
-        if rest:
-            self.log.note(f"line {end} ends the program; {len(rest)} lines from {rest[0]} to {rest[-1]} stand behind "
-                          "it and are not read")
+        rest = [(k, text) for k, text in enumerate(bare, end + 1) if text and not seen[k] and not _CLOSES.match(text)]
+        if not rest:
+            return 0
+        first = rest[0][0]
+        other = _OPENS.match(rest[0][1])
+        what = f"{len(rest)} lines from {first} to {rest[-1][0]}"
+        self.log.note(f"line {end} ends the program; {what} stand behind it and are not read"
+                      + (f": line {first} begins another program" if other else ""))
+        return 0 if other else end
 
     def _scan(self, blocks: Iterable[tuple[int, str]], seen: bytearray) -> int:
         """Run blocks with their lines; the fast path serves plain straight moves in the plain state only.

@@ -2,6 +2,11 @@
 
 All of them are exact, because the zero of the setup is known: a shift is the place of the tip minus its programmed
 number. ``verify.gcode.offset_tables`` runs the other forms of G10.
+
+LinuxCNC keeps the shifts of G52 and G92 in one register: the later word replaces the shift of the axes it names. Fanuc
+and Haas have two. There G52 is a local system within the shifted one, ``G52 X0`` ends only that, and G92 ends the local
+shift of the axes that it names. G92.1 of Fanuc presets the named axes, which ends both of their shifts; Haas has no
+G92.1. No control is counted on to end a shift at M30: parameters decide it there.
 """
 
 from __future__ import annotations
@@ -19,6 +24,13 @@ class Origins(OffsetTables):
 
     polar: tuple[float | None, float | None] | None = None
 
+    @property
+    def cancel_shift(self) -> str:
+        """What ends all shifts on this control, in words of a remark."""
+        if self._foreign:
+            return "cancel it with G52 X0 Y0 Z0, and with a G92 that sets the old numbers again"
+        return "cancel it with G92.1"
+
     def _shift_origin(self, block: Block, axes: Axes) -> None:
         """Run the word of a block that moves program zero."""
         word = next(g for g in block.codes if g in (10, 52, 92, 92.1, 92.2, 92.3))
@@ -29,6 +41,8 @@ class Origins(OffsetTables):
             raise BlockError(f"polar words with G{word:g}: it takes X, Y and Z")
         if turned := [letter for letter in self.rotary if letter in block.values]:
             raise BlockError(f"G{word:g} {turned[0]} (a shifted rotary zero): it takes X, Y and Z")
+        if word == 92.1 and self._foreign:
+            return self._preset(axes)
         if word in (92.1, 92.2, 92.3):
             if any(a is not None for a in axes):
                 raise BlockError(f"G{word:g} takes no coordinates")
@@ -42,13 +56,29 @@ class Origins(OffsetTables):
             raise BlockError(f"G{word:g} while the coordinates are rotated, scaled or mirrored")
         if word == 10:
             return self._table(block.values, axes)
+        if word == 52 and self._foreign and s.relative:
+            raise BlockError("G52 in incremental coordinates (G91), which controls read differently")
+        local = s.local if self._foreign else s.shift
         for k, axis in enumerate(axes):
-            if axis is not None:
-                s.shift[k] = axis * s.scale if word == 52 else (
-                    self._known(k, word) - s.table[k] - axis * s.scale - (s.length if k == 2 else 0.0))
+            if axis is None:
+                continue
+            if word == 52:
+                local[k] = axis * s.scale
+            else:
+                s.shift[k] = self._known(k, word) - s.table[k] - axis * s.scale - (s.length if k == 2 else 0.0)
+                s.local[k] = 0.0
         s.kept = list(s.shift)
         self._tell(f"G{word:g}")
         return None
+
+    def _preset(self, axes: Axes) -> None:
+        """G92.1 of Fanuc: the axes named have no shift, neither of G92 nor of G52."""
+        if all(a is None for a in axes) or any(axes):
+            raise BlockError("G92.1 names the axes that it sets back, each with 0", "write G92.1 X0 Y0 Z0")
+        for k, axis in enumerate(axes):
+            if axis is not None:
+                self.s.shift[k] = self.s.local[k] = 0.0
+        self._tell("G92.1")
 
     def _recall(self, word: float) -> None:
         s = self.s
@@ -77,7 +107,7 @@ class Origins(OffsetTables):
         zero = self.zeros.setdefault(own, [math.nan] * 3)
         for k, axis in enumerate(axes):
             if axis is not None:
-                moved = self._known(k, 10) - s.shift[k] - axis * s.scale - (s.length if k == 2 else 0.0)
+                moved = self._known(k, 10) - s.shift[k] - s.local[k] - axis * s.scale - (s.length if k == 2 else 0.0)
                 if own in self.written:
                     self.written[own][k] += moved - zero[k]
                 zero[k] = moved
@@ -97,7 +127,8 @@ class Origins(OffsetTables):
         return place
 
     def _tell(self, word: str) -> None:
-        shift = " ".join(f"{a}{v:.4f}" for a, v in zip("XYZ", self.s.shift, strict=True) if v)
+        moved = [g92 + g52 for g92, g52 in zip(self.s.shift, self.s.local, strict=True)]
+        shift = " ".join(f"{a}{v:.4f}" for a, v in zip("XYZ", moved, strict=True) if v)
         self.log.note(f"line {self.log.line}: {word} moves program zero to {shift or 'the zero of the setup'} mm")
 
     def _polar_words(self, block: Block) -> None:

@@ -18,6 +18,7 @@ from verify.kernels.sweep import capsule_start, cutter_interval
 from verify.kernels.tables import F64, I32, I64, MoveArrays
 
 TOUCH = 1e-6
+CUT_ONCE = -1e300  # mm, no cut reaches below
 SAME = 1e-8  # mm: a move that takes less than that off a ray has taken nothing, as the way back out of a plunge
 
 
@@ -139,12 +140,13 @@ def new_left(qx, qy, qz, nx, ny, nz, dx, dy, dz, plan2, cutter: CutterSizes, lef
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def cut_tile(tile, cells: CellArrays, samples: SampleArrays, left, moves: MoveArrays, cutters):
+def cut_tile(tile, cells: CellArrays, samples: SampleArrays, left, moves: MoveArrays, cutters, once):
     """Work all feed moves through the cell columns x0..x1-1, y0..y1-1 of a tile (x0, x1, y0, y1).
 
     samples : sorted by cell
     left    : (cells,) float64, mm, largest residual of each cell, changed in place
     cutters : (k, 4) float64, mm, rows of ``CutterSizes``
+    once    : whether the first cut of a sample is the last: its residual is then ``CUT_ONCE``
     """
     cx0, cx1, cy0, cy1 = tile
     origin, size, shape, first = cells
@@ -202,6 +204,6 @@ def cut_tile(tile, cells: CellArrays, samples: SampleArrays, left, moves: MoveAr
                         t = new_left(points[i, 0] - ax, points[i, 1] - ay, points[i, 2] - az, normals[i, 0],
                                      normals[i, 1], normals[i, 2], dx, dy, dz, plan2, cutter, residual[i])
                         if t < residual[i] - SAME:
-                            residual[i], mover[i] = t, m
+                            residual[i], mover[i] = CUT_ONCE if once else t, m
                         most = max(most, residual[i])
                     left[c] = most

@@ -13,16 +13,18 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from geometry.kernels.cutter_sizes import CutterSizes
 from verify.kernels.engaged import LEAST_DEPTH, WINDOW, EngagedArrays, sector_bits
 from verify.kernels.frustum import Frustum, contact
-from verify.kernels.heights import INF, _cells, entered, lowest, lowest_within
-from verify.kernels.tables import F64, Bool, ContactLimits, MoveArrays, ToolArrays
+from verify.kernels.heights import INF, _cells, bottom, entered, lowest, lowest_within
+from verify.kernels.tables import F64, I64, Bool, ContactLimits, MoveArrays, ToolArrays
 
 CUTTER, NECK, SHANK, HOLDER, PLUNGE, FIXTURE = 0, 1, 2, 3, 4, 8
 REFRESH = 64
 ARM = 0.05  # mm by which a line that stands over the flutes must reach into them
+UNITS = 1e9  # whole numbers of 1e-9 mm³ and 1e-9 mm: sums do not depend on the order of the blocks
 
 
 class LineArrays(NamedTuple):
@@ -47,12 +49,16 @@ class DescentArrays(NamedTuple):
     earned : (m,) float64, mm, depth that ramps could have taken before
     way    : (m,) float64, mm, sideways way of feed moves before; far off after a rapid or another tool
     skin   : (k,) float64, mm, depth that the end of each tool may dig
+    core   : (k,) float64, mm, radius at the end of each tool within which it does not cut; 0: it cuts to its centre
+    left   : (k,) float64, mm, height of the stock that such a core may stand over
     """
 
     steep: Bool
     earned: F64
     way: F64
     skin: F64
+    core: F64
+    left: F64
 
 
 class LineHistory(NamedTuple):
@@ -62,12 +68,28 @@ class LineHistory(NamedTuple):
     dug   : (nx, ny) float64, mm, depth that ends of tools have dug and no ramp has paid for
     come  : (nx, ny) float64, mm, height of the line before the cutter began to lower it
     begun : (nx, ny) float64, mm, sideways way of the feed moves then
+    whole : (nx, ny) float64, mm, depth that ends of tools have dug, whatever ramps could have paid for
+    stub  : (nx, ny) float64, mm, height of the line where ends without a cutting centre leave a stub; no size where
+            all tools cut to their centre
     """
 
     since: F64
     dug: F64
     come: F64
     begun: F64
+    whole: F64
+    stub: F64
+
+
+class CutTotals(NamedTuple):
+    """What a pass adds up, changed in place.
+
+    taken : (m, 2) int64, 1e-9 mm³ that each move takes, and 1e-9 mm: its deepest cut along the tool axis
+    open  : (1,) uint8, set where some line would be dug deeper than the skin if nothing paid for it
+    """
+
+    taken: I64
+    open: NDArray[np.uint8]
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
@@ -129,17 +151,19 @@ def _worse(best, code, depth, clearance, x, y, z):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _lower(lines, box, a, d, cutter, end_radius, skin, descents, m, history, engaged, best):
+def _lower(lines, box, a, d, cutter, end_radius, skin, descents, m, history, engaged, totals, best):
     """Lower the lines under feed move m.
 
     end_radius : mm, of the end of the tool that cuts straight down; skin : mm that it may dig
+    totals     : CutTotals
     engaged    : (parts,) int64, sectors of the cutter that met stock, added to, by even parts of the move
 
     Returns whether any stock went, and whether the flutes were under stock.
     """
     height, origin, step, bottom = lines
     steep, earned, gone_on = descents.steep[m], descents.earned[m], descents.way[m]
-    since, dug, come, begun = history
+    since, dug, come, begun, whole, _stub = history
+    volume, deepest = 0.0, 0.0
     i0, i1, j0, j1 = box
     radius, corner, length, cone = cutter
     cut, under = False, False
@@ -175,7 +199,10 @@ def _lower(lines, box, a, d, cutter, end_radius, skin, descents, m, history, eng
                 under = under or wx * wx + wy * wy < (radius - ARM) * abs(radius - ARM)
                 continue
             height[i, j] = low
-            cut = cut or gone > 1e-6
+            if gone > 1e-6:
+                cut = True
+                volume += max(low + gone - max(low, bottom), 0.0)
+                deepest = max(deepest, low + gone - max(a[2] + s * d[2], bottom))
             if plan > 0.0:
                 # a round end lowers a line bit by bit: what counts is all it takes off the line on its way over it
                 way = gone_on + s * plan
@@ -198,7 +225,82 @@ def _lower(lines, box, a, d, cutter, end_radius, skin, descents, m, history, eng
                 dug[i - i0, j - j0] = max(dug[i - i0, j - j0] - paid, 0.0) + gone
                 if dug[i - i0, j - j0] > skin:
                     _worse(best, PLUNGE, dug[i - i0, j - j0], 0.0, x, y, low)
+                whole[i - i0, j - j0] += gone
+                if whole[i - i0, j - j0] > skin:
+                    totals.open[0] = 1
+    if cut:
+        totals.taken[m, 0] += max(round(volume * step * step * UNITS), 1)
+        totals.taken[m, 1] = max(totals.taken[m, 1], round(deepest * UNITS))
     return cut, under
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _over_stub(x, y, top, floor, a, d, cutter, core, stock_bottom):
+    """What an end without a cutting centre does to a line on a move: (new height, height of the stub under the core).
+
+    top : mm, of the line before; floor : mm, lowest tip of the move
+
+    The ring round the core lowers the line in front of the core and behind it. What stands under the core is pressed.
+    """
+    radius, corner, _length, cone = cutter
+    flat = radius - corner
+    wx, wy = x - a[0], y - a[1]
+    plan2 = d[0] * d[0] + d[1] * d[1]
+    if plan2 < 1e-18:
+        rho = math.sqrt(wx * wx + wy * wy)
+        if rho < core:
+            return top, top - max(floor, stock_bottom)
+        return (min(top, floor + bottom(rho, flat, corner, cone)) if rho <= radius else top), 0.0
+    s0 = (wx * d[0] + wy * d[1]) / plan2
+    miss2 = max(wx * wx + wy * wy - s0 * s0 * plan2, 0.0)
+    if miss2 >= core * core:
+        return min(top, lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, 0.0, cone)[0]), 0.0
+    plan = math.sqrt(plan2)
+    wide, narrow = math.sqrt(radius * radius - miss2) / plan, math.sqrt(core * core - miss2) / plan
+    s1, s2, s3, s4 = max(s0 - wide, 0.0), s0 - narrow, s0 + narrow, min(s0 + wide, 1.0)
+    if s1 > 1.0 or s4 < 0.0:
+        return top, 0.0
+    rim = bottom(core, flat, corner, cone)
+    pressed = 0.0
+    if s2 > s1:
+        far = math.sqrt(miss2 + (s1 - s0) * (s1 - s0) * plan2)
+        near = min(s2, 1.0)
+        there = rim if s2 <= 1.0 else bottom(math.sqrt(miss2 + (1.0 - s0) * (1.0 - s0) * plan2), flat, corner, cone)
+        top = min(top, a[2] + s1 * d[2] + bottom(far, flat, corner, cone), a[2] + near * d[2] + there)
+    if s2 < 1.0 and s3 > 0.0:
+        low = a[2] + min(max(s2, 0.0) * d[2], min(s3, 1.0) * d[2])
+        pressed = top - max(low, stock_bottom)
+    if s3 < s4:
+        far = math.sqrt(miss2 + (s4 - s0) * (s4 - s0) * plan2)
+        near = max(s3, 0.0)
+        there = rim if s3 >= 0.0 else bottom(math.sqrt(miss2 + s0 * s0 * plan2), flat, corner, cone)
+        top = min(top, a[2] + s4 * d[2] + bottom(far, flat, corner, cone), a[2] + near * d[2] + there)
+    return top, pressed
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _leave_stubs(lines, box, a, d, cutter, core, left, stub, best):
+    """Lower the stubs under a feed move, and find those higher than ``left`` under the core of its tool.
+
+    stub : (nx, ny) float64, mm, of the lines of the box, changed in place
+    """
+    _height, origin, step, stock_bottom = lines
+    i0, i1, j0, j1 = box
+    radius = cutter.radius
+    a0, a1 = _cells(min(a[0], a[0] + d[0]) - radius, max(a[0], a[0] + d[0]) + radius, origin[0], step, i0, i1)
+    b0, b1 = _cells(min(a[1], a[1] + d[1]) - radius, max(a[1], a[1] + d[1]) + radius, origin[1], step, j0, j1)
+    floor = min(a[2], a[2] + d[2])
+    over_flutes = max(a[2], a[2] + d[2]) + cutter.length + 1e-9
+    for i in range(a0, a1 + 1):
+        x = origin[0] + (i + 0.5) * step
+        for j in range(b0, b1 + 1):
+            top = stub[i - i0, j - j0]
+            if top <= floor or top > over_flutes:
+                continue
+            y = origin[1] + (j + 0.5) * step
+            stub[i - i0, j - j0], pressed = _over_stub(x, y, top, floor, a, d, cutter, core, stock_bottom)
+            if pressed > left:
+                _worse(best, PLUNGE, pressed, 0.0, x, y, floor)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
@@ -265,7 +367,7 @@ def _rapid_cutter(lines, box, a, d, cutter, grow, best):
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def stock_tile(box, lines: LineArrays, moves: MoveArrays, free, descents: DescentArrays, tools: ToolArrays,
-               limits: ContactLimits, cut, under, engaged: EngagedArrays, events):
+               limits: ContactLimits, cut, under, engaged: EngagedArrays, totals: CutTotals, events):
     """Work all moves through the lines i0..i1-1, j0..j1-1 of a box (i0, i1, j0, j1), in place.
 
     free  : (m,) bool, rapids that need no clearance
@@ -280,10 +382,13 @@ def stock_tile(box, lines: LineArrays, moves: MoveArrays, free, descents: Descen
     cutters, ends_radius, _reach, bodies, body_first = tools
     rapid_grow, slack = limits
     skins, parts, sectors = descents.skin, engaged.first, engaged.sectors
+    stub = np.zeros((0, 0))
+    if descents.core.max() > 0.0:
+        stub = height[i0:i1, j0:j1].copy()
     history = LineHistory(np.zeros((i1 - i0, j1 - j0)), np.zeros((i1 - i0, j1 - j0)), np.zeros((i1 - i0, j1 - j0)),
-                          np.full((i1 - i0, j1 - j0), -INF))
+                          np.full((i1 - i0, j1 - j0), -INF), np.zeros((i1 - i0, j1 - j0)), stub)
     best = np.zeros((16, 5))
-    top = _top(height, i0, i1, j0, j1)
+    top, stubs = _top(height, i0, i1, j0, j1), len(stub) > 0
     x0, x1 = origin[0] + i0 * step, origin[0] + i1 * step
     y0, y1 = origin[1] + j0 * step, origin[1] + j1 * step
     count, lowered = 0, 0
@@ -304,13 +409,15 @@ def stock_tile(box, lines: LineArrays, moves: MoveArrays, free, descents: Descen
         cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3])
         if feeds[m]:
             went, below = _lower(lines, box, a, d, cutter, ends_radius[k], skins[k], descents, m, history,
-                                 sectors[parts[m]:parts[m + 1]], best)
+                                 sectors[parts[m]:parts[m + 1]], totals, best)
+            if stubs:
+                _leave_stubs(lines, box, a, d, cutter, descents.core[k], descents.left[k], history.stub, best)
             if below:
                 under[m] = 1
             if went:
                 cut[m] = 1
                 lowered += 1
-                if lowered % REFRESH == 0:
+                if lowered % REFRESH == 0 and not stubs:
                     top = _top(height, i0, i1, j0, j1)
         else:
             if _rapid_cutter(lines, box, a, d, cutter, grow, best):

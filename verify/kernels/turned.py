@@ -16,7 +16,7 @@ from numba import njit
 from geometry.kernels.cutter_sizes import CutterSizes
 from geometry.kernels.options import KERNEL
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, turned, view
-from verify.kernels.rays import SAME, TOUCH, SampleArrays, gap, new_left
+from verify.kernels.rays import CUT_ONCE, SAME, TOUCH, SampleArrays, gap, new_left
 from verify.kernels.tables import AxisArrays, MoveArrays
 
 AGAIN = 6
@@ -53,7 +53,7 @@ def _cut_ray(p, x, y, z, nx, ny, nz, cutter, left):
 
 
 @njit(**KERNEL)
-def _leaves(p, chunk, n1, balls, left0, samples, m, margin, cutter):
+def _leaves(p, chunk, n1, balls, left0, samples, m, margin, cutter, once):
     """Cut the samples of the 8 leaves of ball n1 of a chunk; returns the most that is left on them, mm."""
     points, normals, residual, mover = samples
     most1 = 0.0
@@ -65,7 +65,7 @@ def _leaves(p, chunk, n1, balls, left0, samples, m, margin, cutter):
                 t = _cut_ray(p, points[i, 0], points[i, 1], points[i, 2], normals[i, 0], normals[i, 1], normals[i, 2],
                              cutter, residual[i])
                 if t < residual[i] - SAME:
-                    residual[i], mover[i] = t, m
+                    residual[i], mover[i] = CUT_ONCE if once else t, m
                 most = max(most, residual[i])
             left0[n0] = most
         most1 = max(most1, left0[n0])
@@ -73,13 +73,14 @@ def _leaves(p, chunk, n1, balls, left0, samples, m, margin, cutter):
 
 
 @njit(**KERNEL)
-def cut_chunk(chunk, balls, samples: SampleArrays, moves: MoveArrays, axes: AxisArrays, cutters, reach):
+def cut_chunk(chunk, balls, samples: SampleArrays, moves: MoveArrays, axes: AxisArrays, cutters, reach, once):
     """Work all feed moves through the samples of one chunk.
 
     balls   : four (k, 4) float64, mm, balls of 8, 64, 512, 4096 samples
     samples : in the order of the tree
     cutters : (k, 4) float64, mm, rows of ``CutterSizes``
     reach   : (k,) float64, mm, how far the cutting part reaches from the tip
+    once    : as in ``rays.cut_tile``
     """
     b0, b1, b2, b3 = balls
     points, residual = samples.points, samples.residual
@@ -115,7 +116,8 @@ def cut_chunk(chunk, balls, samples: SampleArrays, moves: MoveArrays, axes: Axis
                     most2 = 0.0
                     for n1 in range(n2 * 8, n2 * 8 + 8):
                         if _near(piece, b1, chunk * 64 + n1, left1[n1], margin, cutter):
-                            left1[n1] = _leaves(piece, chunk, n1, b0, left0, samples, m, margin, cutter)
+                            left1[n1] = _leaves(piece, chunk, n1, b0, left0, samples, m, margin, cutter,
+                                                                once)
                         most2 = max(most2, left1[n1])
                     left2[n2] = most2
                 left3 = max(left3, left2[n2])

@@ -20,7 +20,7 @@ from verify.material.collision import fixture_points, run_clashes
 from verify.material.dogleg_rapids import spread
 from verify.material.stock_field import DistanceField, run_field, stock_field
 from verify.material.stock_lines import blank, run_bodies, run_stock
-from verify.material.stock_pass import StockPass, end_radii, free_rapids, parts
+from verify.material.stock_pass import StockPass, Ways, end_radii, free_rapids, parts
 from verify.model import ProofSetup
 from verify.moves import Moves
 from verify.progress import Report, StageProgress
@@ -147,18 +147,18 @@ def _of_origin(events: F64, run: StockPass, lost: int, origin: NDArray[np.int64]
                tools: Sequence[ToolBody]) -> StockPass:
     """The pass in terms of the original moves, where some rapids were spread out."""
     if origin is None:
-        return StockPass(events, run.lost + lost, run.cut, run.engaged, run.taken)
+        return StockPass(events, run.lost + lost, run.cut, run.engaged, run.ways)
     events = events.copy()
     events[:, 0] = origin[events[:, 0].astype(np.int64)]
-    cut, taken = np.zeros(len(given), np.bool_), np.zeros(len(given))
+    cut, volume, depth = np.zeros(len(given), np.bool_), np.zeros(len(given)), np.zeros(len(given))
     cut[origin[run.cut]] = True
     first, there = parts(moves, tools), parts(given, tools)
     engaged, of = np.zeros(there[-1], np.int64), np.repeat(np.arange(len(moves)), np.diff(first))
     part = there[origin[of]] + (np.arange(len(of)) - first[of]) * moves.feed[of]
     np.bitwise_or.at(engaged, part, run.engaged)
-    if run.taken is not None:
-        np.add.at(taken, origin, run.taken)
-    return StockPass(events, run.lost + lost, cut, engaged, None if run.taken is None else taken)
+    np.add.at(volume, origin, run.ways.volume)
+    np.maximum.at(depth, origin, run.ways.depth)
+    return StockPass(events, run.lost + lost, cut, engaged, Ways(volume, depth))
 
 
 def machined(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, step: float, *,

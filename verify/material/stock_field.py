@@ -26,6 +26,7 @@ from verify.kernels.stock import PLUNGE
 from verify.kernels.tables import ContactLimits
 from verify.material.stock_pass import (
     StockPass,
+    Ways,
     descents,
     end_radii,
     event_table,
@@ -186,15 +187,15 @@ def run_field(field: DistanceField, moves: Moves, tools: Sequence[ToolBody], set
     hole.
     """
     cutters, ends = cutter_table(tools), end_radii(tools)
-    bodies = Bodies(np.zeros((0, 6)), np.zeros(len(tools) + 1, np.int64)) if bare else Bodies.of(tools, setup)
+    bodies = Bodies.none(tools) if bare else Bodies.of(tools, setup)
     axes = moves.axes or ToolAxes.upright(len(moves))
-    sizes, (steep, earned) = bodies.arrays(cutters, ends), descents(moves, tools, setup)
+    sizes, (steep, _) = bodies.arrays(cutters, ends), descents(moves, tools, setup)
     stock, limits = field.arrays, ContactLimits(setup.clearance_rapid, setup.gouge_tolerance)
     steps, turns, free = moves.arrays, axes.arrays(bow), free_rapids(moves)
     x, y = sector_frames(moves.axes, len(moves))
     twists = np.arctan2((axes.about * y).sum(axis=1), (axes.about * x).sum(axis=1))
     first = parts(moves, tools)
-    sums, spare = tables_for(threads, (len(moves), 4))
+    sums, spare = tables_for(threads, (len(moves), 5))
     tables, blank_table = tables_for(threads, (int(first[-1]),))
 
     def job(tile: NDArray[np.int64]) -> Callable[[], object]:
@@ -208,7 +209,8 @@ def run_field(field: DistanceField, moves: Moves, tools: Sequence[ToolBody], set
         return work
 
     events, lost = gather(run_tiles([job(t) for t in _tiles(field.values.shape)], threads, progress))
-    taken, engaged = np.sum(sums, axis=0), np.bitwise_or.reduce(tables)
+    taken, engaged = np.sum([t[:, :4] for t in sums], axis=0), np.bitwise_or.reduce(tables)
+    ways = Ways(taken[:, 0] / VOLUME_UNITS, np.max([t[:, 4] for t in sums], axis=0) / VOLUME_UNITS)
     end = ends[moves.tool]
     aside = np.linalg.norm(_across(moves.end - moves.start, axes.middle), axis=1)
     over = (np.pi * end**2 + 2.0 * end * aside)
@@ -216,9 +218,10 @@ def run_field(field: DistanceField, moves: Moves, tools: Sequence[ToolBody], set
     # straight down beside an edge only the area on stock digs; a few nodes do not measure that area
     partly = (aside <= 0.25 * end) & (stands < WHOLE * over) & (stands > MIN_NODES * field.step**2)
     over = np.where(partly, stands, over)[:, None]
-    plunges = _plunges(moves, axes, taken[:, [1, 2]] / VOLUME_UNITS / over, end, earned,
+    plunges = _plunges(moves, axes, taken[:, [1, 2]] / VOLUME_UNITS / over, end,
+                       descents(moves, tools, setup, ways)[1],
                        setup.plunge_skin * 2.0 * cutters[:, 0], round_off(tools))
-    return StockPass(np.concatenate([events, plunges]), lost, taken[:, 0] > 0, engaged, taken[:, 0] / VOLUME_UNITS)
+    return StockPass(np.concatenate([events, plunges]), lost, taken[:, 0] > 0, engaged, ways)
 
 
 def _across(way: F64, axis: F64) -> F64:

@@ -12,8 +12,11 @@ of the part check necks, shanks and holders, so the spacing matters only for sto
 - In a rapid the whole assembly is grown radially by the rapid clearance, not in height. A straight lift needs no
   clearance where it starts.
 - Plunge: feed moves steeper than the ramp angle remove depth from a line with the end-cutting region of the tool. The
-  depths add up; sideways travel reduces them at the slope of the ramp. It is a plunge where more than ``plunge_skin``
-  tool diameters are open, so a descent interrupted by side steps, lifts or pecks is still one descent. The end-cutting
+  depths add up; sideways travel in the cut reduces them at the slope of the ramp. Which travel is in the cut is known
+  after all moves, so blocks in which it may matter are run a second time. It is a plunge where more than
+  ``plunge_skin`` tool diameters are open, so a descent interrupted by side steps, lifts or pecks is still one descent.
+  An end that does not cut to its centre leaves a stub under its core; a stub higher than four ramps over the radius of
+  the core and a hundredth of the diameter is a plunge, and no way pays for it. The end-cutting
   region is the whole end of a flat, the flat and half the corner of a bull nose, and the inner half radius of a ball
   (to 30 degrees of its sphere). A ball that finishes downhill through a thin skin therefore does not plunge. It is the
   flat at the tip of a chamfer mill, and the core of a tap. A drill and a pointed chamfer mill cut straight down.
@@ -23,7 +26,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,10 +36,12 @@ from verify.blank.blank import blank_cylinder, blank_mesh, stock_bounds
 from verify.kernels.bodies import body_tile
 from verify.kernels.engaged import EngagedArrays
 from verify.kernels.heights import raise_offset
-from verify.kernels.stock import DescentArrays, LineArrays, stock_tile
+from verify.kernels.stock import PLUNGE, UNITS, CutTotals, DescentArrays, LineArrays, stock_tile
 from verify.kernels.tables import ContactLimits
 from verify.material.stock_pass import (
     StockPass,
+    Ways,
+    cores,
     descents,
     end_radii,
     event_table,
@@ -125,29 +130,60 @@ def run_stock(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup:
 
     Returns StockPass. Raises VerificationError as ``cutter_table``. Same bytes for any number of threads.
     """
-    cutters, bodies = cutter_table(tools), Bodies.of(tools, setup)
+    start = field.height.copy() if descents(moves, tools, setup)[0].any() else field.height
+    run, again = _run(field, moves, tools, setup, None, None, threads, StageProgress(progress).span(0.0, 0.8))
+    if not again:
+        return run
+    # feed moves up to the last steep one that cut tell all plunges, with what is known now of the ways in the cut
+    last = int(np.flatnonzero(descents(moves, tools, setup)[0] & run.cut)[-1])
+    rows = np.flatnonzero(moves.feed[:last + 1])
+    chosen = np.isin(np.arange(len(moves)), rows)
+    second, _ = _run(StockLines(field.origin, field.step, start, field.bottom), moves.only(chosen), tools, setup,
+                     run.ways.only(chosen), again, threads, StageProgress(progress).span(0.8, 1.0))
+    plunges = second.events[second.events[:, 1] == PLUNGE]
+    plunges[:, 0] = rows[plunges[:, 0].astype(np.int64)]
+    events = np.concatenate([run.events[run.events[:, 1] != PLUNGE], plunges])
+    return replace(run, events=events[np.argsort(events[:, 0], kind="stable")], lost=run.lost + second.lost)
+
+
+def _run(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, ways: Ways | None,
+         chosen: Sequence[tuple[int, int]] | None, threads: int,
+         progress: Progress | None) -> tuple[StockPass, list[tuple[int, int]]]:
+    """One pass over the blocks that begin at ``chosen``; None: over all of them, with necks, shanks and holders.
+
+    ways : what each move takes, as far as it is known
+
+    Returns the pass, and where the blocks begin in which a descent may be a plunge once the ways are known.
+    """
+    cutters = cutter_table(tools)
+    bodies = Bodies.of(tools, setup) if chosen is None else Bodies.none(tools)
     sizes = bodies.arrays(cutters, end_radii(tools))
-    allowed = DescentArrays(*descents(moves, tools, setup), ways_before(moves),
-                            setup.plunge_skin * 2.0 * cutters[:, 0])
+    allowed = DescentArrays(*descents(moves, tools, setup, ways), ways_before(moves),
+                            setup.plunge_skin * 2.0 * cutters[:, 0], *cores(tools, setup))
     cut, under = np.zeros(len(moves), np.uint8), np.zeros(len(moves), np.uint8)
     limits, free = ContactLimits(setup.clearance_rapid, setup.gouge_tolerance), free_rapids(moves)
     lines, steps = LineArrays(field.height, field.origin, field.step, field.bottom), moves.arrays
     nx, ny = field.height.shape
     first = parts(moves, tools)
     tables, spare = tables_for(threads, (int(first[-1]),))
+    sums, free_sums = tables_for(threads, (len(moves), 2))
+    blocks = [(i, j) for i in range(0, nx, BLOCK) for j in range(0, ny, BLOCK)] if chosen is None else list(chosen)
+    undecided = np.zeros(len(blocks), np.uint8)
 
-    def job(i: int, j: int) -> Callable[[], object]:
+    def job(k: int, i: int, j: int) -> Callable[[], object]:
         def work() -> object:
-            events, engaged = event_table(), spare.get()
+            events, engaged, taken = event_table(), spare.get(), free_sums.get()
             n = stock_tile((i, min(i + BLOCK, nx), j, min(j + BLOCK, ny)), lines, steps, free, allowed, sizes, limits,
-                           cut, under, EngagedArrays(first, engaged), events)
+                           cut, under, EngagedArrays(first, engaged), CutTotals(taken, undecided[k:k + 1]), events)
             spare.put(engaged)
+            free_sums.put(taken)
             return noted(events), n
         return work
 
-    blocks = [(i, j) for i in range(0, nx, BLOCK) for j in range(0, ny, BLOCK)]
-    events, lost = gather(run_tiles([job(*b) for b in blocks], threads, progress))
-    return StockPass(events, lost, cut.astype(bool), np.bitwise_or.reduce(tables), under=under.astype(bool))
+    events, lost = gather(run_tiles([job(k, *b) for k, b in enumerate(blocks)], threads, progress))
+    taken = Ways(np.sum([t[:, 0] for t in sums], axis=0) / UNITS, np.max([t[:, 1] for t in sums], axis=0) / UNITS)
+    run = StockPass(events, lost, cut.astype(bool), np.bitwise_or.reduce(tables), taken, under.astype(bool))
+    return run, [b for b, is_open in zip(blocks, undecided.tolist(), strict=True) if is_open]
 
 
 def run_bodies(points: F64, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *, threads: int = 2,

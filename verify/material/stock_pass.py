@@ -22,12 +22,16 @@ from verify.moves import Moves
 EVENTS = 4096
 ANOTHER_TOOL = 1e6  # mm
 TAP_CORE = 0.75  # radii: what is nearer to the axis of a tap, the hole must have taken; less than any ISO 68 core
+PRESSED = 0.01  # diameters: a hollow end takes a stub that high
 SAME = 1e-6  # mm, and rad: closer ends of moves and axes are the same
 Spare = queue.SimpleQueue[NDArray[np.int64]]
 
 
-def descents(moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup) -> tuple[NDArray[np.bool_], F64]:
+def descents(moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
+             ways: Ways | None = None) -> tuple[NDArray[np.bool_], F64]:
     """Feed moves that descend steeper than their tool may, and the depth that ramps could have removed so far.
+
+    ways : what each move takes; None: unknown, and then every way counts as if it were in the cut
 
     Down is along the tool axis, for a turning tool along its axis half way. Moves of tools that cut straight down do
     not count.
@@ -35,8 +39,13 @@ def descents(moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup) -> tupl
     Returns
     -------
     steep  : (m,) bool
-    earned : (m,) float64, mm: sideways travel of all feed moves so far that are not steep, times the tangent of the
-             angle; a tool change adds ``ANOTHER_TOOL``
+    earned : (m,) float64, mm: sideways travel in the cut of all feed moves so far that are not steep, times the
+             tangent of the angle, but of each move no more than its depth of cut; a tool change adds ``ANOTHER_TOOL``
+
+    Notes
+    -----
+    The travel in the cut is V / (a D / 2), at most all of it: V is the volume that the move takes, a its depth of cut,
+    D the diameter. So a cut half as wide as the tool counts in full, and a nick at the end of a way in air by its size.
     """
     if not len(moves):
         return np.zeros(0, np.bool_), np.zeros(0)
@@ -49,9 +58,29 @@ def descents(moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup) -> tupl
         rise = np.einsum("ij,ij->i", d, up)
         aside = np.linalg.norm(d - rise[:, None] * up, axis=1)
     steep = moves.feed & (-rise > aside * slope + 1e-9) & ~np.array([t.cuts_down for t in tools])[moves.tool]
-    earned = np.cumsum(np.where(moves.feed & ~steep, aside * slope, 0.0))
+    pays = aside * slope
+    if ways is not None:
+        half = np.array([t.radius for t in tools])[moves.tool] * ways.depth
+        in_cut = np.divide(ways.volume, half, out=np.zeros(len(moves)), where=half > 0.0)
+        pays = np.minimum(np.minimum(aside, in_cut) * slope, ways.depth)
+    earned = np.cumsum(np.where(moves.feed & ~steep, pays, 0.0))
     changed = np.concatenate([[False], moves.tool[1:] != moves.tool[:-1]])
     return np.asarray(steep), np.asarray(earned + ANOTHER_TOOL * np.cumsum(changed))
+
+
+def cores(tools: Sequence[ToolBody], setup: ProofSetup) -> tuple[F64, F64]:
+    """Radius of the core of each tool that does not cut, and how high a stub may stand under it.
+
+    Returns two (k,) float64, mm; 0 for a tool that cuts to its centre.
+
+    Notes
+    -----
+    A ramp of the angle r that turns round passes 4 c before the ring round a core of radius c has come over each place
+    that the core stood on, so the stub of a sound ramp is at most 4 c tan(r) high.
+    """
+    radius = np.array([0.5 * setup.cores.get(t.number, 0.0) for t in tools] or [0.0])
+    slope = np.tan([setup.ramp_angles.get(t.number, setup.ramp_angle) for t in tools] or [0.0])
+    return radius, np.asarray(4.0 * radius * slope + PRESSED * np.array([t.diameter for t in tools] or [0.0]))
 
 
 def ways_before(moves: Moves) -> F64:
@@ -80,6 +109,22 @@ def parts(moves: Moves, tools: Sequence[ToolBody]) -> NDArray[np.int64]:
 
 
 @dataclass(frozen=True, eq=False)
+class Ways:
+    """What each of m moves takes off the stock.
+
+    volume : (m,) float64, mm³
+    depth  : (m,) float64, mm, deepest cut along the tool axis: the highest stock over the tip where the flutes take it
+    """
+
+    volume: F64
+    depth: F64
+
+    def only(self, chosen: NDArray[np.bool_]) -> Ways:
+        """The moves where ``chosen`` (m,) bool is true."""
+        return Ways(self.volume[chosen], self.depth[chosen])
+
+
+@dataclass(frozen=True, eq=False)
 class StockPass:
     """Result of one pass over the stock.
 
@@ -87,7 +132,7 @@ class StockPass:
     lost   : number of events lost because a table is full
     cut    : (m,) bool, moves that removed stock
     engaged : (p,) int64, bits, sectors of the cutter in stock (``verify.kernels.engaged``), by parts of moves
-    taken  : (m,) float64, mm³ by move, or None where unknown
+    ways   : Ways, what each move takes
     under  : (m,) bool, moves whose flutes were under stock, or None where that makes no difference
     """
 
@@ -95,7 +140,7 @@ class StockPass:
     lost: int
     cut: NDArray[np.bool_]
     engaged: NDArray[np.int64]
-    taken: F64 | None = None
+    ways: Ways
     under: NDArray[np.bool_] | None = None
 
 

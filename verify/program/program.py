@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64, I32
+from verify.assumptions import Assumed
 
 if TYPE_CHECKING:
     from verify.gcode.frames import Frame
@@ -67,6 +68,20 @@ class Pause:
     counted: bool
 
 
+@dataclass(frozen=True)
+class TravelPlane:
+    """A plane of a STEP-NC file to which a control may take the tool in a rapid.
+
+    line  : of the instance that names it; what : 'security plane' or 'retract plane'
+    point : (3,) mm, setup frame; normal : (3,) unit, setup frame
+    """
+
+    line: int
+    what: str
+    point: tuple[float, float, float]
+    normal: tuple[float, float, float]
+
+
 @dataclass(frozen=True, eq=False)
 class Poses:
     """Tool axes and rotary angles of moves.
@@ -101,6 +116,10 @@ class Program:
     assumed : words that the first move needs and the program has not stated before it
     blend   : mm, largest rounding of a corner that G64 P allows
     places  : coordinates of the machine (G53) by line: line, axis 0 to 2, and mm
+    planes  : security planes of a STEP-NC file, and retract planes that lie lower than the path before them ends
+    open    : what it leaves to the control
+    cools   : whether a word says that the coolant is on or off
+    cut_off : line that ends the program although lines of it follow, 0 where none do
     leaves  : mm, largest deviation from the path that G64 allows: ``blend`` and the tolerance Q of dropped points
     lines   : number of lines read
     remarks : words and blocks that should not be run
@@ -140,6 +159,10 @@ class Program:
     pauses: tuple[Pause, ...] = ()
     leaves: float = 0.0
     places: tuple[tuple[int, int, float], ...] = ()
+    cut_off: int = 0
+    planes: tuple[TravelPlane, ...] = ()
+    open: tuple[Assumed, ...] = ()
+    cools: bool = True
 
     def __len__(self) -> int:
         return len(self.start)
@@ -158,7 +181,8 @@ class State:
     parked    : whether X or Y stand at a fixed place of the machine (G53, G28, G30)
     cycle     : words of the drilling cycle in force, and the height where its series began
     table     : mm, shift of the work offset by G10
-    shift     : mm, shift of program zero by G92 or G52
+    shift     : mm, shift of program zero by G92, and by G52 where both share one register
+    local     : mm, shift by G52 on a control with a register of its own for it
     kept      : mm, the shift that G92.3 restores
     length    : mm, by which the length offset in force differs from the length of the tool
     side      : of the cutter radius compensation in force, 1 left, -1 right, 0 off; d : its register
@@ -190,6 +214,7 @@ class State:
     ended: bool = False
     table: list[float] = field(default_factory=lambda: [0.0] * 3)
     shift: list[float] = field(default_factory=lambda: [0.0] * 3)
+    local: list[float] = field(default_factory=lambda: [0.0] * 3)
     kept: list[float] = field(default_factory=lambda: [0.0] * 3)
     length: float = 0.0
     side: int = 0
@@ -199,8 +224,9 @@ class State:
     @property
     def origin(self) -> list[float]:
         """mm, where program zero lies in the setup frame."""
-        table, shift = self.table, self.shift
-        return [table[0] + shift[0], table[1] + shift[1], table[2] + shift[2] + self.length]
+        table, shift, local = self.table, self.shift, self.local
+        return [table[0] + shift[0] + local[0], table[1] + shift[1] + local[1],
+                table[2] + shift[2] + local[2] + self.length]
 
     @property
     def length_off(self) -> bool:

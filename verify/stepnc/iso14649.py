@@ -233,6 +233,7 @@ class Iso14649Reader:
             self._rapid(place, number, line)
         elif entity == "MACHINING_WORKINGSTEP":
             feature, operation = (self.data.ref(number, entity, a) for a in ("its_feature", "its_operation"))
+            self.recorder.plane("security plane", *self._plane(self.data.ref(number, entity, "its_secplane")), line)
             self._operation(operation, self._feature(feature, operation))
 
     def _rapid(self, place: int, number: int, line: int) -> None:
@@ -280,6 +281,10 @@ class Iso14649Reader:
         self.recorder.coolant = self.data.one(functions, "MILLING_MACHINE_FUNCTIONS", "coolant") == "T"
         self._paths(paths, place, self._direction(number, entity), number, technology,
                     rapid=False)
+        height = self.data.real(number, entity, "retract_plane")
+        if height is not None:
+            turn = self.place @ place
+            self.recorder.retract_to(turn[:3, 3] + height * turn[:3, 2], turn[:3, 2], self.file.line(number))
 
     def _direction(self, number: int, entity: str) -> F64 | None:
         """(3,): the tool axis of paths without axes; None where paths must have axes."""

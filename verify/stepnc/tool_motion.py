@@ -19,7 +19,7 @@ from geometry.mesh import F64, I32
 from verify.kinematics import Kinematics
 from verify.program.move_kinds import FEED, RAPID
 from verify.program.move_log import MAX_MOVES
-from verify.program.program import Poses, Program, Remark, StopPoint
+from verify.program.program import Poses, Program, Remark, StopPoint, TravelPlane
 from verify.program.turn_subdivision import MAX_TURN
 
 SAME_PLACE, SAME_AXIS = 2e-4, 2e-6  # mm and of unit vectors, between the start of a path and the end of the last one
@@ -111,6 +111,7 @@ class MotionRecorder:
         self._line = 1
         self._stops: list[tuple[int, str, int, F64]] = []
         self._over: tuple[F64, F64, int] | None = None
+        self._planes: dict[tuple[object, ...], TravelPlane] = {}
         self.dwell = 0.0
         self.coolant = False
         self.notes: list[str] = []
@@ -144,6 +145,26 @@ class MotionRecorder:
         normal : (3,) float64, unit, setup frame
         """
         self._over = point, normal, line
+        self.plane("security plane", point, normal, line)
+
+    def plane(self, what: str, point: F64, normal: F64, line: int) -> None:
+        """Record a plane to which the control may take the tool.
+
+        what   : as ``TravelPlane`` has it
+        point  : (3,) float64, mm, setup frame
+        normal : (3,) float64, unit, setup frame
+        """
+        key = (what, *np.round(normal, 6).tolist(), round(float(point @ normal), 4))
+        self._planes.setdefault(key, TravelPlane(line, what, _three(point), _three(normal)))
+
+    def retract_to(self, point: F64, normal: F64, line: int) -> None:
+        """Record the retract plane behind a path. One above the place of the tool is no way down.
+
+        point  : (3,) float64, mm, setup frame
+        normal : (3,) float64, unit, setup frame
+        """
+        if self._here is not None and float((point - self._here[:3]) @ normal) < -SAME_PLACE:
+            self.plane("retract plane", point, normal, line)
 
     def follow(self, tips: F64, axes: F64 | None, *, rapid: bool, feed: float, speed: float, lines: F64) -> None:
         """Follow a path with the tool in the spindle.
@@ -220,7 +241,7 @@ class MotionRecorder:
             tool=tool, line=m.line, dwell=self.dwell, speeds=speeds, lines=self._lines, remarks=tuple(remarks),
             unknown=np.array(unknown, np.int64).reshape(-1, 2), stops=stops, assumed=(), blend=0.0, minutes=minutes,
             poses=poses, notes=tuple(notes), speed=np.maximum(m.speed, 0.0), coolant=m.coolant,
-            changes=sum(event == "tool change" for _, event, _, _ in self._stops))
+            changes=sum(event == "tool change" for _, event, _, _ in self._stops), planes=tuple(self._planes.values()))
 
     def _last(self) -> list[tuple[int, str, int, F64]]:
         if self._here is None or self._tool is None:

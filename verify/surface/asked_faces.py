@@ -78,6 +78,24 @@ class Cutting:
 
 
 @dataclass(frozen=True, eq=False)
+class Measured:
+    """Samples as a proof has measured them.
+
+    samples  : SurfaceSamples, n of them
+    residual : (n,) float64, mm of stock on their normals after all moves, not above ``reach``
+    mover    : (n,) int32, index, the move that left it, -1 where none did
+    reach    : mm
+    error    : mm, largest error of a residual against the mesh
+    """
+
+    samples: SurfaceSamples
+    residual: F64
+    mover: I32
+    reach: float
+    error: float
+
+
+@dataclass(frozen=True, eq=False)
 class FinishedPlanes:
     """Planes of the part that a run of feed moves finishes.
 

@@ -49,15 +49,37 @@ def residual_on_normals(points: F64, normals: F64, initial: F64, moves: Moves, t
     Error below 1e-8 mm for coordinates under 1 m: roots of quadratics, and Newton stopped at 1e-9 mm. Where the tool
     turns, the surface it sweeps is off by ``bow`` at most.
     """
-    n = len(points)
-    residual, mover = np.array(initial, dtype=np.float64), np.full(n, -1, np.int32)
-    if n == 0 or len(moves) == 0:
-        return residual, mover
+    residual, mover = np.array(initial, dtype=np.float64), np.full(len(points), -1, np.int32)
+    _cut(points, normals, residual, mover, moves, tools, threads, progress, bow, once=False)
+    return residual, mover
+
+
+def first_below(points: F64, normals: F64, level: F64, moves: Moves, tools: Sequence[ToolBody], *, threads: int = 2,
+                progress: Progress | None = None) -> I32:
+    """The first feed move that leaves less than ``level`` on each normal.
+
+    points, normals : (n, 3) float64, mm and unit, setup frame, normals out of the material
+    level           : (n,) float64, mm
+    moves, tools, threads, progress : as in ``residual_on_normals``
+
+    Returns (n,) int32, index, -1 where no move does.
+    """
+    residual, mover = np.array(level, dtype=np.float64), np.full(len(points), -1, np.int32)
+    _cut(points, normals, residual, mover, moves, tools, threads, progress, BOW, once=True)
+    return mover
+
+
+def _cut(points: F64, normals: F64, residual: F64, mover: I32, moves: Moves, tools: Sequence[ToolBody], threads: int,
+         progress: Progress | None, bow: float, *, once: bool) -> None:
+    """Change ``residual`` and ``mover`` (n,) by all feed moves, or by the first that cuts each ray (``once``)."""
+    if len(points) == 0 or len(moves) == 0:
+        return
     if moves.axes is not None:
-        return _turned(points, normals, residual, moves, moves.axes, tools, threads, progress, bow)
+        _turned(points, normals, residual, mover, moves, moves.axes, tools, threads, progress, bow, once=once)
+        return
     grid = CellGrid.build(points)
     pts, nrm = np.ascontiguousarray(points[grid.order]), np.ascontiguousarray(normals[grid.order])
-    work, mover_of = residual[grid.order], np.full(n, -1, np.int32)
+    work, mover_of = residual[grid.order], np.full(len(points), -1, np.int32)
     counts = np.diff(grid.first)
     left = np.zeros(len(counts))
     full = np.flatnonzero(counts)
@@ -66,16 +88,15 @@ def residual_on_normals(points: F64, normals: F64, initial: F64, moves: Moves, t
     cells, steps = grid.arrays, moves.arrays
 
     def job(tile: tuple[int, int, int, int]) -> Callable[[], object]:
-        return lambda: cut_tile(tile, cells, samples, left, steps, cutters)
+        return lambda: cut_tile(tile, cells, samples, left, steps, cutters, once)
 
     run_tiles([job(t) for t in grid.tiles()], threads, progress)
     residual[grid.order], mover[grid.order] = work, mover_of
-    return residual, mover
 
 
-def _turned(points: F64, normals: F64, residual: F64, moves: Moves, axes: ToolAxes, tools: Sequence[ToolBody],
-            threads: int, progress: Progress | None, bow: float) -> tuple[F64, I32]:
-    """``residual_on_normals`` for tools that tilt or turn."""
+def _turned(points: F64, normals: F64, residual: F64, mover: I32, moves: Moves, axes: ToolAxes,
+            tools: Sequence[ToolBody], threads: int, progress: Progress | None, bow: float, *, once: bool) -> None:
+    """``_cut`` for tools that tilt or turn."""
     tree = PointTree.build(points)
     pts, nrm = np.ascontiguousarray(points[tree.order]), np.ascontiguousarray(normals[tree.order])
     work, mover_of = residual[tree.order], np.full(len(points), -1, np.int32)
@@ -84,9 +105,7 @@ def _turned(points: F64, normals: F64, residual: F64, moves: Moves, axes: ToolAx
     samples, steps, turns = SampleArrays(pts, nrm, work, mover_of), moves.arrays, axes.arrays(bow)
 
     def job(chunk: int) -> Callable[[], object]:
-        return lambda: cut_chunk(chunk, tree.balls, samples, steps, turns, cutters, reach)
+        return lambda: cut_chunk(chunk, tree.balls, samples, steps, turns, cutters, reach, once)
 
     run_tiles([job(c) for c in range(tree.chunks)], threads, progress)
-    mover = np.empty(len(points), np.int32)
     residual[tree.order], mover[tree.order] = work, mover_of
-    return residual, mover

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.mesh import F64, I32
+from geometry.mesh import F64, I32, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.tool_body import ToolBody
@@ -23,6 +23,7 @@ from verify.model import Finding, ProofSetup, ScoredSamples
 from verify.moves import Moves
 from verify.progress import Report
 from verify.surface.between_samples import ClosePoints, close_points, judged_places
+from verify.surface.excluded_faces import CutPlaces, excluded_cuts
 from verify.surface.guard_points import (
     CLOSER_SHARE,
     SURE,
@@ -31,6 +32,7 @@ from verify.surface.guard_points import (
     convex_edges,
     guard_notes,
     guard_samples,
+    guard_spacing,
 )
 from verify.surface.remains import Rays, Remains, depths_both_ways
 from verify.surface.removal import residual_on_normals
@@ -47,7 +49,7 @@ class SurfaceCuts:
 
     residual  : (n,) float64, mm of stock on each normal, negative where the part is cut
     mover     : (n,) int32, index, the move that left it, -1 where none did
-    gouges, allowance : findings
+    gouges, allowance, excluded : findings
     gouge_max : mm, depth of the deepest gouge
     guard, edge : (g, 3) and (e, 3) float64, mm, points that watch for gouges on faces and along edges, setup frame
     close     : ClosePoints, c of them; close_residual : (c,) float64, mm of stock on their normals
@@ -59,6 +61,7 @@ class SurfaceCuts:
     mover: I32
     gouges: list[Finding]
     allowance: list[Finding]
+    excluded: list[Finding]
     gouge_max: float
     guard: F64
     edge: F64
@@ -152,6 +155,7 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
         [*gouge_findings(table.points[gouged], table.face[gouged], -table.residual[gouged], table.area[gouged],
                          table.mover[gouged], source, setup.gouge_tolerance), *tips],
         _in_allowance(table, (row < on_edge) | ((row >= first) & (row < even)), setup, source),
+        _excluded(table, slice(len(s), on_edge), part.mesh, shot, source),
         max([float(-table.residual.min(initial=0.0)), 0.0, *(f.depth for f in tips)]), guard.points, edge, close,
         table.residual[first:even], shot.reach, guard_notes(part.mesh, left_out))
 
@@ -170,6 +174,14 @@ def _deepened(table: _Table, part: Part, tree: TriangleTree, even: int, shot: _S
     rays, left = Rays(table.points, table.normals, table.residual), Remains(tree, shot.moves, shot.tools, shot.threads)
     table.residual[deep] = -depths_both_ways(left, rays, deep, even, tolerance, lambda f: tell(0.5 + 0.5 * f))
     return table, left_out
+
+
+def _excluded(table: _Table, guard: slice, mesh: TriangleMesh, shot: _Shooting, source: Source) -> list[Finding]:
+    """Findings of faces that are left alone and brought to size, on the even points of the whole part."""
+    if not shot.setup.left_alone:
+        return []
+    places = CutPlaces(*(getattr(table, f)[guard] for f in ("points", "normals", "face", "area", "residual", "mover")))
+    return excluded_cuts(places, mesh, shot.moves, shot.tools, shot.setup, source, guard_spacing(mesh))
 
 
 def _in_allowance(table: _Table, counts: NDArray[np.bool_], setup: ProofSetup, source: Source) -> list[Finding]:

@@ -4,7 +4,8 @@ Notation: p and q are opposite places of a thin wall (``verify.surface.slender_w
 height to thickness. ``done(p)`` is the time at which at most twice the scallop is left at p over the allowance.
 ``gone(p)`` is the time at which the stock in front of p stops supporting the wall. **The rule**: when both p and q are
 done, stock still stands on both sides at a place of the same wall within the limit of p, K times the mean thickness
-below p; or the finished part supports the wall within that limit.
+below p; or the finished part supports the wall within that limit. Times count along the path of the tool, so they do
+not depend on how a program divides its path into blocks.
 """
 
 from __future__ import annotations
@@ -24,12 +25,11 @@ from verify.findings import Source
 from verify.model import Finding, FindingKind, ProofSetup, ScoredSamples, Support
 from verify.moves import Moves
 from verify.progress import Report, silent
-from verify.surface.removal import residual_on_normals
+from verify.surface.removal import first_below, residual_on_normals
 from verify.surface.sample_scores import RAY_ERROR
 from verify.surface.slender_walls import ThinWalls, thin_walls
 
-PARTS = 256
-"""Resolution of times: all events in one of these parts of the program count as simultaneous and allowed."""
+PIECES = 200_000  # of the path that are worked at a time
 REST = 2.0  # scallops that may be left at a place that is done: later cuts of so little do not bend a wall
 HOLDS = 0.5  # share of the stock of the blank in front of a place that must stand to support the wall
 ROOM = 2.0  # of the distance of places: the highest supported place may lie this much below the top of the stock
@@ -42,8 +42,8 @@ NEVER = np.iinfo(np.int64).max
 class CutTimes:
     """Times of n places: when each is done, and when its stock is gone.
 
-    gone  : (n,) int64, index, part of the program in which the stock stops supporting the wall, -1 before the first cut
-    done  : (n,) int64, index, part in which the cut ends, NEVER where no move cuts it
+    gone  : (n,) int64, index, piece of the path on which the stock stops supporting the wall, -1 before the first cut
+    done  : (n,) int64, index, piece on which the cut ends, NEVER where no move cuts it
     mover : (n,) int64, index, the move after which it is done, -1 where none
     """
 
@@ -69,14 +69,14 @@ def supported(tree: TriangleTree, scored: ScoredSamples, setup: ProofSetup, move
 
     Notes
     -----
-    A violation within one of ``PARTS`` parts of the moves beside thin walls is not seen, and one of less than twice
-    ``ThinWalls.spacing`` does not count: an order that keeps the rule never gets a finding.
+    A violation within ``ThinWalls.spacing`` of path is not seen, and one of less than twice that spacing does not
+    count: an order that keeps the rule never gets a finding.
     """
     walls = thin_walls(tree, scored.samples, setup.free_ratio)
     if not len(walls) or not moves.feed.any():
         return Support(0, 0, 0.0, setup.free_ratio, 0), []
     both = _times(np.concatenate([walls.points, walls.across]), np.concatenate([walls.normals, walls.beyond]),
-                  np.tile(walls.thickness, 2), tree.mesh.bounds, setup, moves, tools, threads, report)
+                  np.tile(walls.thickness, 2), walls.spacing, tree.mesh.bounds, setup, moves, tools, threads, report)
     times = [both.part(slice(0, len(walls))), both.part(slice(len(walls), None))]
     free, judged = _free_ways(walls, *times)
     over = np.flatnonzero(judged & (free > walls.limit + ROOM * walls.spacing))
@@ -89,34 +89,56 @@ def supported(tree: TriangleTree, scored: ScoredSamples, setup: ProofSetup, move
     return figures, _findings(walls, free, over, times, setup, scored, source, zone_ids)
 
 
-def _times(points: F64, normals: F64, thickness: F64, bounds: F64, setup: ProofSetup, moves: Moves,
+def _times(points: F64, normals: F64, thickness: F64, spacing: float, bounds: F64, setup: ProofSetup, moves: Moves,
            tools: Sequence[ToolBody], threads: int, report: Report) -> CutTimes:
-    """Times of places (n, 3), mm, of walls ``thickness`` (n,) mm thick."""
+    """Times of places (n, 3), mm, of walls ``thickness`` (n,) mm thick, along a path in pieces of ``spacing`` mm.
+
+    A place is done when no more is left on it than the rest allowed. Where more stays, it is done when no more than the
+    rest stands over what stays.
+    """
     left = np.minimum(stock_on_normals(points, normals, bounds, setup, float(thickness.max())), thickness)
     rest = REST * setup.scallop_height + RAY_ERROR
-    enough, reported = setup.stock_allowance + rest, left.copy()
+    enough = setup.stock_allowance + rest
     holds = np.minimum(thickness, HOLDS * stock_on_normals(points, normals, bounds, setup, np.inf))
-    gone = np.where((left >= holds) & (holds > enough), NEVER, -1)
+    near = moves.only(beside := moves.feed & _beside(moves, tools, points, thickness))
+    final, by = residual_on_normals(points, normals, left, near, tools, threads=threads,
+                                    progress=lambda f: report(0.3 * f))
+    stands = (left >= holds) & (holds > enough)
+    target = np.where(final <= enough, enough, final + rest)
+    open_ = (by >= 0) & (left > enough) & (target < left)
+    rows = np.concatenate([np.flatnonzero(stands), np.flatnonzero(open_)])
+    level = np.concatenate([holds[stands] - RAY_ERROR, target[open_]])
+    piece, of = _first_pieces(points[rows], normals[rows], level, spacing, near, tools, threads,
+                              lambda f: report(0.3 + 0.7 * f))
+    gone = np.where(stands, NEVER, -1)
     done, mover = np.where(left <= enough, -1, NEVER), np.full(len(points), -1, np.int64)
-    near = np.flatnonzero(moves.feed & _beside(moves, tools, points, thickness))
-    parts = min(PARTS, max(1, len(near)))
-    for k, rows in enumerate(np.array_split(near, parts)):
-        chosen = np.zeros(len(moves), np.bool_)
-        chosen[rows] = True
-        tried = np.flatnonzero(_met(moves, rows, tools, points, thickness))
-        if len(tried) and len(rows):
-            after, by = residual_on_normals(points[tried], normals[tried], left[tried], moves.only(chosen), tools,
-                                            threads=threads)
-            cut = by >= 0
-            fell = tried[(gone[tried] == NEVER) & cut & (after < holds[tried] - RAY_ERROR)]
-            gone[fell] = k
-            # a place that is never cut that far is done with the last cut that removed more than the rest allowed
-            ends = cut & (done[tried] != -1) & (reported[tried] > enough)
-            ends &= (after <= enough) | (reported[tried] - after > rest)
-            done[tried[ends]], mover[tried[ends]], reported[tried[ends]] = k, rows[by[ends]], after[ends]
-            left[tried] = after
-        report((k + 1) / parts)
+    count = int(stands.sum())
+    gone[stands] = piece[:count]
+    numbers = np.append(np.flatnonzero(beside), -1)  # the last one for none
+    done[open_], mover[open_] = piece[count:], numbers[of[count:]]
     return CutTimes(gone, done, mover)
+
+
+def _first_pieces(points: F64, normals: F64, level: F64, spacing: float, moves: Moves, tools: Sequence[ToolBody],
+                  threads: int, report: Report) -> tuple[INT, INT]:
+    """When less than ``level`` (n,) mm is left on normals first: (n,) piece of the path, NEVER where at no time, and
+    (n,) its move, -1 where none."""
+    piece, of = np.full(len(points), NEVER), np.full(len(points), -1, np.int64)
+    count = np.maximum(np.ceil(np.linalg.norm(moves.end - moves.start, axis=1) / spacing), 1.0).astype(np.int64)
+    ends = np.cumsum(count)
+    total, first = int(ends[-1]) if len(ends) else 0, 0
+    while first < len(moves) and (open_ := np.flatnonzero(of < 0)).size:
+        before = int(ends[first] - count[first])
+        last = max(int(np.searchsorted(ends, before + PIECES, side="right")), first + 1)
+        chosen = np.zeros(len(moves), np.bool_)
+        chosen[first:last] = True
+        pieces, owner = moves.only(chosen).parted(count[first:last])
+        met = first_below(points[open_], normals[open_], level[open_], pieces, tools, threads=threads)
+        rows = open_[met >= 0]
+        piece[rows], of[rows] = before + met[met >= 0], first + owner[met[met >= 0]]
+        first = last
+        report(int(ends[last - 1]) / total)
+    return piece, of
 
 
 def _boxes(moves: Moves, rows: INT, tools: Sequence[ToolBody], room: float) -> tuple[F64, F64]:
@@ -134,14 +156,6 @@ def _beside(moves: Moves, tools: Sequence[ToolBody], points: F64, room: F64) -> 
     """(m,) bool: moves whose box meets the box of all places."""
     low, high = _boxes(moves, np.arange(len(moves)), tools, float(room.max()))
     return np.asarray(((low <= points.max(axis=0)) & (high >= points.min(axis=0))).all(axis=1))
-
-
-def _met(moves: Moves, rows: INT, tools: Sequence[ToolBody], points: F64, room: F64) -> NDArray[np.bool_]:
-    """(n,) bool: places within the box of some moves."""
-    if not len(rows):
-        return np.zeros(len(points), np.bool_)
-    low, high = _boxes(moves, rows, tools, float(room.max()))
-    return np.asarray(((points >= low.min(axis=0)) & (points <= high.max(axis=0))).all(axis=1))
 
 
 def _free_ways(walls: ThinWalls, one: CutTimes, other: CutTimes) -> tuple[F64, NDArray[np.bool_]]:

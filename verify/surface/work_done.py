@@ -27,12 +27,14 @@ from verify.surface.asked_faces import (
     ASIDE_ROOM,
     OFF_FACETS,
     Cutting,
+    Measured,
     distance_aside,
     thinned,
     worked_faces,
 )
 from verify.surface.sample_scores import proved_samples
 from verify.surface.stock_places import StandingStock, stock_findings
+from verify.surface.unread_work import UnreadWork
 from verify.surface.ways_out import ways_out
 
 MAX_TRIED = 12_000  # samples with stock that tools are tried on; the others share the answer of their neighbour
@@ -46,24 +48,6 @@ SAME_AXIS = float(np.radians(0.01))
 NOT_IN_PROGRAM, LEFT = "not_in_program", "pass"  # words of the remainder
 BOOL = NDArray[np.bool_]
 INT = NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class Measured:
-    """Samples as a proof has measured them.
-
-    samples  : SurfaceSamples, n of them
-    residual : (n,) float64, mm of stock on their normals after all moves, not above ``reach``
-    mover    : (n,) int32, index, the move that left it, -1 where none did
-    reach    : mm
-    error    : mm, largest error of a residual against the mesh
-    """
-
-    samples: SurfaceSamples
-    residual: F64
-    mover: I32
-    reach: float
-    error: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,11 +77,12 @@ class _Limits:
         return self.h + self.near + self.error
 
 
-def work_done(asked: Asked, measured: Measured, cutting: Cutting, cut: BOOL,
-              source: Source) -> tuple[WorkDone, list[Finding]]:
+def work_done(asked: Asked, measured: Measured, cutting: Cutting, cut: BOOL, source: Source,
+              unread: UnreadWork | None = None) -> tuple[WorkDone, list[Finding]]:
     """Stock that stands on the faces that were asked, where the tools of the program can touch the part.
 
-    cut : (m,) bool, whether each move removes stock
+    cut    : (m,) bool, whether each move removes stock
+    unread : what lines behind the end of the program would do; where no faces are named, theirs are asked too
 
     Returns WorkDone, and a finding ``stock_left`` for each connected place of a face.
 
@@ -115,6 +100,8 @@ def work_done(asked: Asked, measured: Measured, cutting: Cutting, cut: BOOL,
     s, setup = measured.samples, cutting.setup
     faces = worked_faces(s, measured.residual, measured.mover, measured.reach, cutting) if asked.faces is None else \
         tuple(sorted(asked.faces & set(np.unique(s.face).tolist())))
+    if asked.faces is None and unread is not None:
+        faces = tuple(sorted({*faces, *unread.faces}))
     reason = np.full(len(s), "", dtype=object)
     stays = ~proved_samples(measured.residual, setup) & (measured.residual > setup.stock_allowance)
     on_asked = np.isin(s.face, faces)
@@ -126,7 +113,8 @@ def work_done(asked: Asked, measured: Measured, cutting: Cutting, cut: BOOL,
         return WorkDone(s, faces, reason), []
     tried = _tried(rows, s.face)
     used = cut if cut.any() else cutting.moves.feed
-    tools = [cutting.tools[k] for k in np.unique(cutting.moves.tool[used])]
+    numbers = {*np.unique(cutting.moves.tool[used]).tolist(), *(unread.tools if unread is not None else ())}
+    tools = [cutting.tools[k] for k in sorted(numbers)]
     few = s.subset(tried)
     standing, left, why = _standing(asked, measured, cutting, few, tried, tools, cutting_axes(cutting.moves, used))
     found = np.flatnonzero(left)

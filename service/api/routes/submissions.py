@@ -49,7 +49,8 @@ def multipart(with_program: bool) -> dict[str, Any]:
         properties["program"] = {"type": "string", "format": "binary",
                                  "description": "The NC program or STEP-NC file. A program with words of Siemens or "
                                                 "Heidenhain is read as such. Any other program is read for the first "
-                                                "other control in machine.dialects of the setup, or else for linuxcnc. "
+                                                "other control in machine.dialects of the setup, or else for linuxcnc; "
+                                                "proof.assumed lists a dialect that nothing states. "
                                                 "STEP-NC (AP238 or ISO 14649) is recognized by FILE_SCHEMA in its "
                                                 "header."}
         encoding["program"] = {"contentType": "text/plain, model/step, application/octet-stream"}

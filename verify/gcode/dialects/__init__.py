@@ -22,6 +22,10 @@ CONTROLS: dict[str, type[DialectReader]] = {
     "fanuc": FanucReader, "haas": HaasReader, "siemens": SiemensReader, "heidenhain": HeidenhainReader}
 """Readers by dialect; ``LINUXCNC`` needs none."""
 
+OWN_SPEED_RAPIDS = frozenset({"fanuc", "haas"})
+"""Controls on which each axis of a rapid moves at its own speed unless a parameter or setting says otherwise: Fanuc's
+parameter 1401#1 (LRP), Haas's setting 335. LinuxCNC, Siemens and Heidenhain interpolate rapids."""
+
 NEWS = " "
 """A block without words that keeps the next one off the fast path."""
 
@@ -85,15 +89,36 @@ def dialect_of(text: str, ending: str = "", wanted: Collection[str] = ()) -> str
     >>> dialect_of("G21 G90", "nc", ["haas"]), dialect_of("G21 G90", "nc", ["linuxcnc"])
     ('haas', 'linuxcnc')
     """
+    may = _candidates(text, ending)
+    named = [d for d in wanted if d in may]
+    return named[0] if named else may[0] if len(may) == 1 else LINUXCNC
+
+
+def dialects_left(text: str, ending: str = "", wanted: Collection[str] = ()) -> tuple[str, ...]:
+    """The other dialects that a text may be in, where nothing decides for that of ``dialect_of``; arguments as there.
+
+    >>> dialects_left("G21 G90", "nc", ["haas"]), dialects_left("G21 G90", "ngc")
+    ((), ())
+    >>> dialects_left("G21 G90", "nc"), dialects_left("G21 G90", "nc", ["fanuc", "haas"])
+    (('fanuc', 'haas'), ('haas',))
+    """
+    may = _candidates(text, ending)
+    named = [d for d in wanted if d in may]
+    left = may if not named else named
+    return () if len(left) == 1 else tuple(d for d in left if d != dialect_of(text, ending, wanted))
+
+
+def _candidates(text: str, ending: str) -> list[str]:
+    """The dialects that marks and file name leave, the likeliest first."""
+    text = text.removeprefix("\ufeff")
     if is_conversational(text):
-        return "heidenhain"
+        return ["heidenhain"]
     if is_siemens(text):
-        return "siemens"
+        return ["siemens"]
     may = ENDINGS.get(ending.lower().removeprefix("."), DIALECTS)
     # a text without their marks is not a Siemens or Heidenhain program, unless its name says so
-    plain = [d for d in may if len(may) == 1 or d not in ("siemens", "heidenhain")]
-    named = [d for d in wanted if d in plain]
-    return named[0] if named else plain[0] if len(may) == 1 else LINUXCNC
+    return [d for d in may if len(may) == 1 or d not in ("siemens", "heidenhain")]
 
 
-__all__ = ["CONTROLS", "DIALECTS", "ENDINGS", "LINUXCNC", "dialect_of", "translated_blocks"]
+__all__ = ["CONTROLS", "DIALECTS", "ENDINGS", "LINUXCNC", "OWN_SPEED_RAPIDS", "dialect_of", "dialects_left",
+           "translated_blocks"]

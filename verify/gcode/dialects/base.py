@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Protocol
 
 from geometry.errors import VerificationError
+from verify.assumptions import Assumed
 from verify.gcode.block_words import NUMBER, WORK_OFFSETS, BlockError
 from verify.gcode.cutter_compensation import FANUC_STYLE, Style
 from verify.gcode.frames import Frame
@@ -56,6 +57,7 @@ class DialectReader:
     frame   : from programmed coordinates to those of the work offset, mm, None where both are the same. The reader
               applies it to X, Y, Z, arcs and cycles of the blocks that follow; shifts by words of blocks (G92, G10)
               come after it
+    assumed : what lines leave to the control, each kind once
     names   : T numbers by the names (ids) of the tools of the setup
     """
 
@@ -72,6 +74,7 @@ class DialectReader:
         self.notes: list[str] = []
         self.remarks: list[str] = []
         self.functions: list[int] = []
+        self.assumed: list[Assumed] = []
         self.unbounded = False
         self._free = False
         self.frame: Frame | None = None

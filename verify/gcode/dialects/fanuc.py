@@ -14,6 +14,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
+from verify.assumptions import Assumed, AssumedKind
 from verify.gcode.block_words import FURTHER, bare
 from verify.gcode.dialects.base import NUMBER, BlockError, Machine, zero_word
 from verify.gcode.dialects.fanuc_planes import FanucPlanes
@@ -29,7 +30,7 @@ _FOREIGN: dict[str, frozenset[float]] = {
 ROUNDING = "parameters of the machine set how far the control rounds corners: the error bound does not include it"
 _PLACES = "XYZABCIJKRUVW"
 _KNOWN_M = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30})
-IDLE_G: frozenset[float] = frozenset({9, 13.1, 22, 23, 25, 26, 40.1, 50.2, 61, 62, 63, 67, 69.1, 94.1, 97, 113})
+IDLE_G: frozenset[float] = frozenset({9, 13.1, 22, 23, 25, 26, 40.1, 50.2, 62, 63, 67, 69.1, 94.1, 97, 113})
 """G words without effect on a move: exact stop, modes of tapping and cutting, stroke checks, ends of modes."""
 SMOOTHING: frozenset[float] = frozenset({5, 5.1, 5.4, 8, 64, 61.1})
 REFUSED = {
@@ -64,6 +65,7 @@ class FanucReader(FanucPlanes):
         self.unbounded = True
         self.polar = False
         self.hole = False
+        self.exact = self.limited = False
 
     def order(self, lines: Sequence[str], machine: Machine) -> Iterator[tuple[int, str]]:
         """As in the base class; ``verify.gcode.flow.macro_flow`` follows subprograms, macros, jumps and variables."""
@@ -96,8 +98,8 @@ class FanucReader(FanucPlanes):
         words = [(a, b) for a, b in words if not (a == "M" and self._idle_m(b))]
         for letter, digits in words:
             self._check(letter, digits)
-        if len(ms := [a + b for a, b in words if a == "M"]) > 1:
-            self._several(" and ".join(ms))
+        if len(ms := [b for a, b in words if a == "M"]) > 1:
+            self._several(ms)
         return self._translated(words, deleted is not None)
 
     def _translated(self, words: list[tuple[str, str]], deleted: bool) -> list[str]:
@@ -176,9 +178,16 @@ class FanucReader(FanucPlanes):
         self.function(int(number))
         return True
 
-    def _several(self, ms: str) -> None:
-        """A block has several M words, named by ``ms``."""
-        self.remarks.append(f"{ms} in one block: parameter 3404#7 decides whether the control runs both or only the "
+    def _several(self, ms: list[str]) -> None:
+        """A block has several M words, with the numbers ``ms``. Spindle and coolant together are usual."""
+        names, kinds = " and ".join(f"M{m}" for m in ms), {float(m) for m in ms}
+        if len(ms) == 2 and len(kinds & {3, 4, 5}) == 1 and len(kinds & {7, 8, 9}) == 1:
+            if not self.assumed:
+                self.assumed.append(Assumed(AssumedKind.COOLANT, f"{names} in one block both count", "where parameter "
+                                            "3404#7 is 0 the control runs only the last of them: the spindle may stand",
+                                            "give each M word its own block"))
+            return
+        self.remarks.append(f"{names} in one block: parameter 3404#7 decides whether the control runs both or only the "
                             "last; give each its own block")
 
     def _word(self, letter: str, digits: str, codes: list[float], values: dict[str, str]) -> list[str]:
@@ -213,8 +222,14 @@ class FanucReader(FanucPlanes):
             return ["G43.4"]
         if code == 5.1 and float(values.get("Q", "-1")) not in (0.0, 1.0):
             raise BlockError("G05.1 without Q0 or Q1")
+        if code in (61, 62, 63, *SMOOTHING):
+            self.exact = code == 61
+            self.bound(self.exact or self.limited)
+        if code == 61:
+            return ["G61"]
         if code in SMOOTHING:
-            self.notes.append(ROUNDING)
+            if not self.limited:
+                self.notes.append(ROUNDING)
             return []
         if code == 76:
             self.notes.append("G76 is read without its shift at the bottom: a parameter decides its direction")

@@ -29,8 +29,9 @@ class HaasReader(FanucReader):
             raise BlockError(f"F{digits} without a decimal point counts thousandths or not, depending on a setting",
                              f"write F{digits}.")
 
-    def _several(self, ms: str) -> None:
-        raise BlockError(f"{ms} in one block: Haas takes one M word in a block", "give each its own block")
+    def _several(self, ms: list[str]) -> None:
+        raise BlockError(f"{' and '.join(f'M{m}' for m in ms)} in one block: Haas takes one M word in a block",
+                         "give each its own block")
 
     def _in_seconds(self, digits: str) -> bool:
         return "." in digits
@@ -56,12 +57,16 @@ class HaasReader(FanucReader):
             if "E" not in values:
                 self.notes.append("G187 without E: a setting of the machine decides how far the control rounds "
                                   "corners; the error bound does not include it")
-                self.bound(False)
+                self.limited = False
+                self.bound(self.exact)
                 return []
+            self.limited = True
             self.bound(True)
             return [f"G64 P{values['E']}"]
         if code in (5.1, 54.1):
             raise BlockError(f"unknown word G{code:g}: Haas has G187 and G154")
+        if code == 92.1:
+            raise BlockError("unknown word G92.1: Haas ends a shift with another G92, or with G52")
         return super()._code(code, values)
 
     def _after(self, codes: list[float]) -> list[str]:

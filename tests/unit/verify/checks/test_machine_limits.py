@@ -9,7 +9,7 @@ from verify.kinematics import Kinematics
 from verify.model import FindingKind, ProofSetup
 
 ZERO = (0.0, 0.0, 0.0)
-HEAD = "%\nG21 G90 G17 G94 G54\nT1 M6\nS1000 M3\nG43 H1\nM428\nG0 A0 C0\nX0 Y0\nZ10\n"
+HEAD = "%\nG21 G90 G17 G94 G54 G61\nT1 M6\nS1000 M3\nG43 H1\nM428\nG0 A0 C0\nX0 Y0\nZ10\n"
 MACHINE = Kinematics("table-table-AC", (ZERO, ZERO))
 
 

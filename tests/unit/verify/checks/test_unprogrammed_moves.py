@@ -13,7 +13,7 @@ TOOL = ToolBody("T1", 1, 3.0, 1.5, 9.0, 2.8, 20.0, 6.0, 45.0, (HolderFrustum(50.
 BOUNDS = np.array([[-20.0, -20.0, 0.0], [20.0, 20.0, 20.0]])
 PIVOTS = {"table-table-AC": ((0.0, 0.0, -50.0), (0.0, 0.0, 0.0)), "head-table-BC": ((0.0, 0.0, 100.0), (0.0, 0.0, 0.0)),
           "head-head-AC": ((0.0, 0.0, 100.0),)}
-HEAD = "%\nG21 G90 G17 G94 G54\nT1 M6\nS1000 M3\nG43 H1\nG53 G0 Z0\n"  # line 7 is the first of a body
+HEAD = "%\nG21 G90 G17 G94 G54 G61\nT1 M6\nS1000 M3\nG43 H1\nG53 G0 Z0\n"  # line 7 is the first of a body
 
 
 def found(kind, *lines, **options):

@@ -12,7 +12,7 @@ from verify.model import FindingKind, ProofSetup, StockKind
 
 TOOL = ToolBody("T1", 1, 8.0, 0.0, 20.0, 8.0, 20.0, 8.0, 45.0)
 BOUNDS = np.array([[-20.0, -20.0, 0.0], [20.0, 20.0, 10.0]])
-HEAD = "%\nG21 G90 G17 G94 G54\nT1 M6\nS1000 M3\nG43 H1\nG0 X0 Y0\nZ15\n"  # line 8 is the first of a body
+HEAD = "%\nG21 G90 G17 G94 G54 G61\nT1 M6\nS1000 M3\nG43 H1\nG0 X0 Y0\nZ15\n"  # line 8 is the first of a body
 SETUP = ProofSetup(stock_kind=StockKind.BOX, margin=0.0, uncertainty=0.0, clearance_rapid=1.0)
 
 

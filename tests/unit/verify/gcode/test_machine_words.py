@@ -10,7 +10,7 @@ from tests.program_pairs import read
 from verify.gcode.machine_words import FANUC_M, HAAS_M, HEIDENHAIN_M, SIEMENS_M
 from verify.gcode.reader import read_program
 
-HEAD = "G21 G90 G17 G54\nT1 M6\nG43 H1\nS900 M3\nG0 X0. Y0. Z5.\nG1 Z1. F100.\n"
+HEAD = "G21 G90 G17 G61 G54\nT1 M6\nG43 H1\nS900 M3\nG0 X0. Y0. Z5.\nG1 Z1. F100.\n"
 REFUSED = {"fanuc": FANUC_M, "haas": HAAS_M, "siemens": SIEMENS_M, "heidenhain": HEIDENHAIN_M}
 ALWAYS = {"heidenhain": {97, 98, 130, 197}}
 """Words that are refused in some states only."""

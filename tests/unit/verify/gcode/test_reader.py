@@ -16,7 +16,7 @@ from verify.model import FindingKind, ScoredSamples
 from verify.program.move_log import Log
 from verify.prove import error_bound, prove
 
-HEAD = "%\nG21 G90 G17 G94 G40 G49 G54\nT1 M6\nS1000 M3\nG0 X0 Y0\nG43 H1 Z10\n"
+HEAD = "%\nG21 G90 G17 G94 G40 G49 G54 G61\nT1 M6\nS1000 M3\nG0 X0 Y0\nG43 H1 Z10\n"
 TAIL = "M30\n%\n"
 _FEW = sample_surface(block().mesh, 1.0, seed=3)
 SAMPLES = ScoredSamples(_FEW, np.zeros(len(_FEW), np.int32))
@@ -176,7 +176,7 @@ def test_harmless_habits_are_not_remarked(body):
 
 
 def test_speed_never_given():
-    p = read_program("%\nG21 G90\nT1 M6\nM3\nG43 H1\nG0 X0 Y0\nZ5\nG1 Z1 F100\nM30\n%\n")
+    p = read_program("%\nG21 G90 G61\nT1 M6\nM3\nG43 H1\nG0 X0 Y0\nZ5\nG1 Z1 F100\nM30\n%\n")
     assert [(r.line, "no S given" in r.message) for r in p.remarks] == [(8, True)]
 
 
@@ -264,3 +264,16 @@ def test_speed_of_plain_lines():
     begin = time.perf_counter()
     assert len(read(body)) > 50_000
     assert in_time(time.perf_counter() - begin, 2.0)
+
+
+@pytest.mark.parametrize(("mode", "line"), [("", 6), ("G61", 0), ("G61.1", 0), ("G64 P0.001", 0), ("G64", 1)])
+def test_linuxcnc_starts_in_g64_without_a_tolerance(mode, line):
+    """A program that states no path mode gets the finding that G64 gets; the word has to stand before the first cut."""
+    p = read_program(f"G21 G90 G17 G94 G54 {mode}\nT1 M6\nS900 M3\nG43 H1\nG0 X0 Y0 Z5\nG1 Z1 F100\nX5\nM2\n")
+    assert [(r.line, "by any amount" in r.message) for r in p.remarks] == ([(line, True)] if line else [])
+
+
+def test_a_path_mode_after_the_first_cut_does_not_count_for_it():
+    p = read_program("G21 G90 G17 G94 G54\nT1 M6\nS900 M3\nG43 H1\nG0 X0 Y0 Z5\nG1 Z1 F100\nG61 X5\nM2\n")
+    assert [r.line for r in p.remarks] == [6]
+    assert read_program("G21 G90\nG0 X0 Y0\nZ5\nM2\n").remarks == ()

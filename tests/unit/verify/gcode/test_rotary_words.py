@@ -13,7 +13,7 @@ from verify.program.turn_subdivision import MAX_TURN, TURN, axis_pieces
 
 PIVOTS = {"table-table-AC": ((3.0, -2.0, -40.0), (1.5, 4.0, -7.0)),
           "head-table-BC": ((0.0, 0.0, 60.0), (12.0, -5.0, 3.0)), "head-head-BC": ((0.0, 0.0, 60.0),)}
-HEAD = "%\nG21 G90 G17 G94 G40 G49 G54\nT1 M6\nS1000 M3\nG43 H1\nG0 {0}0 C0\nX0 Y0\nZ10\n"
+HEAD = "%\nG21 G90 G17 G94 G40 G49 G54 G61\nT1 M6\nS1000 M3\nG43 H1\nG0 {0}0 C0\nX0 Y0\nZ10\n"
 TAIL = "M30\n%\n"
 GAUGE = 80.0
 
@@ -201,7 +201,7 @@ def test_home_and_machine_coordinates():
 
 def test_what_is_taken_for_granted():
     machine = Kinematics("table-table-AC")
-    text = "G0 X0 Y0 Z50\nS1000 M3\nG1 X5 F100\nM30\n"
+    text = "G0 X0 Y0 Z50\nS1000 M3\nG61\nG1 X5 F100\nM30\n"
     p = read_program(text, kinematics=machine, spindle_tool=3, tools={1, 3})
     assert p.assumed == ("G21", "G90", "G17", "G94", "G54", "T3 M6", "G43 H3", "A0", "C0")
     assert (p.tool == 3).all() and p.remarks == ()

@@ -221,3 +221,42 @@ def test_the_page_lists_every_word_that_is_refused():
     page = (Path(__file__).resolve().parents[4] / "docs" / "verify.md").read_text().partition("## Words it refuses")[2]
     listed = set(page.replace(",", " ").split())
     assert not [f"G{code:g}" for code in REFUSED if f"G{code:g}" not in listed]
+
+
+@pytest.mark.parametrize(("dialect", "body", "expected"), [
+    # G92 at X0 says X5: zero is at X-5, and G52 X0 does not take that back
+    ("fanuc", "G92 X5. Y0\nG52 X0 Y0\nG1 X10. F100.\n", [5, 0, 10]),
+    ("haas", "G92 X5. Y0\nG52 X0 Y0\nG1 X10. F100.\n", [5, 0, 10]),
+    ("fanuc", "G92 X5.\nG52 X2. Y3.\nG1 X10. Y0 F100.\n", [7, 3, 10]),
+    ("fanuc", "G52 X2. Y3.\nG92 X5.\nG1 X10. Y0 F100.\n", [5, 3, 10]),  # G92 ends G52 of the axis it names
+    ("fanuc", "G52 X2. Y3.\nG92 X5.\nG92.1 X0 Y0\nG1 X10. Y1. F100.\n", [10, 1, 10]),
+    ("fanuc", "G52 X2. Y3.\nG92.1 X0\nG1 X10. Y0 F100.\n", [10, 3, 10]),
+    ("linuxcnc", "G92 X5 Y0\nG52 X0 Y0\nG1 X10 F100\n", [10, 0, 10]),  # one register
+    ("linuxcnc", "G52 X2 Y3\nG92 X5\nG1 X10 Y0 F100\n", [5, 3, 10]),
+])
+def test_registers_of_zero_shifts_are_those_of_the_control(dialect, body, expected):
+    np.testing.assert_allclose(read(body, dialect).end[-1], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(("dialect", "word", "words"), [
+    ("fanuc", "G92.1", "G92.1 names the axes"), ("fanuc", "G92.1 X5.", "each with 0"),
+    ("haas", "G92.1 X0", "Haas ends a shift"), ("fanuc", "G91 G52 X5.", "incremental")])
+def test_shift_words_that_a_control_does_not_take(dialect, word, words):
+    with pytest.raises(ProgramError, match=words):
+        read(f"{word}\n", dialect)
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas"])
+def test_a_shift_that_is_left_is_told(dialect):
+    for body in ("G92 X5.\nG52 X0\n", "G52 X5.\n"):
+        (told,) = read(body, dialect).remarks
+        assert "its zero shifted" in told.message and "G52 X0 Y0 Z0" in told.message
+    assert read("G52 X5.\nG52 X0\n", dialect).remarks == ()
+
+
+@pytest.mark.parametrize(("dialect", "words", "free"), [
+    ("fanuc", "", True), ("fanuc", "G61\n", False), ("fanuc", "G61\nG1 X1. F100.\nG64\n", True),
+    ("haas", "", True), ("haas", "G187 P3 E0.005\nG64\n", False), ("haas", "G187 E0.005\nG1 X1. F100.\nG187\n", True),
+    ("haas", "G61\n", False), ("haas", "G1 X1. F100.\nG187 E0.005\n", True), ("fanuc", "G1 X1. F100.\nG61\n", True)])
+def test_a_path_mode_counts_from_its_word_on(dialect, words, free):
+    assert read(f"{words}G1 X5. Y5. F100.\n", dialect).unbounded is free

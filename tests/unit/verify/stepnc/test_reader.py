@@ -3,6 +3,7 @@ apart, and a file is simulated like the program of the same job."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -16,10 +17,11 @@ from output.workplan import Ap238, StockBox
 from tests.pocket_case import OTHER, SETUP, TOOL, ZONES, block, program, scored, text
 from tests.synthetic_plan import BALL, clamped, full, line, long_plan, plan, shaped, step, tiny, write_linuxcnc
 from toolpath.workingsteps import Trajectory, TrajectoryKind
+from verify.checks.machine_limits import way_findings
 from verify.comparison.stepnc_agreement import check_agreement
 from verify.gcode.reader import read_program
 from verify.kinematics import KINDS, Kinematics
-from verify.model import NcProgram
+from verify.model import FindingKind, NcProgram, ProofSetup
 from verify.prove import prove
 from verify.stepnc.part21 import EnumItem, Part21File, Ref, Typed, decoded, is_exchange_file
 from verify.stepnc.reader import is_stepnc, read_moves, read_stepnc
@@ -298,3 +300,30 @@ def test_a_file_is_proved_like_the_program(write):
 def test_the_first_edition_is_read_too():
     job = replace(plan(), ap238=Ap238.INTEGRATED_CNC)
     check_agreement(nc_of(job), read_stepnc(write_stepnc_aim(job), tools=job.tools))
+
+
+@both
+def test_planes_that_a_control_travels_on_are_kept(write):
+    """The security plane of the setup; a retract plane only where it is lower than the path before it ends."""
+    wanted = plan()
+    planes = read_stepnc(write(wanted), tools=wanted.tools).planes
+    assert {(p.what, p.point[2], p.normal) for p in planes} == \
+        {("security plane", wanted.clearance_plane, (0.0, 0.0, 1.0))}
+
+
+def test_a_plane_in_the_part_is_a_finding():
+    wanted = plan()
+    whole = write_stepnc_arm(wanted)
+    height = f"{wanted.clearance_plane:g}"
+    lower = re.sub(rf"(CARTESIAN_POINT\('',\(0\.,0\.,){height}[.0]*\)\)", r"\g<1>2.))", whole)
+    lower = re.sub(rf"(FREEFORM_OPERATION\([^']*'[^']*',){height}[.0]*,", r"\g<1>-50.,", lower)
+    program = read_stepnc(lower, tools=wanted.tools)
+    bounds = np.array([[-20.0, -20.0, 0.0], [20.0, 20.0, 10.0]])
+    setup = ProofSetup(stock_kind="box", margin=0.5, uncertainty=0.0)
+    found = [f for f in way_findings(program, bounds, wanted.tools, setup) if "plane" in f.message]
+    assert [(f.kind, f.depth, f.limit) for f in found if "security" in f.message] == [(FindingKind.RAPID, 9.5, 11.5)]
+    assert {f.depth for f in found if "retract" in f.message} == {61.5}
+    assert all(lower.split("\n")[f.line - 1].startswith("#") for f in found)
+    ours = read_stepnc(whole, tools=wanted.tools)
+    low = np.array([[-20.0, -20.0, 0.0], [20.0, 20.0, wanted.clearance_plane - 2.0]])
+    assert not [f for f in way_findings(ours, low, wanted.tools, setup) if "plane" in f.message]

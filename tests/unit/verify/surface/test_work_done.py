@@ -8,8 +8,9 @@ import pytest
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.sampling import sample_surface
 from tests.pocket_case import DEPTH, SETUP, TOOL, block, program, text
-from verify.model import Asked, FindingKind, ScoredSamples
+from verify.model import Asked, FindingKind, NcProgram, ScoredSamples
 from verify.moves import Moves
+from verify.program_reading import read_one
 from verify.prove import prove
 from verify.surface.asked_faces import Cutting, thinned
 from verify.surface.ways_out import ways_out
@@ -34,10 +35,10 @@ class Everything:
         return np.full(len(samples), "corner", dtype=object)
 
 
-def run(lines, faces=None, touch=None, setup=SETUP):
+def run(lines, faces=None, touch=None, setup=SETUP, whole=None):
     part = block()
     samples = sample_surface(part.mesh, 30.0, seed=3, triangles=np.flatnonzero(part.mesh.face_ids >= 2))
-    asked = Asked(None if faces is None else frozenset(faces), touch or Everything())
+    asked = Asked(None if faces is None else frozenset(faces), touch or Everything(), whole=whole)
     return prove([("pocket.ngc", text(lines))], part, (TOOL,), setup,
                  ScoredSamples(samples, np.zeros(len(samples), np.int32)), [], asked=asked)
 
@@ -133,7 +134,7 @@ def faced(*heights):
     """Rows over the whole top at some heights, 0 being the top, each a run of its own."""
     rows = [f"X{24 * (1 if k % 2 else -1)} Y{y}\nX{24 * (-1 if k % 2 else 1)}" for k, y in enumerate(range(-16, 18, 3))]
     body = [f"G0 Z20\nX-24 Y-20\nG1 Z{z} F300\n" + "\n".join(rows) for z in heights]
-    head = ["%", "G21 G90 G17 G94 G40 G49 G54", "T1 M6", "S8000 M3", "G0 G43 H1 Z20"]
+    head = ["%", "G21 G90 G17 G94 G40 G49 G54 G61", "T1 M6", "S8000 M3", "G0 G43 H1 Z20"]
     return [*head, *"\n".join(body).split("\n"), "G0 Z20", "M5", "M30", "%"]
 
 
@@ -156,3 +157,20 @@ def test_a_cut_to_size_goes_into_the_allowance(allowance):
     assert found and max(f.depth for f in found) == pytest.approx(allowance, abs=1e-4)
     assert {f.face for f in found} == {f"F{TOP}"}
     assert not of(run(faced(0.3), setup=replace(SETUP, stock_allowance=0.3)), FindingKind.ALLOWANCE)
+
+
+@pytest.mark.slow
+def test_faces_that_only_unread_lines_cut_are_asked():
+    """A stray M2 after the facing: the pocket that the lines behind it would cut is asked, and is left."""
+    lines = [*faced(0.0)[:-3], "G0 X-7 Y0", *program()[6:]]
+    end = lines.index("G0 X-7 Y0")
+    assert set(run(lines).work.faces) == {TOP, *WALLS, FLOOR} and run(lines).no_findings
+    stray = [*lines[:end], "M2", *lines[end:]]
+    read, whole = (read_one(NcProgram("p", text(t)), (TOOL,)) for t in (stray, lines))
+    assert read.cut_off == end + 1
+    proof = run(stray)
+    assert proof.work.faces == (TOP,) and proof.no_findings, "nothing is known of the lines behind the end"
+    proof = run(stray, whole=whole)
+    assert set(proof.work.faces) == {TOP, *WALLS, FLOOR}
+    assert proof.counts.keys() == {"stock_left"} and {f.face for f in of(proof)} >= {f"F{FLOOR}"}
+    assert run(stray, faces={TOP}, whole=whole).work.faces == (TOP,), "faces that are named are the faces"

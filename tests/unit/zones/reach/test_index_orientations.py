@@ -65,7 +65,7 @@ def test_the_choice_is_the_best_of_all_choices():
 
 
 def program(*lines):
-    head = "%\nG21 G90 G17 G94 G40 G49 G54\nT1 M6\nS1000 M3\nG43 H1\nG0 A0 C0\nX0 Y0\nZ80\nM428\n"
+    head = "%\nG21 G90 G17 G94 G40 G49 G54 G61\nT1 M6\nS1000 M3\nG43 H1\nG0 A0 C0\nX0 Y0\nZ80\nM428\n"
     return read_program(head + "\n".join(lines) + "\nM30\n%\n", kinematics=Kinematics("table-table-AC", None),
                         gauge_length={1: 66.0})
 

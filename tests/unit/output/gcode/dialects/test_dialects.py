@@ -263,9 +263,13 @@ def test_other_programs_of_these_controls_are_read():
 
 
 def test_two_m_words_in_a_block_of_a_fanuc_are_remarked_on():
-    """Parameter 3404#7 says what becomes of them."""
-    told = read_program("G21 G17 G90 G94 G54\nT1 M6\nS900 M3 M8\nG0 G43 Z9. H1\nM30\n", dialect="fanuc").remarks
-    assert [r.line for r in told] == [3] and "M3 and M8 in one block" in told[0].message
+    """Parameter 3404#7 says what becomes of them. Spindle and coolant in one block are usual, and are assumed."""
+    told = read_program("G21 G17 G90 G94 G54\nT1 M6\nS900 M3\nG0 G43 Z9. H1\nM5 M30\n", dialect="fanuc").remarks
+    assert [r.line for r in told] == [5] and "M5 and M30 in one block" in told[0].message
+    both = read_program("G21 G17 G90 G94 G54\nT1 M6\nS900 M3 M8\nG0 G43 Z9. H1\nM9 M5\nM30\n", dialect="fanuc")
+    (taken,) = both.open
+    assert not both.remarks and taken.what == "coolant" and taken.value == "M3 and M8 in one block both count"
+    assert both.coolant.all() and (both.speed == 900).all()
 
 
 def test_a_zero_is_stated_after_every_change_of_the_transformation():

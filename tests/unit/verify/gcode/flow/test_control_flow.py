@@ -15,7 +15,7 @@ from verify.gcode.flow.parametric_lines import is_plain
 from verify.gcode.reader import FEED, RAPID, read_program
 from verify.model import ProofSetup
 
-HEAD = "%\nG21 G90 G17 G94 G40 G49 G54\nT1 M6\nS1000 M3\nG0 X0 Y0\nG43 H1 Z10\nG1 F100\n"
+HEAD = "%\nG21 G90 G17 G94 G40 G49 G54 G61\nT1 M6\nS1000 M3\nG0 X0 Y0\nG43 H1 Z10\nG1 F100\n"
 TAIL = "M30\n%\n"
 
 

@@ -1,0 +1,146 @@
+"""What pays for a descent, what each move takes off the stock, and the stub under an end without a cutting centre."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.pocket_case import SETUP, TOOL, block, scored, text
+from verify.kernels.stock import PLUNGE
+from verify.material.stock_field import run_field, stock_field
+from verify.material.stock_lines import blank, run_stock
+from verify.material.stock_pass import Ways, cores, descents
+from verify.model import NcProgram, ScoredSamples
+from verify.moves import Moves
+from verify.prove import prove
+
+PART = block()
+NOBODY = ScoredSamples(scored(PART).samples, np.zeros(len(scored(PART).zone), np.int32))
+HOLLOW = replace(SETUP, cores={1: 1.2})  # of a tool of 4 mm
+
+
+def plunges(lines, setup=SETUP, turn=None):
+    head = ["%", "G21 G90 G17 G94 G40 G49 G54", "T1 M6", "S8000 M3", "G0 G43 H1 Z20", "X-12 Y0", "Z1.5"]
+    body = [*head, *lines, "G0 Z20", "M5", "M30", "%"]
+    found = prove([NcProgram("p", text(body), turn)], PART, (TOOL,), setup, NOBODY, (), threads=2).findings
+    return [f for f in found if f.kind == "plunge"]
+
+
+def pecks(aside, up=None):
+    """Three pecks of 0.35 mm from the top at 0.5 mm; after each a way of 16 mm to and fro."""
+    out = []
+    for k in range(1, 4):
+        out += [f"G1 Z{0.5 - 0.35 * k:.3f} F200", *([f"Z{up}"] if up else []), f"X{-12 + aside}", "X-12"]
+    return out
+
+
+@pytest.mark.parametrize("turn", [None, np.eye(3)], ids=["lines", "field"])
+def test_a_way_in_air_pays_for_no_descent(turn):
+    drilled = plunges(pecks(16, up=0.8), turn=turn)
+    assert max(f.depth for f in drilled) == pytest.approx(3 * 0.35, rel=0.1)
+    assert plunges(pecks(16), turn=turn) == []  # the same ways at depth are slots
+
+
+def test_a_nick_at_the_end_of_a_way_pays_by_its_size():
+    """Each way back and forth in air cuts 0.3 mm deep and 0.5 mm far into a step at its end: far too little."""
+    step = ["G0 Z1.5", "X-12 Y0"]
+    lines = list(step)
+    for k in range(1, 6):
+        lines += [f"G1 Z{0.5 - 0.35 * k:.3f} F200", "Z0.8", "X4", "Z0.2" if k == 1 else "Z0.8", f"X{4 + 0.5 * k}",
+                  "Z0.8", "X-12"]
+    assert max(f.depth for f in plunges(lines)) > 1.4
+
+
+def test_a_shallow_layer_pays_as_deep_as_it_is():
+    """Layers of 0.1 mm, each entered straight down, are cleared one by one: no descent adds up."""
+    lines = []
+    for k in range(1, 13):
+        lines += [f"G1 Z{0.5 - 0.1 * k:.3f} F200", "X12 F600", "X-12"]
+    assert plunges(lines) == []
+
+
+def test_what_ways_earn():
+    p = np.array([[0.0, 0, 0], [10, 0, 0], [20, 0, 0], [30, 0, 0], [40, 0, 0]])
+    moves = Moves(p[:-1], p[1:], np.ones(4, bool), np.zeros(4, np.int32))
+    slope = math.tan(SETUP.ramp_angle)
+    # a slot 1 deep, air, a nick of 1 mm³ 1 deep, a layer of 0.1 mm
+    ways = Ways(np.array([40.0, 0.0, 1.0, 4.0]), np.array([1.0, 0.0, 1.0, 0.1]))
+    earned = descents(moves, [TOOL], SETUP, ways)[1]
+    np.testing.assert_allclose(np.diff(np.r_[0.0, earned]), [10 * slope, 0.0, 0.5 * slope, 0.1], rtol=1e-12)
+
+
+@pytest.mark.parametrize("deep", [0.2, 2.0])
+@pytest.mark.parametrize("model", ["lines", "field"])
+def test_volume_and_depth_of_a_cut(model, deep):
+    """A slot of 20 mm, then half as wide beside it: volume L D a, and L a ae; the depth is that of the layer."""
+    p = np.array([[-30.0, 0, 0.5 - deep], [30, 0, 0.5 - deep], [30, 2, 0.5 - deep], [-30, 2, 0.5 - deep]])
+    moves = Moves(p[:-1], p[1:], np.ones(3, bool), np.zeros(3, np.int32))
+    if model == "lines":
+        run = run_stock(blank(PART.mesh, 0.1, SETUP), moves, [TOOL], SETUP)
+    else:
+        run = run_field(stock_field(PART.mesh, SETUP, 0.2), moves, [TOOL], SETUP)
+    long = 41.0
+    np.testing.assert_allclose(run.ways.volume[[0, 2]], [long * 4 * deep, long * 2 * deep], rtol=0.05)
+    np.testing.assert_allclose(run.ways.depth[[0, 2]], deep, atol=0.2 if model == "field" else 1e-6)
+    assert run.ways.volume[1] == 0.0
+
+
+def helix(radius, pitch, turns, per=48):
+    t = 2.0 * np.pi * np.arange(per * turns + 1) / per
+    return np.column_stack([radius * np.cos(t), radius * np.sin(t), 0.5 - pitch * t / (2.0 * np.pi)])
+
+
+def pressed(path, core, setup=HOLLOW):
+    moves = Moves(path[:-1], path[1:], np.ones(len(path) - 1, bool), np.zeros(len(path) - 1, np.int32))
+    ramp = replace(setup, cores={1: 2.0 * core}, ramp_angles={1: math.radians(60.0)}, plunge_skin=1e9)
+    run = run_stock(blank(PART.mesh, 0.1, setup), moves, [TOOL], ramp)
+    events = run.events[run.events[:, 1] == PLUNGE]
+    return float(events[:, 2].max(initial=0.0)), float(cores([TOOL], ramp)[1][0])
+
+
+def twin(path, core, step=0.1, per=0.01):
+    """Highest stock under the core, tool by tool along the path over points; the ring round the core cuts."""
+    x, y = np.meshgrid(np.arange(-4.0, 4.0, step), np.arange(-4.0, 4.0, step))
+    top, worst = np.full(x.shape, 0.5), 0.0
+    for a, b in zip(path[:-1], path[1:], strict=True):
+        count = max(int(np.linalg.norm(b - a) / per), 1)
+        for s in np.arange(1, count + 1) / count:
+            tip = a + s * (b - a)
+            rho = np.hypot(x - tip[0], y - tip[1])
+            ring = (rho >= core) & (rho <= TOOL.radius)
+            top[ring] = np.minimum(top[ring], tip[2])
+            worst = max(worst, float((top[rho < core] - tip[2]).max()))
+    return worst
+
+
+@pytest.mark.parametrize("radius, pitch, core", [(0.3, 0.4, 0.6), (0.9, 0.6, 0.6), (0.55, 0.6, 0.6), (1.5, 0.9, 1.2)])
+def test_the_stub_is_that_of_a_twin(radius, pitch, core):
+    path = helix(radius, pitch, 3)
+    got, left = pressed(path, core)
+    want = twin(path, core)
+    assert got == (pytest.approx(want, abs=0.06) if want > left else 0.0)
+
+
+def test_a_hollow_end_goes_neither_straight_down_nor_round_its_core():
+    down = plunges(["G1 Z-0.5 F200"], HOLLOW)
+    assert down and down[0].depth == pytest.approx(1.0, abs=0.01)
+    paid = plunges(pecks(16), HOLLOW)  # steps that a centre-cutting mill may make, with slots between them
+    assert paid and paid[0].depth == pytest.approx(0.35, abs=0.01)
+    ramp = ["G1 Z0.5 F300", *(f"X{(-4, -12)[k % 2]} Z{0.5 - 0.4 * (k + 1):.3f}" for k in range(6)), "X-4"]
+    assert plunges(ramp, HOLLOW) == []
+
+
+@pytest.mark.parametrize("radius, harm", [(0.4, True), (1.6, False)])
+def test_a_helix_round_the_core_of_a_hollow_end(radius, harm):
+    pitch = 2 * math.pi * radius * math.tan(math.radians(2.9))
+    turns = math.ceil(1.5 / pitch)
+    path = helix(radius, pitch, turns)
+    moves = Moves(path[:-1], path[1:], np.ones(len(path) - 1, bool), np.zeros(len(path) - 1, np.int32))
+    found = {}
+    for setup in (SETUP, HOLLOW):
+        events = run_stock(blank(PART.mesh, 0.15, setup), moves, [TOOL], setup).events
+        found[setup.cores.get(1)] = events[events[:, 1] == PLUNGE, 2]
+    assert len(found[None]) == 0 and (len(found[1.2]) > 0) == harm
+    if harm:
+        assert found[1.2].max() == pytest.approx(turns * pitch, rel=0.02)

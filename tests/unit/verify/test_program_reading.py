@@ -1,0 +1,36 @@
+"""Lines behind the end of a program: named, and read on for the faces that they would work on."""
+
+import pytest
+
+from tests.pocket_case import TOOL
+from verify.model import NcProgram
+from verify.program_reading import read_on, read_one
+
+HEAD = "G21 G90 G17 G94 G54 G61\nT1 M6\nS900 M3\nG43 H1\nG0 X0. Y0. Z5.\nG1 Z1. F100.\n"
+
+
+def both(text, dialect="linuxcnc"):
+    nc = NcProgram("p", HEAD + text, dialect=dialect)
+    read = read_one(nc, (TOOL,))
+    return read, read_on(nc, read, lambda program: read_one(program, (TOOL,)))
+
+
+@pytest.mark.parametrize(("text", "end"), [
+    ("M2\nX5.\nX9.\nM2\n", 7), ("N70 M5 M30\nX5.\nX9.\nM30\n", 7), ("X1.\nM02\nX5.\nX9.\n", 8),
+    ("M2\nX5.\nM2\nX9.\nM2\n", 7)])
+def test_a_program_is_read_on_through_its_ends(text, end):
+    read, whole = both(text + "%\n" if not text.endswith("M2\n") else text)
+    assert read.cut_off == end and any(f"line {end} ends the program" in n for n in read.notes)
+    assert whole.end[-1, 0] == 9.0 and (whole.end[:len(read)] == read.end).all()
+
+
+@pytest.mark.parametrize(("text", "dialect"), [
+    ("X5.\nM30\n", "linuxcnc"), ("X5.\nM30\n%\n(made by hand)\n", "fanuc"), ("M2\nX5. Q9 W1\nM2\n", "linuxcnc")])
+def test_nothing_follows_or_what_follows_cannot_be_read(text, dialect):
+    assert both(text, dialect)[1] is None
+
+
+def test_another_program_of_the_file_is_told_and_not_read_on():
+    read, whole = both("X5.\nM30\nO2000\nG0 X9.\nM30\n%\n", "fanuc")
+    assert read.cut_off == 0 and whole is None
+    assert any("line 9 begins another program" in n for n in read.notes)
