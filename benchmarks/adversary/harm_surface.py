@@ -411,6 +411,13 @@ def excluded_face(rng: Rng) -> Case:
                 what=f"{scale} x {tolerance} {operations}")
 
 
+def excluded_face_finished(rng: Rng) -> Case:
+    """A face that is to be left alone is brought to size."""
+    part = choice(rng, "plate", "slope", "cylinder")
+    operations = {"exclude_faces": ["F5"]}
+    return made("excluded face finished", part, base(part), ("excluded_face",), None, None, {"operations": operations})
+
+
 def side_cut(rng: Rng) -> Case:
     """An outer side that no one works on, cut from beside."""
     part, (tolerance, scale, d) = choice(rng, "plate", "step", "slot"), scale_of(rng)
@@ -450,4 +457,5 @@ MECHANISMS = {"pit level": pit_level, "pit slope": pit_slope, "pit cylinder": pi
               "rim pit": rim_pit, "edge notch": edge_notch, "wall cut": wall_cut, "rib top": rib_top,
               "rib side": rib_side, "rib off": rib_off, "rib gap": rib_gap, "floor dip": floor_dip,
               "floor through": floor_through, "wedge short": wedge_short, "wedge shaved": wedge_shaved,
-              "allowance": allowance, "excluded face": excluded_face, "side cut": side_cut, "many dips": many_dips}
+              "allowance": allowance, "excluded face": excluded_face,
+              "excluded face finished": excluded_face_finished, "side cut": side_cut, "many dips": many_dips}

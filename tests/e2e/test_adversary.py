@@ -1,6 +1,6 @@
 """A shard of ``benchmarks/adversary``: harmful programs by mechanism are not called proved, good ones are not refused.
 
-What does harm, on which line and how deep, is stated by the generator, whose closed forms the brute-force twin confirms.
+The generator states what does harm, on which line and how deep. A brute-force twin confirms its closed forms.
 ``ADVERSARY_SEEDS`` (FROM:TO) names another shard than the usual one.
 """
 
@@ -26,8 +26,8 @@ def test_a_seed_gives_the_same_case_and_mechanisms_use_all_parts():
     for seed, mechanism in ((3, "pit level"), (4, "needle"), (5, "split moves")):
         a, b = case_of(seed, mechanism), case_of(seed, mechanism)
         assert (a.text, a.setup, a.expected) == (b.text, b.setup, b.expected)
-    used = {case_of(seed, m).part for m in ("any dialect", "pit level", "rib off", "floor dip", "pit cylinder", "wedge short")
-            for seed in range(16)}
+    names = ("any dialect", "pit level", "rib off", "floor dip", "pit cylinder", "wedge short")
+    used = {case_of(seed, name).part for name in names for seed in range(16)}
     assert len(PARTS) == 10 and used == set(PARTS)
 
 
