@@ -213,6 +213,28 @@ def small_ball(rng: Rng) -> Case:
     return made("small ball", "cylinder", s, ("gouge",), ops, d, setup, what=f"R{radius}, {scale} x {tolerance}")
 
 
+def smooth_dip(rng: Rng) -> Case:
+    """A small ball follows an arc into a curved face and out again, in chords that turn by ten degrees at most."""
+    tolerance, scale, d = scale_of(rng, 0.1)
+    radius, bow = float(rng.choice([0.1, 0.25, 0.5])), float(rng.uniform(0.5, 2.0))
+    tool = {**BALL, "id": "T3", "number": 3, "diameter_mm": 2 * radius, "flute_length_mm": 4.0,
+            "shank_diameter_mm": 3.0, "stickout_mm": 30.0}
+    s = base("cylinder")
+    s.tool(3, 12000)
+    p, n = contact("cylinder", rng)
+    most = math.acos(1.0 - (0.2 + d) / bow)
+    angles = np.linspace(-most, most, 2 * math.ceil(most / math.radians(5.0)) + 1)
+    tips = [p + (radius - d + bow * (1.0 - math.cos(a))) * n + [0.0, bow * math.sin(a), -radius] for a in angles]
+    s.over(float(tips[0][0]), float(tips[0][1]) - 2.0)
+    s.rapid(z=float(tips[0][2]) + 3.0)
+    s.feed(z=float(tips[0][2]), feed=300.0)
+    ops = [s.feed(*tip.tolist(), feed=100.0) for tip in tips]
+    s.feed(y=float(tips[-1][1]) + 2.0)
+    s.rapid(z=SAFE)
+    setup = {**quality(tolerance), "tools": [FLAT, BALL, tool]}
+    return made("smooth dip", "cylinder", s, ("gouge",), ops, d, setup, what=f"R{radius}, {scale} x {tolerance}")
+
+
 def rim_pit(rng: Rng) -> Case:
     """The rim of a flat pressed into a cylinder or a slope from above: a lens far narrower than the tool."""
     part, (tolerance, scale, d) = choice(rng, "cylinder", "slope"), scale_of(rng, 0.4)
@@ -454,7 +476,8 @@ def many_dips(rng: Rng) -> Case:
 
 MECHANISMS = {"pit level": pit_level, "pit slope": pit_slope, "pit cylinder": pit_cylinder, "groove": groove,
               "needle": needle, "small ball": small_ball,
-              "rim pit": rim_pit, "edge notch": edge_notch, "wall cut": wall_cut, "rib top": rib_top,
+              "smooth dip": smooth_dip, "rim pit": rim_pit, "edge notch": edge_notch, "wall cut": wall_cut,
+              "rib top": rib_top,
               "rib side": rib_side, "rib off": rib_off, "rib gap": rib_gap, "floor dip": floor_dip,
               "floor through": floor_through, "wedge short": wedge_short, "wedge shaved": wedge_shaved,
               "allowance": allowance, "excluded face": excluded_face,

@@ -1,8 +1,8 @@
 """Where ends of cutters press deepest into the part: rays there see pits and lenses that lie between the guard points.
 
-A cut that is narrow to all sides ends where the path turns: down and up, in and out. So the end of the tool is looked
-at wherever a feed move ends at a corner of the path, and all along the moves of tools thinner than the guard points
-lie apart. Coordinates are float64, mm, in the setup frame.
+A cut that is narrow to all sides mostly ends where the path turns: down and up, in and out. So the end of a tool is
+looked at wherever a feed move ends at a corner of the path, and at even distances along all feed moves. Coordinates
+are float64, mm, in the setup frame.
 """
 
 from __future__ import annotations
@@ -23,10 +23,12 @@ from verify.surface.guard_points import CLOSER_SHARE, GUARD_SPACING, inside_part
 from verify.tool_axes import square_to
 
 CORNER = math.cos(math.radians(45.0))  # of the angle by which a path turns at a corner
-STEP = 0.1  # mm between places of thin tools
+STEP = 0.1  # mm between places along the ways
+MOST_RINGS, MOST_BALLS = 50_000, 400_000  # places along the ways of a tool; more get a wider step
 AROUND = 16  # places round the rim of an end
 ROUNDS = 4  # of the search round the deepest of them
 LIFT, LIFT_SHARE = 0.05, 0.25  # mm, and of the radius: a second rim over the sharp one, for walls
+THIN = 0.05  # mm
 BATCH = 4096  # poses
 INT = NDArray[np.int64]
 
@@ -36,11 +38,20 @@ class Feet:
     """Places of the surface over the deepest points of ends, with the normals that lead to these.
 
     points, normals : (n, 3) float64, mm and unit, setup frame; triangle : (n,) int64, index
+    depth           : (n,) float64, mm, how far the end presses in there
     """
 
     points: F64
     normals: F64
     triangle: INT
+    depth: F64
+
+    def thinned(self) -> Feet:
+        """The deepest of each cell of ``THIN``, the deepest first."""
+        order = np.lexsort((*self.points.T, -self.depth))
+        cell = np.floor(self.points[order] / THIN).astype(np.int64)
+        rows = order[np.sort(np.unique(cell, axis=0, return_index=True)[1])] if len(order) else order
+        return Feet(self.points[rows], self.normals[rows], self.triangle[rows], self.depth[rows])
 
 
 def turning_feet(tree: TriangleTree, moves: Moves, tools: Sequence[ToolBody], tolerance: float) -> Feet:
@@ -54,15 +65,34 @@ def turning_feet(tree: TriangleTree, moves: Moves, tools: Sequence[ToolBody], to
     -----
     The deepest place on a rim of radius R is searched from 16 places round it, to R / 300. A ball has one sphere.
     """
-    found = [_pressed(tree, *_poses(moves, k, tool, tree.mesh.bounds), tool, CLOSER_SHARE * tolerance)
-             for k, tool in enumerate(tools) if tool.cone_height <= 0.0]
+    found = []
+    least = CLOSER_SHARE * tolerance
+    for k, tool in enumerate(tools):
+        if tool.cone_height <= 0.0:
+            rows, share = _corners(moves, k)
+            found += [_pressed(tree, *_placed(moves, rows, share, tool, tree.mesh.bounds), tool, lift, least)
+                      for lift in _lifts(tool)]
+        if tool.cone_height <= 0.0 and not _seen(tool, least, tolerance):
+            rows, share = _ways(moves, k, tool, tree.mesh.bounds)
+            found.append(_pressed(tree, *_placed(moves, rows, share, tool, tree.mesh.bounds), tool, 0.0, least))
+    return _joined(found).thinned()
+
+
+def _joined(parts: Sequence[Feet]) -> Feet:
     none = np.zeros((0, 3))
-    return Feet(np.concatenate([none, *(f.points for f in found)]), np.concatenate([none, *(f.normals for f in found)]),
-                np.concatenate([np.zeros(0, np.int64), *(f.triangle for f in found)]))
+    return Feet(np.concatenate([none, *(f.points for f in parts)]), np.concatenate([none, *(f.normals for f in parts)]),
+                np.concatenate([np.zeros(0, np.int64), *(f.triangle for f in parts)]),
+                np.concatenate([np.zeros(0), *(f.depth for f in parts)]))
 
 
-def _poses(moves: Moves, k: int, tool: ToolBody, bounds: F64) -> tuple[F64, F64]:
-    """Tips and axes, (n, 3) mm and unit, at which the end of a tool is looked at."""
+def _seen(tool: ToolBody, least: float, tolerance: float) -> bool:
+    """Whether every cut of a ball that is too deep covers a guard point by more than ``least`` mm."""
+    round_ = tool.corner_radius >= tool.radius - 1e-12
+    return round_ and 0.5 * (0.87 * GUARD_SPACING) ** 2 / tool.radius + least < tolerance
+
+
+def _corners(moves: Moves, k: int) -> tuple[INT, F64]:
+    """Moves of a tool that end, or begin, at a corner of the path, and the share of the move that is: 1 or 0."""
     way = moves.end - moves.start
     length = np.linalg.norm(way, axis=1)
     way = way / np.maximum(length, 1e-12)[:, None]
@@ -70,13 +100,24 @@ def _poses(moves: Moves, k: int, tool: ToolBody, bounds: F64) -> tuple[F64, F64]
     joined = feed[:-1] & feed[1:] & (np.einsum("ij,ij->i", way[:-1], way[1:]) > CORNER)
     ends = np.flatnonzero(feed & ~np.append(joined, False))
     starts = np.flatnonzero(feed & ~np.append(False, feed[:-1]))
-    row, share = np.concatenate([ends, starts]), np.concatenate([np.ones(len(ends)), np.zeros(len(starts))])
-    if tool.radius < GUARD_SPACING:
-        own = np.flatnonzero(feed)
-        count = np.ceil(length[own] / STEP).astype(np.int64)
-        nth = np.arange(int(count.sum())) - np.repeat(np.cumsum(count) - count, count)
-        row = np.concatenate([row, np.repeat(own, count)])
-        share = np.concatenate([share, nth / np.repeat(np.maximum(count, 1), count)])
+    return np.concatenate([ends, starts]), np.concatenate([np.ones(len(ends)), np.zeros(len(starts))])
+
+
+def _ways(moves: Moves, k: int, tool: ToolBody, bounds: F64) -> tuple[INT, F64]:
+    """Even places along the feed moves of a tool that come near the part: moves, and shares of them."""
+    low, high = np.minimum(moves.start, moves.end), np.maximum(moves.start, moves.end)
+    near = ((low < bounds[1] + tool.radius) & (high > bounds[0] - tool.radius)).all(axis=1)
+    rows = np.flatnonzero(moves.feed & (moves.tool == k) & near)
+    length = np.linalg.norm(moves.end[rows] - moves.start[rows], axis=1)
+    past = np.cumsum(length)
+    most = MOST_BALLS if tool.corner_radius >= tool.radius - 1e-12 else MOST_RINGS
+    at = np.arange(0.0, past[-1], max(STEP, past[-1] / most)) if len(rows) and past[-1] > 0.0 else np.zeros(0)
+    own = np.minimum(np.searchsorted(past, at, side="right"), len(rows) - 1)
+    return rows[own], 1.0 - (past[own] - at) / np.maximum(length[own], 1e-12) if len(at) else at
+
+
+def _placed(moves: Moves, row: INT, share: F64, tool: ToolBody, bounds: F64) -> tuple[F64, F64]:
+    """Tips and axes, (n, 3) mm and unit, at shares of moves, where the end of the tool can reach the part."""
     tip = moves.start[row] + share[:, None] * (moves.end - moves.start)[row]
     axis = np.tile([0.0, 0.0, 1.0], (len(row), 1))
     if moves.axes is not None:
@@ -88,14 +129,10 @@ def _poses(moves: Moves, k: int, tool: ToolBody, bounds: F64) -> tuple[F64, F64]
     return both[:, :3], both[:, 3:]
 
 
-def _pressed(tree: TriangleTree, tip: F64, axis: F64, tool: ToolBody, least: float) -> Feet:
-    """The deepest place of each pose (n, 3) that presses in by more than ``least`` mm."""
-    out = []
-    for i in range(0, len(tip), BATCH):
-        out += [_deepest(tree, tip[i:i + BATCH], axis[i:i + BATCH], tool, lift, least) for lift in _lifts(tool)]
-    none = np.zeros((0, 3))
-    return Feet(np.concatenate([none, *(f.points for f in out)]), np.concatenate([none, *(f.normals for f in out)]),
-                np.concatenate([np.zeros(0, np.int64), *(f.triangle for f in out)]))
+def _pressed(tree: TriangleTree, tip: F64, axis: F64, tool: ToolBody, lift: float, least: float) -> Feet:
+    """The deepest place of each pose (n, 3) that presses in by more than ``least`` mm, on a rim ``lift`` mm up."""
+    return _joined([_deepest(tree, tip[i:i + BATCH], axis[i:i + BATCH], tool, lift, least)
+                    for i in range(0, len(tip), BATCH)])
 
 
 def _lifts(tool: ToolBody) -> tuple[float, ...]:
@@ -141,4 +178,4 @@ def _deepest(tree: TriangleTree, tip: F64, axis: F64, tool: ToolBody, lift: floa
             angle[at] = turned[better]
         span *= 0.5
     rows = rows[deep[rows] > least]
-    return Feet(foot[rows], way[rows], triangle[rows])
+    return Feet(foot[rows], way[rows], triangle[rows], deep[rows])

@@ -56,6 +56,16 @@ def test_a_path_that_goes_on_gives_none_and_neither_does_one_that_stays_within_t
     assert not len(turning_feet(slope(), moves(tip + [0, 0, 2.0], tip, tip + [0, 0, 2.0]), [body], 0.01).points)
 
 
+def test_the_depths_are_those_of_the_dips():
+    body, depths = tool(1.0, 0.5), [0.02, 0.05, 0.011]
+    tips = [tip_of(body, d, y=3.0 * k) for k, d in enumerate(depths)]
+    path = [p for tip in tips for p in (tip + [0, 0, 2.0], tip, tip + [0, 0, 2.0])]
+    feet = turning_feet(slope(), moves(*path), [body], 0.01)
+    own = [feet.depth[np.abs(feet.points[:, 1] - 3.0 * k) < 0.1].max() for k in range(3)]
+    assert own == pytest.approx(depths, abs=1e-6)
+    assert (np.diff(feet.depth) <= 0.0).all()
+
+
 def test_a_thin_tool_is_followed_along_its_way():
     body = tool(0.12, 0.06)
     row = [tip_of(body, 0.02, y=y) for y in (-0.5, 0.5)]
