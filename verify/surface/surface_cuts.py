@@ -23,6 +23,7 @@ from verify.model import Finding, ProofSetup, ScoredSamples
 from verify.moves import Moves
 from verify.progress import Report
 from verify.surface.between_samples import ClosePoints, close_points, judged_places
+from verify.surface.cutter_ends import tip_gouges, turning_feet
 from verify.surface.excluded_faces import CutPlaces, excluded_cuts
 from verify.surface.guard_points import (
     CLOSER_SHARE,
@@ -37,8 +38,6 @@ from verify.surface.guard_points import (
 from verify.surface.remains import Rays, Remains, depths_both_ways
 from verify.surface.removal import residual_on_normals
 from verify.surface.sample_scores import RAY_ERROR
-from verify.surface.tip_gouges import tip_gouges
-from verify.surface.turning_ends import turning_feet
 
 MIN_REACH = 1.0
 

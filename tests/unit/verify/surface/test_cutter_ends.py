@@ -8,7 +8,7 @@ import pytest
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import prism, terraces, tool
 from verify.moves import Moves
-from verify.surface.turning_ends import turning_feet
+from verify.surface.cutter_ends import turning_feet
 
 DEG = 20.0
 WIDE = 30.0
