@@ -112,7 +112,7 @@ def level(part: str, rng: Rng) -> tuple[float, float, float]:
         if rng.random() < 0.5:
             r = float(rng.uniform(0.0, BOSS - R - 0.5))
             return r * math.cos(a), r * math.sin(a), BOSS_TOP
-        r = float(rng.uniform(BOSS + R + 0.3, BOSS + R + 1.0))
+        r = float(rng.uniform(BOSS + R + 1.2, BOSS + R + 1.6))
         return r * math.cos(a), r * math.sin(a), BOSS_FOOT
     if part == "pocket":
         return float(rng.uniform(-4, 4)), float(rng.uniform(-2.5, 2.5)), POCKET_FLOOR

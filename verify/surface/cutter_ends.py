@@ -31,6 +31,7 @@ MOST_RINGS, MOST_BALLS = 50_000, 400_000  # places along the ways of a tool; mor
 AROUND = 16  # places round the rim of an end
 ROUNDS = 4  # of the search round the deepest of them
 LIFT, LIFT_SHARE = 0.05, 0.25  # mm, and of the radius: a second rim over the sharp one, for walls
+TOLD = 0.5  # mm: a wider step along the ways is a note
 THIN = 0.05  # mm
 BATCH = 4096  # poses
 INT = NDArray[np.int64]
@@ -57,18 +58,21 @@ class Feet:
         return Feet(self.points[rows], self.normals[rows], self.triangle[rows], self.depth[rows])
 
 
-def turning_feet(tree: TriangleTree, moves: Moves, tools: Sequence[ToolBody], tolerance: float) -> Feet:
+def turning_feet(tree: TriangleTree, moves: Moves, tools: Sequence[ToolBody],
+                 tolerance: float) -> tuple[Feet, list[str]]:
     """Places of the surface into which ends of cutters press where paths turn.
 
     tree      : TriangleTree of the part
     tools     : those that ``Moves.tool`` refers to
     tolerance : mm, gouge tolerance; ends that press in by less than 0.4 of it give nothing
 
+    Returns Feet, the deepest first, and notes on tools whose ways are so long that few of their places are looked at.
+
     Notes
     -----
     The deepest place on a rim of radius R is searched from 16 places round it, to R / 300. A ball has one sphere.
     """
-    found = []
+    found, notes = list[Feet](), list[str]()
     least = CLOSER_SHARE * tolerance
     for k, tool in enumerate(tools):
         if tool.cone_height <= 0.0:
@@ -76,9 +80,12 @@ def turning_feet(tree: TriangleTree, moves: Moves, tools: Sequence[ToolBody], to
             found += [_pressed(tree, *_placed(moves, rows, share, tool, tree.mesh.bounds), tool, lift, least)
                       for lift in _lifts(tool)]
         if tool.cone_height <= 0.0 and not _seen(tool, least, tolerance):
-            rows, share = _ways(moves, k, tool, tree.mesh.bounds)
+            rows, share, step = _ways(moves, k, tool, tree.mesh.bounds)
+            if step > TOLD:
+                notes.append(f"the ways of {tool.id} are long: its end is checked every {step:.1f} mm and at corners; a "
+                             "smooth dip may lie in between")
             found.append(_pressed(tree, *_placed(moves, rows, share, tool, tree.mesh.bounds), tool, 0.0, least))
-    return _joined(found).thinned()
+    return _joined(found).thinned(), notes
 
 
 def _joined(parts: Sequence[Feet]) -> Feet:
@@ -106,17 +113,20 @@ def _corners(moves: Moves, k: int) -> tuple[INT, F64]:
     return np.concatenate([ends, starts]), np.concatenate([np.ones(len(ends)), np.zeros(len(starts))])
 
 
-def _ways(moves: Moves, k: int, tool: ToolBody, bounds: F64) -> tuple[INT, F64]:
-    """Even places along the feed moves of a tool that come near the part: moves, and shares of them."""
+def _ways(moves: Moves, k: int, tool: ToolBody, bounds: F64) -> tuple[INT, F64, float]:
+    """Even places along the feed moves of a tool that come near the part: moves, shares of them, and mm between two."""
     low, high = np.minimum(moves.start, moves.end), np.maximum(moves.start, moves.end)
     near = ((low < bounds[1] + tool.radius) & (high > bounds[0] - tool.radius)).all(axis=1)
     rows = np.flatnonzero(moves.feed & (moves.tool == k) & near)
     length = np.linalg.norm(moves.end[rows] - moves.start[rows], axis=1)
     past = np.cumsum(length)
     most = MOST_BALLS if tool.corner_radius >= tool.radius - 1e-12 else MOST_RINGS
-    at = np.arange(0.0, past[-1], max(STEP, past[-1] / most)) if len(rows) and past[-1] > 0.0 else np.zeros(0)
+    if not len(rows) or past[-1] <= 0.0:
+        return np.zeros(0, np.int64), np.zeros(0), STEP
+    step = max(STEP, float(past[-1]) / most)
+    at = np.arange(0.0, past[-1], step)
     own = np.minimum(np.searchsorted(past, at, side="right"), len(rows) - 1)
-    return rows[own], 1.0 - (past[own] - at) / np.maximum(length[own], 1e-12) if len(at) else at
+    return rows[own], 1.0 - (past[own] - at) / np.maximum(length[own], 1e-12), step
 
 
 def _placed(moves: Moves, row: INT, share: F64, tool: ToolBody, bounds: F64) -> tuple[F64, F64]:

@@ -141,7 +141,7 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
                            lambda f: tell(0.75 + 0.05 * f))
     even = len(table)
     tree = TriangleTree(part.mesh)
-    feet = turning_feet(tree, moves, tools, setup.gouge_tolerance)
+    feet, notes = turning_feet(tree, moves, tools, setup.gouge_tolerance)
     if len(feet.triangle):
         table += shot.rays(feet.points, feet.normals, part.mesh.face_ids[feet.triangle], np.zeros(len(feet.triangle)),
                            lambda f: tell(0.8 + 0.05 * f), full=True)
@@ -156,7 +156,7 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
         _in_allowance(table, (row < on_edge) | ((row >= first) & (row < even)), setup, source),
         _excluded(table, slice(len(s), on_edge), part.mesh, shot, source),
         max([float(-table.residual.min(initial=0.0)), 0.0, *(f.depth for f in tips)]), guard.points, edge, close,
-        table.residual[first:even], shot.reach, guard_notes(part.mesh, left_out))
+        table.residual[first:even], shot.reach, [*guard_notes(part.mesh, left_out), *notes])
 
 
 def _deepened(table: _Table, part: Part, tree: TriangleTree, even: int, shot: _Shooting,
