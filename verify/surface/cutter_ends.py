@@ -82,8 +82,8 @@ def turning_feet(tree: TriangleTree, moves: Moves, tools: Sequence[ToolBody],
         if tool.cone_height <= 0.0 and not _seen(tool, least, tolerance):
             rows, share, step = _ways(moves, k, tool, tree.mesh.bounds)
             if step > TOLD:
-                notes.append(f"the ways of {tool.id} are long: its end is checked every {step:.1f} mm and at corners; a "
-                             "smooth dip may lie in between")
+                notes.append(f"the ways of {tool.id} are long: its end is checked every {step:.1f} mm and at corners; "
+                             "a smooth dip may lie in between")
             found.append(_pressed(tree, *_placed(moves, rows, share, tool, tree.mesh.bounds), tool, 0.0, least))
     return _joined(found).thinned(), notes
 
