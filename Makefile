@@ -14,7 +14,7 @@ PIP_OPTIONS = install --disable-pip-version-check --progress-bar off
 INSTALL = $(if $(UV),uv pip install --no-progress --python $(BIN)/python,$(BIN)/python -m pip $(PIP_OPTIONS))
 SHOW := $(PYTHON) .ci/progress.py
 
-.PHONY: setup hooks peers check types test test-cov test-slow limits test-runtime soak image clients audit kernels golden bench docs demo serve lock third-party clean
+.PHONY: setup hooks peers check types test test-cov test-slow limits test-runtime soak image clients audit kernels golden bench bench-jobs docs demo serve lock third-party clean
 
 # The page wants Node 20.19 or newer with npm; where there is none, that of a wheel is put into .venv.
 PAGE := service/page/index.html
@@ -133,6 +133,10 @@ golden: $(STAMP)
 
 bench: $(BENCH_STAMP)
 	@for script in benchmarks/*/bench_*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+
+# Whole jobs by stage, beside the code of another commit: make bench-jobs BEFORE=COMMIT JOBS="demo plate".
+bench-jobs: $(STAMP)
+	$(BIN)/python benchmarks/jobs/jobs_before_after.py $(JOBS) $(if $(BEFORE),--before $(BEFORE))
 
 # The documentation is Markdown read in place; this proves that no link in it is dead.
 docs: $(STAMP)
