@@ -23,6 +23,7 @@ from verify.model import Finding, ProofSetup, ScoredSamples
 from verify.moves import Moves
 from verify.progress import Report
 from verify.surface.between_samples import ClosePoints, close_points, judged_places
+from verify.surface.cutter_ends import tip_gouges, turning_feet
 from verify.surface.excluded_faces import CutPlaces, excluded_cuts
 from verify.surface.guard_points import (
     CLOSER_SHARE,
@@ -37,7 +38,6 @@ from verify.surface.guard_points import (
 from verify.surface.remains import Rays, Remains, depths_both_ways
 from verify.surface.removal import residual_on_normals
 from verify.surface.sample_scores import RAY_ERROR
-from verify.surface.tip_gouges import tip_gouges
 
 MIN_REACH = 1.0
 
@@ -140,7 +140,12 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
         table += shot.rays(close.points, close.normals, s.face[close.row], np.zeros(len(close.row)),
                            lambda f: tell(0.75 + 0.05 * f))
     even = len(table)
-    table, left_out = _deepened(table, part, shot, lambda f: tell(0.8 + 0.2 * f))
+    tree = TriangleTree(part.mesh)
+    feet, notes = turning_feet(tree, moves, tools, setup.gouge_tolerance)
+    if len(feet.triangle):
+        table += shot.rays(feet.points, feet.normals, part.mesh.face_ids[feet.triangle], np.zeros(len(feet.triangle)),
+                           lambda f: tell(0.8 + 0.05 * f), full=True)
+    table, left_out = _deepened(table, part, tree, even, shot, lambda f: tell(0.85 + 0.15 * f))
     gouged = np.flatnonzero((table.residual < -setup.gouge_tolerance - RAY_ERROR) & (table.mover >= 0))
     tips = tip_gouges(part.mesh, moves, tools, source, setup.gouge_tolerance + RAY_ERROR)
     row = np.arange(len(table))  # the stock on an edge belongs to two faces, so an edge has no allowance
@@ -151,16 +156,16 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
         _in_allowance(table, (row < on_edge) | ((row >= first) & (row < even)), setup, source),
         _excluded(table, slice(len(s), on_edge), part.mesh, shot, source),
         max([float(-table.residual.min(initial=0.0)), 0.0, *(f.depth for f in tips)]), guard.points, edge, close,
-        table.residual[first:even], shot.reach, guard_notes(part.mesh, left_out))
+        table.residual[first:even], shot.reach, [*guard_notes(part.mesh, left_out), *notes])
 
 
-def _deepened(table: _Table, part: Part, shot: _Shooting, tell: Report) -> tuple[_Table, int]:
+def _deepened(table: _Table, part: Part, tree: TriangleTree, even: int, shot: _Shooting,
+              tell: Report) -> tuple[_Table, int]:
     """More rays round the places that are cut, and the depths of all gouges; and how many places were left out."""
-    tolerance, even = shot.setup.gouge_tolerance, len(table)
+    tolerance = shot.setup.gouge_tolerance
     near = np.flatnonzero((table.residual < -CLOSER_SHARE * tolerance) & (table.mover >= 0))
     if not len(near):
         return table, 0
-    tree = TriangleTree(part.mesh)
     seeds, left_out = closer_seeds(table.points[near], table.residual[near], table.mover[near], SURE * tolerance)
     points, normals, row = closer_points(tree, seeds)
     table += shot.rays(points, normals, part.mesh.face_ids[row], np.zeros(len(row)), lambda f: tell(0.5 * f), full=True)
