@@ -11,13 +11,13 @@ from schemas.zones import Remainder, Share, ZoneFacts, Zones
 
 Findings = Annotated[list[Any], Field(
     description="Findings of the proof, then those of the whole job; empty in state proved. kind: collision, gouge, "
-                "allowance, excluded_face, rapid, plunge, load, rubbing, engagement, support, limit, program, residual or "
-                "stock_left; of the whole job: nothing_cut or coverage. message: the finding in one sentence. program, line: place "
-                "in the programs; line 0: no line causes it. zone, face: ids, or null. point: worst place, mm, setup "
-                "frame, or null. tip: the tool tip there, or null. depth, limit: measured and allowed value, in the "
-                "unit of message. near: true: nothing touches, and depth is the distance. count, area: number and "
-                "area, mm2, of the merged places. A stock_left, only in a verification, also has height (mm, the same "
-                "as depth) and lines (those that left the stock).")]
+                "allowance, excluded_face, rapid, plunge, load, rubbing, engagement, support, limit, program, "
+                "residual or stock_left; of the whole job: nothing_cut, load or coverage. message: the finding in one "
+                "sentence. program, line: place in the programs; line 0: no line causes it. zone, face: ids, or null. "
+                "point: worst place, mm, setup frame, or null. tip: the tool tip there, or null. depth, limit: "
+                "measured and allowed value, in the unit of message. near: true: nothing touches, and depth is the "
+                "distance. count, area: number and area, mm2, of the merged places. A stock_left, only in a "
+                "verification, also has height (mm, the same as depth) and lines (those that left the stock).")]
 
 
 class Inputs(ReportModel):

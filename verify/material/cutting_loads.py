@@ -73,8 +73,8 @@ def cut_sequence(read: Sequence[FramedProgram], known: NDArray[np.bool_], run: S
                  spacing: float) -> CutSequence:
     """The moves of a proof with their feeds, speeds and times.
 
-    known : (n,) bool, which moves of the programs the proof counts
-    stretches, of : as ``verify.material.engagement.in_parts``
+    known     : (n,) bool, which moves of the programs the proof counts
+    stretches : (p,) parts of moves, as ``verify.material.engagement.in_parts``; of : (p,) int64, index, move of each
     took  : (m,) float64, min, time of each counted move; spacing : mm, of the stock
     """
     programs = [r.program for r in read]
