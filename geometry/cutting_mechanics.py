@@ -23,8 +23,9 @@ from geometry.tool_body import ToolBody
 
 CARBIDE = 600e3
 """N/mm2, modulus of cemented carbide."""
-STRENGTH = 4000.0
-"""N/mm2, bending stress at which rods of cemented carbide break (transverse rupture strength, ISO 3327)."""
+STRENGTH, ROD, SIZE_EXPONENT = 4000.0, 3.3, 0.25
+"""N/mm2, bending stress at which rods of cemented carbide break (transverse rupture strength, ISO 3327); the diameter
+of such a rod, mm; and how the strength falls with the diameter: 3 / m for a Weibull modulus m of 12 [Weibull1951]."""
 CORE = 0.8
 """Diameter of a solid bar as stiff as the flutes, of the diameter of the cutter."""
 
@@ -44,24 +45,36 @@ def compliance(tool: ToolBody, modulus: float = CARBIDE) -> float:
     return total
 
 
-def bending_stress(tool: ToolBody, force: float, depth: float) -> float:
-    """Largest bending stress in a tool held at the nose of its holder, N/mm2 [Timoshenko1955].
+def strength(diameter: float) -> float:
+    """Bending stress at which a round bar of cemented carbide breaks, N/mm2: larger bars have larger flaws.
+
+    diameter : mm
+
+    >>> strength(3.3), round(strength(8.0))
+    (4000.0, 3206)
+    """
+    return STRENGTH * float((ROD / diameter) ** SIZE_EXPONENT)
+
+
+def bending_stress(tool: ToolBody, force: float, depth: float) -> tuple[float, float]:
+    """Bending stress in a tool held at the nose of its holder, and the strength there, N/mm2 [Timoshenko1955].
 
     force : N, square to the axis, spread evenly over the cut; depth : mm, of the cut
 
     The moment at the height z is F (z - a / 2), and the stress of a round bar 32 M / (pi d^3). It is greatest at the
-    upper end of flutes, neck or shank. Flutes count as a bar of ``CORE`` of the diameter.
+    upper end of flutes, neck or shank; that of the largest share of the strength counts. Flutes count as a bar of
+    ``CORE`` of the diameter.
 
     >>> rod = ToolBody("T1", 1, 8.0, 0.0, 20.0, 8.0, 20.0, 8.0, 35.0)
-    >>> round(bending_stress(rod, 1000.0, 10.0), 3)
-    596.831
+    >>> [round(x) for x in bending_stress(rod, 1000.0, 10.0)]
+    [597, 3206]
     """
-    most, low = 0.0, 0.0
+    worst, low = (0.0, STRENGTH), 0.0
     for top, wide in _bars(tool):
         if top > low:
-            most = max(most, 32.0 * force * max(top - 0.5 * depth, 0.0) / (math.pi * wide**3))
-            low = top
-    return most
+            here = 32.0 * force * max(top - 0.5 * depth, 0.0) / (math.pi * wide**3), strength(wide)
+            worst, low = max(worst, here, key=lambda pair: pair[0] / pair[1]), top
+    return worst
 
 
 def _bars(tool: ToolBody) -> tuple[tuple[float, float], ...]:
@@ -132,5 +145,5 @@ def cutting_forces(kc: float, mc: float, per_tooth: F64, depth: F64, width: F64,
     return np.asarray(np.maximum(1.0, flutes * phi / (2.0 * math.pi)) * edge * chip**(1.0 - mc) * kc)
 
 
-__all__ = ["CARBIDE", "CORE", "STRENGTH", "bending_stress", "compliance", "cutting_force", "cutting_forces",
-           "effective_diameter", "engaged_angle"]
+__all__ = ["CARBIDE", "CORE", "bending_stress", "compliance", "cutting_force", "cutting_forces", "effective_diameter",
+           "engaged_angle", "strength"]

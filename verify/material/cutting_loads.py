@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.cutting_mechanics import STRENGTH, bending_stress, compliance, cutting_forces, effective_diameter
+from geometry.cutting_mechanics import bending_stress, compliance, cutting_forces, effective_diameter
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from verify.checks.program_sequence import FramedProgram
@@ -186,14 +186,17 @@ class _Judge:
             return [], cautions
         force = cutting_forces(said.kc, said.mc, per_tooth[turns], depth, section / depth, tool, said.flutes)
         bend = force * compliance(tool)
-        stress = np.array([bending_stress(tool, f, a) for f, a in zip(force.tolist(), depth.tolist(), strict=True)])
+        stress, strong = np.array([bending_stress(tool, *pair) for pair in zip(force.tolist(), depth.tolist(),
+                                                                               strict=True)]).T
 
         def cut(i: int) -> str:
             return (f"T{tool.number}: its cut of {depth[i]:.2f} mm depth and {section[i] / depth[i]:.2f} mm width at "
                     f"F{cuts.feed[last[i]]:.6g}")
-        findings, _ = self._over(last, stress, STRENGTH, math.inf, "load", lambda value, i:
-                                 f"{cut(i)} bends it with {value:.0f} N/mm²",
-                                 f"cemented carbide breaks at {STRENGTH:.0f} N/mm²", "", "cut in layers or feed slower")
+        findings, _ = self._over(last, stress / strong, 1.0, math.inf, "load", lambda share, i:
+                                 f"{cut(i)} bends it with {share * strong[i]:.0f} N/mm²",
+                                 "cemented carbide of that diameter breaks", "", "cut in layers or feed slower")
+        limit = float(strong[int(np.argmax(stress / strong))])
+        findings = [replace(f, depth=f.depth * limit, limit=limit) for f in findings]
         _, bent = self._over(last, bend, math.inf, said.bend, "deflection", lambda value, i:
                              f"{cut(i)} would bend its tip by {value:.3f} mm", "", f"limit {said.bend:.3f} mm",
                              "cut in layers, feed slower, or use a shorter or thicker tool")
