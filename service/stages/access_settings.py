@@ -83,7 +83,7 @@ def proof_setup(job: JobPart, view: View | ProofFrame, *, foreign: bool = False)
         clearance_shank=c.shank, clearance_holder=c.holder, clearance_rapid=c.rapid,
         scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,
         stock_allowance=q.stock_allowance_mm, ramp_angle=RAMP_ANGLE, ramp_angles=inputs.ramp_angles(foreign=foreign),
-        cores=inputs.cores,
+        cores=inputs.cores, cutting=inputs.cutting,
         rapid_feed=inputs.rates.rapid, acceleration=inputs.rates.acceleration,
         work_offset=access_of(job, view).work_offset,
         travel=None if machine.travel_mm is None else np.array(machine.travel_mm, dtype=np.float64),
