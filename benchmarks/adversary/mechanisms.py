@@ -19,8 +19,5 @@ NOT_YET = {
     "rapid over face": "the rapid clearance does not hold upward",
     "empty spindle": "a spindle without a tool has no nose",
     "longer tool at top": "where a tool is changed is not known",
-    "chip too thick": "chips are not counted in programs of others",
-    "deep slot": "bending is not computed in programs of others",
-    "surface speed": "cutting speed is not held against a bound",
 }
 """Mechanisms of which some cases are still called proved, or refused where they are good, with the reason."""
