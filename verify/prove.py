@@ -124,7 +124,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     angle = engaged_angles(run.engaged, stretches, tools)
     again, springs = repeats(moves, run.cut, source, _finishes(cuts, setup, len(moves)))
     findings = [*contact_findings(run.events, moves, source, setup.clearance_rapid, skins),
-                *cuts.gouges, *cuts.excluded, *_program_findings(framed), *(f for p in framed for f in p.findings(tools)),
+                *cuts.gouges, *cuts.excluded, *_program_findings(framed),
+                *(f for p in framed for f in p.findings(tools)),
                 *table_findings([p.program for p in framed], tools, setup),
                 *_idle_findings(framed, run, moves, source, [t for t in fine if t.cone_height <= 0.0], asked),
                 *again, *sideways_findings(moves, run.cut, tools, source),
@@ -141,7 +142,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
         work, left = work_done(asked, measured, cutting, run.cut, source, unread)
         findings += [*cuts.allowance, *left, *deep_findings(scored.samples, cuts.residual, cuts.mover, cutting, source)]
     notes = [f"{run.lost} contacts are not listed: the tables are full"] if run.lost else []
-    notes.extend([*cuts.notes, *springs])
+    notes.extend(springs)
     notes.extend(f"T{t.number} is so thin that a plunge may stay unseen: the stock is sampled every "
                  f"{met.spacing:.3f} mm" for t in fine)
     if met.dip > DIP + 1e-9:
@@ -152,7 +153,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     proof = _proof(findings, cuts, run, framed, moves, source, setup, scored, zone_ids,
                    engagements(angle, stretches, tools), met.spacing, tuple(notes), support)
     proof = replace(proof, assumed=in_order(
-        [*setup.assumed, *program_assumptions(framed, tools, setup, stated)]))
+        [*setup.assumed, *program_assumptions(framed, tools, setup, stated), *cuts.assumed]))
     return proof if work is None else replace(proof, work=work)
 
 

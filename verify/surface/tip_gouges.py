@@ -1,16 +1,19 @@
-"""Gouges by the points of drills and pointed chamfer mills: their tips inside the part.
+"""Gouges by the ends of tools: the points of drills and pointed chamfer mills, and the ends of mills in narrow pits.
 
-The surface below a point is the farthest from it where a hole ends in a cone: no normal of the cone leads there. So the
-depth of a tip is its own distance from the part. Coordinates are float64, mm, in the frame of the proof.
+The surface below a point is the farthest from it where a hole ends in a cone: no normal of the cone leads there. No
+normal of a slope leads to the end of a pit in it either. So the depth of an end is its own distance from the surface.
+Coordinates are float64, mm, in the frame of the proof.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from geometry.mesh import TriangleMesh
+from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.nearest import nearest
 from geometry.mesh_queries.rays import first_hits
@@ -18,6 +21,12 @@ from geometry.tool_body import ToolBody
 from verify.findings import Source, gouge_findings
 from verify.model import Finding
 from verify.moves import Moves
+from verify.surface.guard_points import PATH_BATCH, inside_part, path_places
+from verify.tool_axes import square_to
+
+AROUND = 8  # places of each ring of an end
+TILTS = (0.0, 0.25 * math.pi, 0.5 * math.pi)  # of rings on a corner, from its lowest place to its side
+INT = NDArray[np.int64]
 
 
 def tip_gouges(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], source: Source,
@@ -38,4 +47,62 @@ def tip_gouges(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], sour
                           rows[which[inside]].astype(np.int32), source, tolerance)
 
 
-__all__ = ["tip_gouges"]
+def end_depths(tree: TriangleTree, moves: Moves, rows: INT, tools: Sequence[ToolBody],
+               tolerance: float) -> tuple[F64, F64, INT]:
+    """How deep the ends of mills go into the part on some moves.
+
+    rows      : (k,) int64, index, the moves; tools : those that ``Moves.tool`` refers to
+    tolerance : mm; what is less deep counts 0
+
+    Returns
+    -------
+    depth    : (k,) float64, mm, largest distance of a place of the end, inside the part, from the surface
+    place    : (k, 3) float64, mm, setup frame, the place of the surface nearest to it
+    triangle : (k,) int64, index of its triangle, -1 where the depth is 0
+
+    Notes
+    -----
+    Places are the middle of the end and eight on its rim, of a corner eight at each of three heights, in steps of half
+    a radius along the move and at both ends of it. Too small by 8 % of the radius at most on a move straight down.
+    """
+    depth, place, triangle = np.zeros(len(rows)), np.zeros((len(rows), 3)), np.full(len(rows), -1, np.int64)
+    radius = np.array([t.radius for t in tools])[moves.tool[rows]]
+    count = np.ceil(np.linalg.norm((moves.end - moves.start)[rows], axis=1) / (0.5 * radius)).astype(np.int64) + 1
+    ends = np.cumsum(count)
+    first = 0
+    while first < len(rows):
+        last = max(int(np.searchsorted(ends, ends[first] - count[first] + PATH_BATCH, side="right")), first + 1)
+        chosen = rows[first:last]
+        tip, z, of = path_places(moves.only(chosen), count[first:last])
+        tool = moves.tool[chosen][of]
+        for k in np.unique(tool).tolist():
+            mine = np.flatnonzero(tool == k)
+            for at in _end_places(tip[mine], z[mine], tools[k]):
+                away, row, foot = nearest(tree, at)
+                deep = np.flatnonzero(away > np.maximum(depth[first:last][of[mine]], tolerance))
+                deep = deep[inside_part(tree, at[deep])]
+                deep = deep[np.lexsort((deep, -away[deep], of[mine[deep]]))]
+                move, one = np.unique(of[mine[deep]], return_index=True)
+                best = deep[one]
+                depth[first + move], place[first + move], triangle[first + move] = away[best], foot[best], row[best]
+        first = last
+    return depth, place, triangle
+
+
+def _end_places(tip: F64, z: F64, tool: ToolBody) -> list[F64]:
+    """Places of the end of a tool with its tip on (n, 3), mm, and its axis along (n, 3): each an (n, 3) array."""
+    out = [tip]
+    if tool.cone_height > 0.0:
+        return out
+    x = square_to(z)
+    y = np.cross(z, x)
+    corner = tool.corner_radius
+    for tilt in TILTS if corner > 0.0 else TILTS[:1]:
+        wide, high = tool.radius - corner * (1.0 - math.sin(tilt)), corner * (1.0 - math.cos(tilt))
+        if wide > 0.0:
+            out += [tip + wide * (math.cos(t) * x + math.sin(t) * y) + high * z
+                    for t in (2.0 * math.pi * np.arange(AROUND) / AROUND).tolist()]
+    return out
+
+
+__all__ = ["end_depths", "tip_gouges"]
