@@ -80,6 +80,6 @@ function cautionList(h: ViewHead, onPlace: (point: P3) => void): HTMLElement {
 function assumedList(assumed: ViewAssumption[]): HTMLElement {
   const list = el("ul", { class: "cautions" });
   for (const a of assumed)
-    add(list, el("li", {}, el("strong", {}, spaced(a.what)), ` taken to be ${a.value}. Otherwise ${a.effect}. Remedy: ${a.remedy}.`));
+    add(list, el("li", {}, el("strong", {}, spaced(a.what)), `: ${a.value}. Otherwise ${a.effect}. Remedy: ${a.remedy}.`));
   return el("div", {}, el("p", { class: "hint" }, "Neither setup nor program states this. Check it on your machine."), list);
 }
