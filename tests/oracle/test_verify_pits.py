@@ -13,7 +13,7 @@ from verify.model import FindingKind, ProofSetup, ScoredSamples
 from verify.prove import prove
 
 SETUP = ProofSetup(stock_kind="box", margin=0.5, uncertainty=0.0, clearance_rapid=0.2)
-HEAD = ["%", "G21 G90 G17 G94 G40 G49 G54", "T1 M6", "S20000 M3", "G0 G43 H1 Z40"]
+HEAD = ["%", "G21 G90 G17 G94 G40 G49 G61 G54", "T1 M6", "S20000 M3", "G0 G43 H1 Z40"]
 PARTS = {"block": lambda: block(), "dome": lambda: as_part(dome(15.0)),
          "waves": lambda: as_part(slope_field(lambda x, y: 0.8 * np.sin(x) + 0.3 * y))}
 COUNT = 20

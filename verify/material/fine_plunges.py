@@ -39,8 +39,8 @@ def fine_plunges(moves: Moves, tools: Sequence[ToolBody], fine: Sequence[ToolBod
 
     Notes
     -----
-    A descent is a plunge where it is the first move that leaves less than s over its end. Small steps are one too: where
-    less than 3 s was left first by a steep descent, and ramps could have earned less than 2 s since.
+    A descent is a plunge where it is the first move that leaves less than s over its end. Small steps are one too, if a
+    steep descent was the first to leave less than 3 s there, and ramps could have earned less than 2 s since.
     """
     steep, earned = descents(moves, tools, setup)
     rows = np.flatnonzero(steep & np.isin(moves.tool, [k for k, t in enumerate(tools) if t in fine]))

@@ -11,7 +11,7 @@ from verify.model import FindingKind, ScoredSamples
 from verify.prove import prove
 
 TOP, WALLS, FLOOR = 6, (7, 8, 9, 10), 11
-HEAD = ["%", "G21 G90 G17 G94 G40 G49 G54", "T1 M6", "S8000 M3", "G0 G43 H1 Z20"]
+HEAD = ["%", "G21 G90 G17 G94 G40 G49 G61 G54", "T1 M6", "S8000 M3", "G0 G43 H1 Z20"]
 TAIL = ["G0 Z20", "M5", "M30", "%"]
 WHY = "operations.exclude_faces names it"
 
