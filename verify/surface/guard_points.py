@@ -151,7 +151,7 @@ def path_points(tree: TriangleTree, moves: Moves, tools: Sequence[ToolBody], tol
     first = 0
     while first < len(rows):
         last = max(int(np.searchsorted(ends, ends[first] - count[first] + PATH_BATCH, side="right")), first + 1)
-        yield _under(tree, moves.only(rows[first:last]), count[first:last], tools)
+        yield _under(tree, moves.only(rows[first:last]), count[first:last], tools, tolerance)
         first = last
 
 
@@ -186,13 +186,18 @@ def path_places(moves: Moves, count: NDArray[np.int64]) -> tuple[F64, F64, NDArr
     return tip, np.cos(turn) * axis + np.sin(turn) * np.cross(moves.axes.about[of], axis), of
 
 
-def _under(tree: TriangleTree, moves: Moves, count: NDArray[np.int64], tools: Sequence[ToolBody]
+def _under(tree: TriangleTree, moves: Moves, count: NDArray[np.int64], tools: Sequence[ToolBody], tolerance: float
            ) -> tuple[F64, NDArray[np.int64]]:
     """Places of the surface and their triangles under ``count`` (m,) even places of each move, both ends among them."""
     tip, z, of = path_places(moves, count)
     radius, corner = (np.array(size)[moves.tool[of]]
                       for size in ([t.radius for t in tools], [t.corner_radius for t in tools]))
     middle = tip + corner[:, None] * z
+    # a ball that is one tolerance deep under one place of a cell is 0.4 of it deep at any other
+    least = float(radius.min(initial=np.inf))
+    cell = min(0.25 * least, math.sqrt((1.0 - CLOSER_SHARE) * least * max(tolerance, 1e-6)))
+    one = _apart(middle, cell)
+    middle, z, radius, corner = middle[one], z[one], radius[one], corner[one]
     reach = float(radius.max(initial=0.0)) + PATH_ROOM
     away, row, foot = nearest(tree, middle, reach)
     near = away <= np.where(radius <= FINE, radius, corner) + PATH_ROOM
@@ -207,7 +212,7 @@ def _under(tree: TriangleTree, moves: Moves, count: NDArray[np.int64], tools: Se
         feet.append(foot[near])
         rows.append(row[near])
     points, row = np.concatenate(feet), np.concatenate(rows)
-    one = _apart(points, 0.25 * float(radius.min(initial=GUARD_SPACING)))
+    one = _apart(points, cell)
     return _off_edges(tree, points[one], row[one]), row[one]
 
 
@@ -223,7 +228,10 @@ def _off_edges(tree: TriangleTree, points: F64, row: NDArray[np.int64]) -> F64:
 
 def _apart(points: F64, cell: float) -> NDArray[np.int64]:
     """Of points (n, 3), mm, the first in each cube of ``cell`` mm, (k,) int64, index."""
-    return np.sort(np.unique(np.floor(points / cell).astype(np.int64), axis=0, return_index=True)[1])
+    cells = np.floor(points / cell).astype(np.int64)
+    cells -= cells.min(axis=0, initial=0)
+    _, ny, nz = (cells.max(axis=0, initial=0) + 1).tolist()
+    return np.sort(np.unique((cells[:, 0] * ny + cells[:, 1]) * nz + cells[:, 2], return_index=True)[1])
 
 
 def closer_seeds(points: F64, residual: F64, mover: I32, tolerance: float) -> tuple[F64, F64]:

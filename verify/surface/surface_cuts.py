@@ -27,6 +27,7 @@ from verify.surface.between_samples import ClosePoints, close_points, judged_pla
 from verify.surface.excluded_faces import CutPlaces, excluded_cuts
 from verify.surface.guard_points import (
     CLOSER_SHARE,
+    FINE,
     closer_points,
     closer_seeds,
     convex_edges,
@@ -222,7 +223,9 @@ def _at_ends(table: _Table, tree: TriangleTree, shot: _Shooting) -> _Table:
     gouged = np.flatnonzero((table.residual < -tolerance) & (table.mover >= 0))
     gouged = gouged[np.lexsort((gouged, table.residual[gouged], table.mover[gouged]))]
     mover, first = np.unique(table.mover[gouged], return_index=True)
-    rows = np.union1d(mover, fine_moves(tree.mesh, shot.moves, shot.tools, shot.setup.gouge_tolerance)).astype(np.int64)
+    small = np.array([t.radius <= FINE for t in shot.tools])
+    fine = fine_moves(tree.mesh, shot.moves, shot.tools, shot.setup.gouge_tolerance)
+    rows = np.union1d(mover, fine[small[shot.moves.tool[fine]]]).astype(np.int64)
     depth, place, triangle = end_depths(tree, shot.moves, rows, shot.tools, tolerance)
     deepest = gouged[first]
     known = depth[np.searchsorted(rows, mover)]

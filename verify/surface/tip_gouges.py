@@ -74,6 +74,8 @@ def end_depths(tree: TriangleTree, moves: Moves, rows: INT, tools: Sequence[Tool
         last = max(int(np.searchsorted(ends, ends[first] - count[first] + PATH_BATCH, side="right")), first + 1)
         chosen = rows[first:last]
         tip, z, of = path_places(moves.only(chosen), count[first:last])
+        near = _near_surface(tree, tip, z, of, moves.tool[chosen], tools)
+        tip, z, of = tip[near], z[near], of[near]
         tool = moves.tool[chosen][of]
         for k in np.unique(tool).tolist():
             mine = np.flatnonzero(tool == k)
@@ -87,6 +89,20 @@ def end_depths(tree: TriangleTree, moves: Moves, rows: INT, tools: Sequence[Tool
                 depth[first + move], place[first + move], triangle[first + move] = away[best], foot[best], row[best]
         first = last
     return depth, place, triangle
+
+
+def _near_surface(tree: TriangleTree, tip: F64, z: F64, of: INT, tool: NDArray[np.int32],
+                  tools: Sequence[ToolBody]) -> NDArray[np.bool_]:
+    """(n,) bool: places of moves that come so near to the surface somewhere that their end may go through it.
+
+    tip, z : (n, 3) float64, mm and unit; of : (n,) int64, index, the move of each; tool : (m,) int32, index, of moves
+    """
+    corner, radius = (np.array(v)[tool][of] for v in ([t.corner_radius for t in tools], [t.radius for t in tools]))
+    away, _, _ = nearest(tree, tip + corner[:, None] * z, float(radius.max(initial=0.0)))
+    ball = corner >= radius - 1e-9
+    through = np.zeros(len(tool), np.bool_)
+    through[of[away < np.where(ball, radius - 1e-4, radius)]] = True
+    return through[of]
 
 
 def _end_places(tip: F64, z: F64, tool: ToolBody) -> list[F64]:
