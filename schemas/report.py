@@ -11,14 +11,13 @@ from schemas.zones import Remainder, Share, ZoneFacts, Zones
 
 Findings = Annotated[list[Any], Field(
     description="Findings of the proof, then those of the whole job; empty in state proved. kind: collision, gouge, "
-                "allowance, excluded_face, rapid, plunge, rubbing, engagement, support, limit, program, residual or "
-                "stock_left; of the whole job: nothing_cut or coverage. message: the finding in one sentence. "
-                "program, line: place "
-                "in the programs; line 0: no line causes it. zone, face: ids, or null. point: worst place, mm, setup "
-                "frame, or null. tip: the tool tip there, or null. depth, limit: measured and allowed value, in the "
-                "unit of message. near: true: nothing touches, and depth is the distance. count, area: number and "
-                "area, mm2, of the merged places. A stock_left, only in a verification, also has height (mm, the same "
-                "as depth) and lines (those that left the stock).")]
+                "allowance, excluded_face, rapid, plunge, load, rubbing, engagement, support, limit, program, "
+                "residual or stock_left; of the whole job: nothing_cut, load or coverage. message: the finding in one "
+                "sentence. program, line: place in the programs; line 0: no line causes it. zone, face: ids, or null. "
+                "point: worst place, mm, setup frame, or null. tip: the tool tip there, or null. depth, limit: "
+                "measured and allowed value, in the unit of message. near: true: nothing touches, and depth is the "
+                "distance. count, area: number and area, mm2, of the merged places. A stock_left, only in a "
+                "verification, also has height (mm, the same as depth) and lines (those that left the stock).")]
 
 
 class Inputs(ReportModel):
@@ -181,7 +180,11 @@ class Caution(ReportModel):
                     "thickness. tool_life: a tool needs more than one cutter, or one workingstep outlasts a cutter. "
                     "center_cutting: a tool that does not cut to its centre ramps into stock. upright: a zone should "
                     "be cut with a tilted tool, but the tool is upright along more than half of the cut, or all of it. "
-                    "Then measured is the length cut upright, mm.")]
+                    "Then measured is the length cut upright, mm. Of a verification: tool_data: the program exceeds "
+                    "spindle speed, feed, plunge feed or life of the tool. chip_load, cutting_speed, plunge_feed: it "
+                    "exceeds what the material recommends. depth_of_cut: depth times width of a cut, mm2. deflection: "
+                    "mm that the tip would bend. dwell: turns that a tool stands in its cut. coolant: a tool that is "
+                    "to be cooled cuts dry.")]
     subjects: Annotated[list[str], Field(description="Ids of tools, workingsteps, zones or walls.")]
     message: str
     measured: Annotated[float | None, Field(description="Measured value, in the unit named in message. limit has the "
@@ -242,6 +245,8 @@ class Verification(ReportModel):
                     "not_in_program: the program does not work on the face. pass: places within the error of the "
                     "proof.")] = []
     proof: ProofFacts | None = None
+    warnings: Annotated[list[Caution], Field(
+        description="Warnings: the program exceeds what tools and material recommend. They change no state.")] = []
     deviation: Annotated[list[FaceDeviation], Field(description="Figures by face number.")] = []
     machined: Annotated[MachinedPart | None, Field(
         description="The machined part. Only on the command line, with --out; null over HTTP.")] = None

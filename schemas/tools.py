@@ -115,6 +115,9 @@ class Tool(WireModel):
         ge=0.1, le=1e6, description="Downward feed into stock, mm/min: the feed of a plunge, and the downward part of "
                                     "the feed on ramps and helices. At most machine.max_feed_mm_min. null: 0.3 of the "
                                     "cutting feed.")] = None
+    coolant: Annotated[Literal["flood", "off"] | None, Field(
+        description="Whether the tool is to be cooled. Plans turn the coolant on as machine.coolant says, for all "
+                    "tools; a tool that states otherwise gets a warning. null: it is not stated.")] = None
     holder: Annotated[list[HolderSegment], Field(
         max_length=50, description="Segments of the holder, upwards from its nose; empty: no holder is checked.")] = []
 

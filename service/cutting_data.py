@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 from itertools import pairwise
 
+from geometry.cutting_mechanics import compliance, effective_diameter
 from geometry.move_timing import RATES, Rates
 from geometry.tool_body import ToolBody
 from schemas.machine import Machine
@@ -20,10 +21,9 @@ from toolpath.tool_deflection import (
     LAYER_LIMIT,
     MIN_FEED,
     DeflectionModel,
-    compliance,
-    effective_diameter,
     left_by_layers,
 )
+from verify.cutting_words import CuttingWords
 from zones.lattice import lattice_step
 
 DEFAULT_MAX_RPM = 18000.0
@@ -148,6 +148,19 @@ def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float 
                        material.source, tuple(cut_back))
 
 
+def cutting_words(material: Material, tool: Tool) -> CuttingWords:
+    """What tool and material say about cutting, for the proof; what the setup states goes into the fields of the tool.
+
+    A layer as deep as ``STEP_DOWN`` allows, in a slot, is the recommended depth times width.
+    """
+    return CuttingWords(tool.flutes, material.cutting_speed_m_min,
+                        feed_per_tooth(material.feed_per_tooth, tool.diameter_mm),
+                        STEP_DOWN[tool.kind] * tool.diameter_mm**2, LAYER_LIMIT,
+                        material.specific_cutting_force_n_mm2, material.chip_thickness_exponent, tool.spindle_rpm,
+                        tool.feed_mm_min, tool.plunge_feed_mm_min, tool.life_min,
+                        None if tool.coolant is None else tool.coolant == "flood")
+
+
 def bending(setup: Setup, tool: Tool, body: ToolBody, data: CuttingData, depth: float | None) -> DeflectionModel | None:
     """Load and stiffness for the deflection of a tool; None where the material has no specific cutting force.
 
@@ -178,5 +191,5 @@ def rates_of(setup: Setup) -> Rates:
 
 
 __all__ = ["DEFAULT_MAX_FEED_MM_MIN", "DEFAULT_MAX_RPM", "MATERIALS", "MAX_CHIP_THINNING",
-           "PLUNGE_FACTOR", "STEP_DOWN", "CuttingData", "bending", "chip_thinning", "cutting_data", "feed_per_tooth",
-           "find_material", "rates_of"]
+           "PLUNGE_FACTOR", "STEP_DOWN", "CuttingData", "bending", "chip_thinning", "cutting_data", "cutting_words",
+           "feed_per_tooth", "find_material", "rates_of"]

@@ -26,6 +26,8 @@ from toolpath.planning.zone_finishing import ZonePlan
 from toolpath.stock.stock_map import StockSnapshot
 from toolpath.tool_deflection import DeflectionEstimate
 from toolpath.workingsteps import ArcSpan, CutDirection, Trajectory, TrajectoryKind, Workingstep
+from verify.assumptions import Assumed, AssumedKind
+from verify.cutting_words import ProgramCaution
 from verify.model import Engagement, FaceProof, Finding, FindingKind, Proof, Spent, Support, ZoneProof
 from zones.lattice import Lattice
 
@@ -33,8 +35,8 @@ ALIGNED = 64
 CLASSES: dict[str, Any] = {c.__name__: c for c in (
     Plan, Workingstep, Trajectory, ArcSpan, Rates, DeflectionEstimate, ZonePlan, Counterexamples, HighWall, Lattice,
     Proof, Finding, Engagement, Spent, Support, ZoneProof, FaceProof, PlanSnapshot, StockSnapshot, ToolSnapshot,
-    LayersSnapshot, FinishSnapshot, PackedLines)}
-ENUMS: dict[str, Any] = {e.__name__: e for e in (CutDirection, TrajectoryKind, FindingKind)}
+    LayersSnapshot, FinishSnapshot, PackedLines, Assumed, ProgramCaution)}
+ENUMS: dict[str, Any] = {e.__name__: e for e in (CutDirection, TrajectoryKind, FindingKind, AssumedKind)}
 PLAIN = (type(None), bool, int, float, str)
 
 

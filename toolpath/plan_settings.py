@@ -10,12 +10,13 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.cutting_mechanics import effective_diameter
 from geometry.mesh import F64
 from geometry.move_timing import RATES, Rates
 from geometry.tool_body import ToolBody
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.scallop_budget import ScallopBudget
-from toolpath.tool_deflection import MIN_FEED, DeflectionEstimate, DeflectionModel, effective_diameter
+from toolpath.tool_deflection import MIN_FEED, DeflectionEstimate, DeflectionModel
 from toolpath.workingsteps import CutDirection
 
 

@@ -17,12 +17,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from geometry.cutting_mechanics import cutting_force, engaged_angle
 from geometry.tool_body import ToolBody
 
-CARBIDE = 600e3
-"""N/mm2, modulus of cemented carbide."""
-CORE = 0.8
-"""Diameter of a solid bar as stiff as the flutes, of the diameter of the cutter."""
 MIN_SHARE = 0.2
 """Least share to which a feed is reduced: below it, edges rub and the tool wears without cutting."""
 LAYER_LIMIT = 0.05
@@ -95,67 +92,6 @@ class DeflectionModel:
         return DeflectionEstimate(full, self.limit, share, full * share ** (1.0 - self.mc), self.fixed)
 
 
-def compliance(tool: ToolBody, modulus: float = CARBIDE) -> float:
-    """Deflection of the tip for each N of force, mm/N, for a tool held at the nose of its holder [Timoshenko1955].
-
-    The force acts at the tip, square to the axis. The tool is a stepped bar: flutes as a bar of ``CORE`` of the
-    diameter, neck, shank. The moment at the height z is F z, so tip / F = sum (z1^3 - z0^3) / (3 E I) over the
-    cylinders from z0 to z1. Shear and the holder's compliance are left out.
-    """
-    total, low = 0.0, 0.0
-    for top, wide in ((tool.flute_length, CORE * tool.diameter), (tool.neck_length, tool.neck_diameter),
-                      (tool.stickout, tool.shank_diameter)):
-        if top > low:
-            total += (top**3 - low**3) / (3.0 * modulus * math.pi * wide**4 / 64.0)
-            low = top
-    return total
-
-
-def effective_diameter(diameter: float, corner_radius: float, depth: float) -> float:
-    """Diameter of a cutter at the height ``depth`` above its tip, all mm: D - 2 r + 2 sqrt(a (2 r - a)) in the corner.
-
-    >>> round(effective_diameter(10.0, 5.0, 1.0), 9), effective_diameter(10.0, 0.0, 1.0)
-    (6.0, 10.0)
-    """
-    if depth >= corner_radius:
-        return diameter
-    return diameter - 2.0 * corner_radius + 2.0 * math.sqrt(depth * (2.0 * corner_radius - depth))
-
-
-def engaged_angle(tool: ToolBody, depth: float, width: float) -> float:
-    """Engaged angle of a side cut at the effective diameter D, rad: cos(phi) = 1 - 2 ae / D; pi in a slot
-    [Altintas2012].
-
-    depth, width : mm
-
-    >>> round(math.degrees(engaged_angle(ToolBody("T1", 1, 10.0, 0.0, 20.0, 10.0, 20.0, 10.0, 40.0), 5.0, 2.5)), 9)
-    60.0
-    """
-    wide = effective_diameter(tool.diameter, tool.corner_radius, depth)
-    return math.acos(max(-1.0, 1.0 - 2.0 * width / wide)) if wide > 0.0 else math.pi
-
-
-def cutting_force(kc: float, mc: float, per_tooth: float, depth: float, width: float, tool: ToolBody,
-                  flutes: int) -> float:
-    """Cutting force of a milling tool, N: that of all teeth in the cut, of at least one [Kienzle1952].
-
-    kc, mc                   : N/mm2 and its exponent
-    per_tooth, depth, width  : mm
-
-    F = max(1, z phi / (2 pi)) b h^(1 - mc) kc, where h = fz sin(kappa) (1 - cos(phi)) / phi is the mean thickness of
-    the chip over the engaged angle, b the length of the edge up to the depth with its round corner as a chord, and
-    sin(kappa) = a / b.
-    """
-    if depth <= 0.0 or width <= 0.0:
-        return 0.0
-    r = tool.corner_radius
-    low = min(depth, r)
-    edge = math.hypot(low, math.sqrt(low * (2.0 * r - low))) + depth - low
-    phi = engaged_angle(tool, depth, width)
-    chip = per_tooth * depth / edge * (1.0 - math.cos(phi)) / phi
-    return float(max(1.0, flutes * phi / (2.0 * math.pi)) * edge * chip ** (1.0 - mc) * kc)
-
-
 def left_by_layers(step_down: float, spacing: float) -> float:
     """Stock that layers leave on a wall for its finish, mm.
 
@@ -165,5 +101,4 @@ def left_by_layers(step_down: float, spacing: float) -> float:
     return max(LEFT_SHARE * step_down, LEFT_STEPS * spacing)
 
 
-__all__ = ["CARBIDE", "CORE", "LAYER_LIMIT", "MIN_FEED", "MIN_SHARE", "DeflectionEstimate", "DeflectionModel",
-           "compliance", "cutting_force", "effective_diameter", "engaged_angle", "left_by_layers"]
+__all__ = ["LAYER_LIMIT", "MIN_FEED", "MIN_SHARE", "DeflectionEstimate", "DeflectionModel", "left_by_layers"]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64, I32, TriangleMesh
 from geometry.tool_body import ToolBody
 from verify.assumptions import Assumed
+from verify.cutting_words import CuttingWords, ProgramCaution
 from verify.kinematics import Kinematics
 
 if TYPE_CHECKING:  # sampling is compiled, and the readers of programs need these classes without it
@@ -38,6 +39,7 @@ class FindingKind(StrEnum):
     EXCLUDED_FACE = "excluded_face"
     RAPID = "rapid"
     PLUNGE = "plunge"
+    LOAD = "load"
     RUBBING = "rubbing"
     ENGAGEMENT = "engagement"
     SUPPORT = "support"
@@ -89,6 +91,7 @@ class ProofSetup:
     walls_in_turn : whether a larger ratio is a finding; otherwise the proof reports the figure only
     left_alone    : by number of each face that is not to be machined, the words of the setup that say so
     assumed       : what the setup leaves open and the proof takes for granted
+    cutting       : cutting data by T number; a tool that is absent has none, and its loads are not judged
     """
 
     stock_kind: StockKind | str = StockKind.PART_OFFSET
@@ -129,6 +132,7 @@ class ProofSetup:
     walls_in_turn: bool = True
     left_alone: Mapping[int, str] = field(default_factory=dict)
     assumed: tuple[Assumed, ...] = ()
+    cutting: Mapping[int, CuttingWords] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -349,6 +353,7 @@ class Proof:
     support  : free height of thin walls where they were cut
     work     : what became of the work that was asked; None where none was
     assumed  : what was taken for granted, of the setup and of the programs
+    cautions : where the programs exceed what tools and material recommend
     """
 
     findings: tuple[Finding, ...]
@@ -371,6 +376,7 @@ class Proof:
     support: Support = Support(0, 0, 0.0, 0.0, 0)
     work: WorkDone | None = None
     assumed: tuple[Assumed, ...] = ()
+    cautions: tuple[ProgramCaution, ...] = ()
 
     @property
     def no_findings(self) -> bool:

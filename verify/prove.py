@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import VerificationError
+from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.tool_body import ToolBody
@@ -30,6 +31,7 @@ from verify.findings import (
 )
 from verify.kernels.stock import PLUNGE
 from verify.material.collision import DIP
+from verify.material.cutting_loads import cut_sequence, loads
 from verify.material.dogleg_rapids import box_findings
 from verify.material.engagement import engaged_angles, engagement_findings, engagements, in_parts
 from verify.material.fine_plunges import fine_plunges
@@ -123,12 +125,16 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     fine = unseen([tools[k] for k in np.unique(moves.tool[moves.feed])], met.spacing, met.upright)
     skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
     stretches, of = in_parts(moves, tools)
+    known = counted(framed, np.unique(source.tool).tolist())
+    took = np.concatenate([np.zeros(0), *(minutes_of(p.program, setup) for p in framed)])
+    in_cut = cut_sequence(framed, known, run, moves, source, tools, stretches, of, took[known], met.spacing)
+    loaded, cautions = loads(in_cut, tools, setup.cutting)
     angle = engaged_angles(run.engaged, stretches, tools)
     again, springs = repeats(moves, run.cut, source, _finishes(cuts, setup, len(moves)))
     dug = fine_plunges(moves, tools, fine, part.mesh.bounds, setup, threads)
     dug = dug[~np.isin(dug[:, 0], run.events[run.events[:, 1] == PLUNGE, 0])]
     findings = [*contact_findings(np.concatenate([run.events, dug]), moves, source, setup.clearance_rapid, skins),
-                *cuts.gouges, *cuts.excluded, *_program_findings(framed),
+                *cuts.gouges, *cuts.excluded, *loaded, *_program_findings(framed),
                 *(f for p in framed for f in p.findings(tools)), *_unlisted(run.lost, framed),
                 *table_findings([p.program for p in framed], tools, setup),
                 *_idle_findings(framed, run, moves, source, [t for t in fine if t.cone_height <= 0.0], asked),
@@ -149,9 +155,9 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     dips = [Assumed(AssumedKind.BETWEEN_SAMPLES, round(met.dip, 3), "the fixtures are so large that a ball may enter "
                     f"one by {met.dip:.3f} mm unseen", "give smaller boxes where tools go")] * (met.dip > DIP + 1e-9)
     stages.tell(1.0)
-    proof = _proof(findings, cuts, run, framed, moves, source, setup, scored, zone_ids,
+    proof = _proof(findings, cuts, run, framed, known, took, moves, source, setup, scored, zone_ids,
                    engagements(angle, stretches, tools), met.spacing, tuple(notes), support)
-    proof = replace(proof, assumed=in_order(
+    proof = replace(proof, cautions=tuple(cautions), assumed=in_order(
         [*setup.assumed, *program_assumptions(framed, tools, setup, stated), *cuts.assumed, *dips]))
     return proof if work is None else replace(proof, work=work)
 
@@ -232,13 +238,12 @@ def _residuals(scored: ScoredSamples, cuts: SurfaceCuts, setup: ProofSetup, zone
                              np.concatenate([s.area[bad], close.area[near]]), zone_ids, setup.scallop_height)
 
 
-def _proof(findings: list[Finding], cuts: SurfaceCuts, run: StockPass, readings: Sequence[FramedProgram], moves: Moves,
-           source: Source, setup: ProofSetup, scored: ScoredSamples, zone_ids: Sequence[str],
-           engaged: dict[int, Engagement], spacing: float, notes: tuple[str, ...], support: Support) -> Proof:
+def _proof(findings: list[Finding], cuts: SurfaceCuts, run: StockPass, readings: Sequence[FramedProgram],
+           known: NDArray[np.bool_], took: F64, moves: Moves, source: Source, setup: ProofSetup, scored: ScoredSamples,
+           zone_ids: Sequence[str], engaged: dict[int, Engagement], spacing: float, notes: tuple[str, ...],
+           support: Support) -> Proof:
     read = [r.program for r in readings]
-    took = np.concatenate([minutes_of(p, setup) for p in read]) if read else np.zeros(0)
     cut_length = np.linalg.norm(moves.end - moves.start, axis=1)[run.cut]
-    known = counted(readings, np.unique(source.tool).tolist())
     minutes = took[known][run.cut]
     used = source.tool[run.cut]
     proved = proved_samples(cuts.residual, setup)

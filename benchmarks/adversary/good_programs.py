@@ -37,17 +37,16 @@ def in_any_dialect(rng: Rng) -> Case:
 
 
 def spring_pass(rng: Rng) -> Case:
-    """The last rows once more, after a lift."""
-    part = choice(rng, *LEVELS, "boss")
+    """The rows of the last level once more, after a lift."""
+    part = choice(rng, *LEVELS[1:], "boss")
     s = PARTS[part].program()
     last = max(k for k, op in enumerate(s.ops[:-1]) if op.kind == "rapid" and op.z == SAFE)
     own = s.ops[last + 1:-1]
     low = min(op.z for op in own if op.z is not None)
     first = min(k for k, op in enumerate(own) if op.z == low)
     again = [Op(**vars(op)) for op in own[first:]]
-    x, y = (own[0].x, own[0].y) if part != "plate" else (1.0, -OUT)
-    s.rapid(x, y)
-    s.rapid(z=low + (5.0 if part == "plate" else 0.0))
+    s.rapid(own[0].x, own[0].y)
+    s.rapid(z=low)
     s.ops += again
     s.rapid(z=SAFE)
     return made("spring pass", part, s)

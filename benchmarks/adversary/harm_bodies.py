@@ -96,8 +96,8 @@ def clamp_rapid(rng: Rng) -> Case:
     s.rapid(z=z)
     ops = [s.rapid(x=width + 30.0)]
     s.rapid(z=SAFE)
-    return made("clamp in rapid", part, s, ("rapid",), ops, high - z, {"fixtures": [{"box_mm": _beside(part, high)}]},
-                what=f"{high - z:.3f} deep")
+    return made("clamp in rapid", part, s, ("rapid",), ops, min(high - z, R),
+                {"fixtures": [{"box_mm": _beside(part, high)}]}, what=f"{high - z:.3f} deep")
 
 
 def rapid_through_part(rng: Rng) -> Case:

@@ -112,7 +112,7 @@ def level(part: str, rng: Rng) -> tuple[float, float, float]:
         if rng.random() < 0.5:
             r = float(rng.uniform(0.0, BOSS - R - 0.5))
             return r * math.cos(a), r * math.sin(a), BOSS_TOP
-        r = float(rng.uniform(BOSS + R + 0.3, BOSS + R + 1.0))
+        r = float(rng.uniform(BOSS + R + 1.2, BOSS + R + 1.6))
         return r * math.cos(a), r * math.sin(a), BOSS_FOOT
     if part == "pocket":
         return float(rng.uniform(-4, 4)), float(rng.uniform(-2.5, 2.5)), POCKET_FLOOR
@@ -197,6 +197,58 @@ def needle(rng: Rng) -> Case:
     ops = dip(s, x, y, z - d, feed=60.0)
     setup = {**quality(tolerance), "tools": [FLAT, BALL, NEEDLE]}
     return made("needle", part, s, ("gouge",), ops, depth, setup, what=f"after T{number}, {scale} x {tolerance}")
+
+
+def small_ball(rng: Rng) -> Case:
+    """A pit of a small ball on a curved face."""
+    tolerance, scale, d = scale_of(rng, 0.2)
+    radius = float(rng.choice([0.1, 0.25, 0.5]))
+    tool = {**BALL, "id": "T3", "number": 3, "diameter_mm": 2 * radius, "flute_length_mm": 4.0,
+            "shank_diameter_mm": 3.0, "stickout_mm": 30.0}
+    s = base("cylinder")
+    s.tool(3, 12000)
+    p, n = contact("cylinder", rng)
+    ops = dip(s, *(p + (radius - d) * n - [0.0, 0.0, radius]).tolist(), feed=60.0)
+    setup = {**quality(tolerance), "tools": [FLAT, BALL, tool]}
+    return made("small ball", "cylinder", s, ("gouge",), ops, d, setup, what=f"R{radius}, {scale} x {tolerance}")
+
+
+def smooth_dip(rng: Rng) -> Case:
+    """A small ball follows an arc into a curved face and out again, in chords that turn by ten degrees at most."""
+    tolerance, scale, d = scale_of(rng, 0.1)
+    radius, bow = float(rng.choice([0.1, 0.25, 0.5])), float(rng.uniform(0.5, 2.0))
+    tool = {**BALL, "id": "T3", "number": 3, "diameter_mm": 2 * radius, "flute_length_mm": 4.0,
+            "shank_diameter_mm": 3.0, "stickout_mm": 30.0}
+    s = base("cylinder")
+    s.tool(3, 12000)
+    p, n = contact("cylinder", rng)
+    most = math.acos(1.0 - (0.2 + d) / bow)
+    angles = np.linspace(-most, most, 2 * math.ceil(most / math.radians(5.0)) + 1)
+    tips = [p + (radius - d + bow * (1.0 - math.cos(a))) * n + [0.0, bow * math.sin(a), -radius] for a in angles]
+    s.over(float(tips[0][0]), float(tips[0][1]) - 2.0)
+    s.rapid(z=float(tips[0][2]) + 3.0)
+    s.feed(z=float(tips[0][2]), feed=300.0)
+    ops = [s.feed(*tip.tolist(), feed=100.0) for tip in tips]
+    s.feed(y=float(tips[-1][1]) + 2.0)
+    s.rapid(z=SAFE)
+    setup = {**quality(tolerance), "tools": [FLAT, BALL, tool]}
+    return made("smooth dip", "cylinder", s, ("gouge",), ops, d, setup, what=f"R{radius}, {scale} x {tolerance}")
+
+
+def rim_pit(rng: Rng) -> Case:
+    """The rim of a flat pressed into a cylinder or a slope from above: a lens far narrower than the tool."""
+    part, (tolerance, scale, d) = choice(rng, "cylinder", "slope"), scale_of(rng, 0.4)
+    s = base(part)
+    s.tool(1)
+    y = float(rng.uniform(-LOW, LOW))
+    if part == "cylinder":
+        low, dx = PARTS[part].top - BOW_RADIUS, float(rng.uniform(1.0, 6.0))
+        x = 12.0 + (dx + R) * float(rng.choice([-1.0, 1.0]))
+        tip = low + math.sqrt((BOW_RADIUS - d) ** 2 - dx * dx)
+    else:
+        a, x = math.radians(SLOPE_DEG), float(rng.uniform(7.0, 18.0))
+        tip = PARTS[part].top - (x - R) * math.tan(a) - d / math.cos(a)
+    return made("rim pit", part, s, ("gouge",), dip(s, x, y, tip), d, quality(tolerance), what=f"{scale} x {tolerance}")
 
 
 def contact_normal(part: str, x: float) -> tuple[float, float, float]:
@@ -381,6 +433,13 @@ def excluded_face(rng: Rng) -> Case:
                 what=f"{scale} x {tolerance} {operations}")
 
 
+def excluded_face_finished(rng: Rng) -> Case:
+    """A face that is to be left alone is brought to size."""
+    part = choice(rng, "plate", "slope", "cylinder")
+    operations = {"exclude_faces": ["F5"]}
+    return made("excluded face finished", part, base(part), ("excluded_face",), None, None, {"operations": operations})
+
+
 def side_cut(rng: Rng) -> Case:
     """An outer side that no one works on, cut from beside."""
     part, (tolerance, scale, d) = choice(rng, "plate", "step", "slot"), scale_of(rng)
@@ -416,7 +475,10 @@ def many_dips(rng: Rng) -> Case:
 
 
 MECHANISMS = {"pit level": pit_level, "pit slope": pit_slope, "pit cylinder": pit_cylinder, "groove": groove,
-              "needle": needle, "edge notch": edge_notch, "wall cut": wall_cut, "rib top": rib_top,
+              "needle": needle, "small ball": small_ball,
+              "smooth dip": smooth_dip, "rim pit": rim_pit, "edge notch": edge_notch, "wall cut": wall_cut,
+              "rib top": rib_top,
               "rib side": rib_side, "rib off": rib_off, "rib gap": rib_gap, "floor dip": floor_dip,
               "floor through": floor_through, "wedge short": wedge_short, "wedge shaved": wedge_shaved,
-              "allowance": allowance, "excluded face": excluded_face, "side cut": side_cut, "many dips": many_dips}
+              "allowance": allowance, "excluded face": excluded_face,
+              "excluded face finished": excluded_face_finished, "side cut": side_cut, "many dips": many_dips}

@@ -25,6 +25,7 @@ from service.stages.access_settings import leaned
 from service.stages.cautions import (
     JobCaution,
     bent,
+    cooled,
     dry,
     limited,
     lives_ended,
@@ -49,7 +50,7 @@ PREVIEW_NAME = "preview.png"
 
 def cautions_before_planning(ready: Prepared) -> list[JobCaution]:
     """The cautions of a job that are known before it is planned."""
-    return [*limited(ready.inputs), *dry(ready.inputs), *thin_walls(ready)]
+    return [*limited(ready.inputs), *dry(ready.inputs), *cooled(ready.inputs), *thin_walls(ready)]
 
 
 def warned(ready: Prepared, texts: Iterable[str]) -> Prepared:

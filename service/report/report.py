@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
 from service.report import approach_cones, tool_offers
-from service.stages.cautions import JobCaution
+from service.stages.cautions import MAX_TIMES, JobCaution
 from service.stages.job_part import JobPart
 from service.stages.preparation import Prepared
 from service.version import VERSION
@@ -194,7 +194,9 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
     reach = float(area[proved | (zone > 0)].sum()) + sum(i.area for i in items if i.reason == Reason.PASS)
     coverage = done / total if total > 0 else 0.0
     remainder = _remainder(ready, items)
-    unmet = _unmet(ready, made, coverage, remainder)
+    unmet = [*_unmet(ready, made, coverage, remainder),
+             *(of_job("load", f"{c.message}; past {MAX_TIMES:g} times the limit", r(c.stays or 0.0) or 0.0, c.limit)
+               for c in cautions if c.grave)]
     findings = [*(f.as_dict() for f in proof.findings), *unmet]
     plans = {p.zone.id: p for p in made.zones}
     steps = {s.id: s for s in made.steps}

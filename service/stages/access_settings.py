@@ -22,7 +22,9 @@ from toolpath.plan_settings import Pattern, PlanSettings, ToolLean
 from toolpath.scallop_budget import ARC_SHARE
 from toolpath.stock.stock_map import StockMap
 from toolpath.workingsteps import CutDirection
-from verify.gcode.dialects import OWN_SPEED_RAPIDS
+from verify.assumptions import Assumed
+from verify.checks.program_assumptions import FREE_PATH
+from verify.gcode.dialects import CONTROLS, OWN_SPEED_RAPIDS
 from verify.model import ProofSetup
 from zones.reach.access_view import View
 
@@ -81,7 +83,7 @@ def proof_setup(job: JobPart, view: View | ProofFrame, *, foreign: bool = False)
         clearance_shank=c.shank, clearance_holder=c.holder, clearance_rapid=c.rapid,
         scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,
         stock_allowance=q.stock_allowance_mm, ramp_angle=RAMP_ANGLE, ramp_angles=inputs.ramp_angles(foreign=foreign),
-        cores=inputs.cores,
+        cores=inputs.cores, cutting=inputs.cutting,
         rapid_feed=inputs.rates.rapid, acceleration=inputs.rates.acceleration,
         work_offset=access_of(job, view).work_offset,
         travel=None if machine.travel_mm is None else np.array(machine.travel_mm, dtype=np.float64),
@@ -94,7 +96,7 @@ def proof_setup(job: JobPart, view: View | ProofFrame, *, foreign: bool = False)
         kinematics=inputs.kinematics, rotary_limits=inputs.rotary_limits,
         rotary_rate=None if machine.rotary_rate_deg_min is None else float(np.radians(machine.rotary_rate_deg_min)),
         left_alone=left_alone(job),
-        assumed=(*setup_assumptions(inputs), *(() if foreign else planned_sense(inputs))))
+        assumed=(*setup_assumptions(inputs), *(() if foreign else (*planned_sense(inputs), *_free_paths(inputs)))))
 
 
 def _own_speeds(inputs: JobInputs, foreign: bool) -> bool | None:
@@ -108,6 +110,12 @@ def _own_speeds(inputs: JobInputs, foreign: bool) -> bool | None:
         return machine.rapid_motion == "dogleg"
     own = not foreign and not inputs.turns and not OWN_SPEED_RAPIDS.isdisjoint(machine.dialects)
     return True if own else None
+
+
+def _free_paths(inputs: JobInputs) -> tuple[Assumed, ...]:
+    """What a plan assumes of controls that have no word for the deviation from the path, the first or another."""
+    others = [CONTROLS[d] for d in inputs.machine.dialects if d in CONTROLS]
+    return () if all(c.bounds_path for c in others) else (FREE_PATH,)
 
 
 def left_alone(job: JobPart) -> dict[int, str]:

@@ -24,10 +24,12 @@ from toolpath.planning.zone_finishing import LEANING, ZonePlan, upright_way
 from toolpath.strategies import inclined_axis
 from toolpath.tool_deflection import DeflectionEstimate
 from toolpath.workingsteps import TrajectoryKind, Workingstep
+from verify.cutting_words import ProgramCaution
 from verify.model import Support
 from zones.features.wall_slenderness import slender_walls
 from zones.model import Wall
 
+MAX_TIMES = 10.0  # a caution whose value stays past so many times its limit is a finding
 MAX_REASONS = 3  # of one caution
 MAX_UPRIGHT_SHARE = 0.5  # of the cutting length of a zone; above it a zone that should lean gets a caution
 MAX_HEIGHT_RATIO = 10.0
@@ -41,6 +43,7 @@ class JobCaution:
     kind      : 'limited', 'dry', 'thin_wall', 'support', 'deflection', 'tool_life', 'center_cutting' or 'upright'
     subjects  : ids of tools, steps, walls
     measured, limit : in the unit of the message; limit is nan where there is none
+    stays     : what the program keeps of the measured value; None: nothing that could be too much
     at        : mm, setup frame; None where the caution has no place
     """
 
@@ -51,6 +54,18 @@ class JobCaution:
     limit: float
     remedy: str
     at: tuple[float, float, float] | None = None
+    stays: float | None = None
+
+    @property
+    def grave(self) -> bool:
+        """Whether the program goes so far over the limit that it is a finding.
+
+        >>> JobCaution("deflection", ("T1",), "", 0.9, 0.05, "", stays=0.6).grave
+        True
+        >>> JobCaution("deflection", ("T1",), "", 0.9, 0.05, "", stays=0.2).grave
+        False
+        """
+        return self.stays is not None and self.stays > MAX_TIMES * self.limit
 
     @property
     def sentence(self) -> str:
@@ -93,6 +108,14 @@ def dry(inputs: JobInputs) -> list[JobCaution]:
             out.append(JobCaution("dry", (tool.id,), message, speed, math.nan,
                                   "give spindle_rpm and feed_mm_min for dry cutting"))
     return out
+
+
+def cooled(inputs: JobInputs) -> list[JobCaution]:
+    """One caution for each tool that states another coolant than the machine; the plan follows the machine."""
+    machine = inputs.machine.coolant
+    return [JobCaution("coolant", (t.id,), f"tool {t.id} states coolant {t.coolant}, but the program has {machine}",
+                       math.nan, math.nan, "correct coolant of the tool or of the machine")
+            for t in inputs.tools if t.coolant is not None and t.coolant != machine]
 
 
 def uncut_centres(inputs: JobInputs, steps: Sequence[Workingstep]) -> list[JobCaution]:
@@ -154,7 +177,7 @@ def thin_walls(ready: Prepared) -> list[JobCaution]:
                    f"Z{z:.2f}: {s.ratio:.1f} to 1 (limit {MAX_HEIGHT_RATIO:g} to 1), so it deflects and vibrates")
         out.append(JobCaution("thin_wall", (s.wall,), message, s.ratio, MAX_HEIGHT_RATIO,
                               "support it or fill the room beside it, cut both its sides in turn, or make it thicker",
-                              (x, y, z)))
+                              (x, y, z), s.ratio))
     return out
 
 
@@ -168,7 +191,8 @@ def unheld(support: Support) -> list[JobCaution]:
     message = (f"thin walls are finished where they stand free over up to {support.most:.1f} times their thickness "
                f"(limit {support.limit:g} times), at {support.over} of {support.places} places")
     return [JobCaution("support", (), message, support.most, support.limit,
-                       "support them or fill the room beside them, or cut their two sides in turn", support.at)]
+                       "support them or fill the room beside them, or cut their two sides in turn", support.at,
+                       support.most)]
 
 
 def bent(steps: Sequence[Workingstep]) -> list[JobCaution]:
@@ -188,7 +212,8 @@ def bent(steps: Sequence[Workingstep]) -> list[JobCaution]:
         else:
             remedy = (f"the plan lowers its feed to {100.0 * bend.share:.0f} %, where it bends "
                       f"{bend.deflection:.3f} mm; a shorter or thicker tool keeps its feed")
-        out.append(JobCaution("deflection", (tool, *(s.id for s, _ in group)), message, bend.full, bend.limit, remedy))
+        out.append(JobCaution("deflection", (tool, *(s.id for s, _ in group)), message, bend.full, bend.limit, remedy,
+                              stays=bend.deflection))
     return out
 
 
@@ -214,10 +239,16 @@ def lives_ended(inputs: JobInputs, steps: Sequence[Workingstep]) -> list[JobCaut
     return out
 
 
+def exceeded(inputs: JobInputs, cautions: Sequence[ProgramCaution]) -> list[JobCaution]:
+    """The cautions of a proof: where a program exceeds what its tools and the material recommend."""
+    ids = {body.number: t.id for t, body in zip(inputs.tools, inputs.bodies, strict=True)}
+    return [JobCaution(c.kind, (ids[c.tool],), c.message, c.measured, c.limit, c.remedy) for c in cautions]
+
+
 def sentences(cautions: Sequence[JobCaution]) -> tuple[str, ...]:
     """Message and remedy of each caution, as one sentence each."""
     return tuple(c.sentence for c in cautions)
 
 
-__all__ = ["JobCaution", "bent", "limited", "lives_ended", "sentences", "thin_walls", "uncut_centres", "unheld",
-           "walls_to_cut"]
+__all__ = ["JobCaution", "bent", "cooled", "exceeded", "limited", "lives_ended", "sentences", "thin_walls",
+           "uncut_centres", "unheld", "walls_to_cut"]

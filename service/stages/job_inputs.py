@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from geometry.cutting_mechanics import effective_diameter
 from geometry.mesh import F64
 from geometry.move_timing import Rates
 from geometry.setup_frame import SetupFrame
@@ -23,7 +24,7 @@ from schemas.machine import Machine
 from schemas.materials import Material
 from schemas.setup import Access, Operations, Quality, Setup, Stock, setup_sha256
 from schemas.tools import Tool
-from service.cutting_data import STEP_DOWN, bending, cutting_data, rates_of
+from service.cutting_data import STEP_DOWN, bending, cutting_data, cutting_words, rates_of
 from service.from_wire import (
     gauge_lengths,
     machine_kinematics,
@@ -34,7 +35,7 @@ from service.from_wire import (
 )
 from toolpath.plan_settings import CutData
 from toolpath.scallop_budget import ScallopBudget
-from toolpath.tool_deflection import effective_diameter
+from verify.cutting_words import CuttingWords
 from verify.kinematics import Kinematics
 from zones.reach.assembly import Clearances
 
@@ -155,6 +156,11 @@ class JobInputs:
             angle = usual if t.ramp_angle_deg is None else math.radians(t.ramp_angle_deg)
             out[body.number] = angle if foreign else min(angle, RAMP_ANGLE)
         return {number: angle for number, angle in out.items() if angle != RAMP_ANGLE}
+
+    @property
+    def cutting(self) -> dict[int, CuttingWords]:
+        """What tools and material say about cutting, by T number."""
+        return {body.number: cutting_words(self.material, t) for t, body in zip(self.tools, self.bodies, strict=True)}
 
     @property
     def cores(self) -> dict[int, float]:

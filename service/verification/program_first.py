@@ -5,14 +5,14 @@ This module imports nothing that is compiled, so that the refusal comes at once.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from geometry.errors import SetupError
 from schemas.machine import Machine
 from schemas.setup import Setup
 from service.from_wire import check_spindle_tool, gauge_lengths, machine_kinematics, tool_bodies
-from service.verification.rotary_sense import assumed_sense, check_sense, sense_in_header
+from service.verification.rotary_sense import assumed_sense, check_gauges, check_sense, sense_in_header
 from verify.assumptions import Assumed, AssumedKind
 from verify.gcode.dialects import dialect_of, dialects_left
 from verify.kinematics import Kinematics
@@ -54,7 +54,7 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
     Raises
     ------
     SetupError
-        ``no_such_access``, ``no_such_tool``, ``rotary_sense_open``.
+        ``no_such_access``, ``no_such_tool``, ``rotary_sense_open``, ``no_gauge_length``.
     ProgramError, VerificationError
         The program cannot be read, as ``verify.program_reading.read_one``.
     """
@@ -66,11 +66,11 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
     own = known[access] if access is not None else setup.access[0]
     nc = NcProgram("program", text, dialect=dialect or dialect_of(text, ending, setup.machine.dialects))
     tools, machine = tool_bodies(setup), machine_kinematics(setup.machine)
-    assumed: list[Assumed] = []
+    gauges, assumed = gauge_lengths(setup.tools, tools), list[Assumed]()
 
-    def reading(of: Kinematics | None, program: NcProgram = nc) -> Program:
+    def reading(of: Kinematics | None, program: NcProgram = nc, longer: Mapping[int, float] | None = None) -> Program:
         return read_one(program, tools, work_offset=own.work_offset, gouge_tolerance=setup.quality.gouge_tolerance_mm,
-                        kinematics=of, gauge_length=gauge_lengths(setup.tools, tools), spindle_tool=spindle_tool)
+                        kinematics=of, gauge_length={**gauges, **(longer or {})}, spindle_tool=spindle_tool)
 
     if dialect is None and not is_exchange_file(text):
         assumed.extend(_assumed_dialect(nc.dialect, dialects_left(text, ending, _stated_dialects(setup))))
@@ -81,6 +81,10 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
         check_sense(read, turned, reading)
     elif stated is not None and read.poses is not None:
         assumed.append(assumed_sense(stated, "as the program says"))
+    if machine is not None and machine.tilts_head and not is_exchange_file(text):
+        bare = {body.number: gauges[body.number] + 1.0 for t, body in zip(setup.tools, tools, strict=True)
+                if not t.gauge_given}
+        check_gauges(read, bare, lambda: reading(stated or machine, longer=bare))
     if setup.machine.coolant == "flood" and not read.cools and (read.kind == FEED).any():
         assumed.append(Assumed(AssumedKind.COOLANT, "off", "machine.coolant is flood and the program has no word for "
                                "it: cutting data for coolant do not hold, and chips may stay",

@@ -1,12 +1,13 @@
-"""Which way the rotary axes of a table turn, where the setup does not state it: the program may, or nobody knows.
+"""What decides where a tool stands on the part, where the setup does not state it.
 
-A wrong guess tilts the part to the other side, so the sense is never taken for granted in a program of others.
+That is the sense of the rotary axes of a table, which the program may state, and the gauge lengths of tools under a
+head that tilts. A wrong guess moves the tool aside, so neither is taken for granted in a program of others.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import numpy as np
@@ -79,6 +80,27 @@ def check_sense(read: Program, machine: Kinematics, again: Callable[[Kinematics]
                                 "the machine or a move in MDI shows it")
 
 
+def check_gauges(read: Program, bare: Collection[int], again: Callable[[], Program]) -> None:
+    """Refuse a program whose moves depend on gauge lengths that the setup does not state.
+
+    read  : the program with the lengths that the setup has, or its defaults for them
+    bare  : T numbers of the tools whose gauge length is a default
+    again : reads it with other lengths of these tools
+
+    Raises
+    ------
+    SetupError
+        Code no_gauge_length; the subjects are the tools.
+    """
+    used = sorted(set(np.unique(read.tool).tolist()) & set(bare))
+    if read.poses is None or not used or _same(read, again()):
+        return
+    names = tuple(f"T{n}" for n in used)
+    raise SetupError(f"the head tilts {' and '.join(names)} without tool centre point control, so every tip depends on "
+                     "the length from the spindle face, which the setup does not state", code="no_gauge_length",
+                     subjects=names, remedy="give the measured gauge_length_mm, tip to spindle face")
+
+
 def _same(a: Program, b: Program) -> bool:
     """Whether two readings move tip and tool axis alike."""
     if len(a) != len(b) or (a.poses is None) != (b.poses is None):
@@ -89,4 +111,4 @@ def _same(a: Program, b: Program) -> bool:
     return all(np.allclose(x, y, rtol=0.0, atol=SAME, equal_nan=True) for x, y in pairs)
 
 
-__all__ = ["assumed_sense", "check_sense", "sense_in_header"]
+__all__ = ["assumed_sense", "check_gauges", "check_sense", "sense_in_header"]

@@ -7,6 +7,7 @@ import pytest
 
 from geometry.errors import SetupError
 from service.from_wire import parse_setup
+from service.pipeline import plan
 from service.stages.job_part import read_job_part
 from service.verification.program_first import read_first
 from service.verification.program_proof import proved_program
@@ -21,6 +22,8 @@ HARMFUL = [  # program, part, kind of finding, its line, depth in mm or None
     ("09-fanuc-diagonal-rapid.nc", "plate", "rapid", 28, 4.0),
     ("15-stepnc-security-plane-in-part.stpnc", "plate", "rapid", 882, 61.5),
     ("17-g53-beyond-travel.ngc", "plate", "limit", 68, 99499.0),
+    ("20-s1-f20000.ngc", "plate", "load", 13, 20000 / 3),
+    ("24-slot-19-deep-in-titanium.ngc", "block", "load", 12, 5571.0),
     ("25-straight-drilling-paid-in-air.ngc", "plate", "plunge", 31, 4.5),
     ("30-rib-0.5x4x30-milled-off.ngc", "rib_0.5", "gouge", None, 4.0),
     ("32-knife-edge-shortened-0.7.ngc", "knife", "gouge", None, 0.7),
@@ -49,6 +52,21 @@ def test_harm_is_found(name, part, kind, line, depth):
         assert found[0]["line"] == line
     if depth is not None:
         assert max(f["depth"] for f in found) == pytest.approx(depth, abs=max(0.1 * depth, 0.005))
+
+
+def test_a_program_that_exceeds_the_words_of_its_tool_is_proved_with_cautions():
+    report = verified("23-feed-speed-life-of-tool-ignored.ngc", "plate")
+    said = [w for w in report["warnings"] if w["kind"] == "tool_data"]
+    assert report["state"] == "proved" and [w["limit"] for w in said] == [1000.0, 50.0, 10.0, 0.05]
+    assert [w["measured"] for w in said[:2]] == [6000.0, 500.0] and all(w["measured"] > w["limit"] for w in said)
+
+
+def test_a_plan_past_ten_times_a_limit_is_unproved(tmp_path):
+    setup = parse_setup((CASES / "28-plan-s1.json").read_text())
+    report = plan(CASES / "plate.step", setup, tmp_path, lambda _stage, _share: None)
+    loads = [f for f in report["findings"] if f["kind"] == "load"]
+    assert report["state"] == "unproved" and not list(tmp_path.glob("*.ngc"))
+    assert [f["limit"] for f in loads] == [pytest.approx(1.6), 0.05, 0.02] and loads[1]["depth"] > 80
 
 
 @pytest.mark.parametrize("name", GOOD)

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from geometry.cutting_mechanics import CARBIDE, CORE, compliance, cutting_force, engaged_angle
 from geometry.tool_body import ToolBody
-from toolpath.tool_deflection import CARBIDE, CORE, compliance, cutting_force, engaged_angle
 
 TOOLS = [
     ToolBody("T1", 1, 1.0, 0.5, 3.0, 0.9, 13.0, 4.0, 29.0),

@@ -10,7 +10,7 @@ from tests.pocket_case import SETUP, TOOL, block, scored, text
 from verify.kernels.stock import PLUNGE
 from verify.material.stock_field import run_field, stock_field
 from verify.material.stock_lines import blank, run_stock
-from verify.material.stock_pass import Ways, cores, descents
+from verify.material.stock_pass import Ways, cores, descents, parts
 from verify.model import NcProgram, ScoredSamples
 from verify.moves import Moves
 from verify.prove import prove
@@ -35,6 +35,7 @@ def pecks(aside, up=None):
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", [None, np.eye(3)], ids=["lines", "field"])
 def test_a_way_in_air_pays_for_no_descent(turn):
     drilled = plunges(pecks(16, up=0.8), turn=turn)
@@ -80,10 +81,13 @@ def test_volume_and_depth_of_a_cut(model, deep):
         run = run_stock(blank(PART.mesh, 0.1, SETUP), moves, [TOOL], SETUP)
     else:
         run = run_field(stock_field(PART.mesh, SETUP, 0.2), moves, [TOOL], SETUP)
-    long = 41.0
-    np.testing.assert_allclose(run.ways.volume[[0, 2]], [long * 4 * deep, long * 2 * deep], rtol=0.05)
-    np.testing.assert_allclose(run.ways.depth[[0, 2]], deep, atol=0.2 if model == "field" else 1e-6)
-    assert run.ways.volume[1] == 0.0
+    ways, long = run.ways.of_moves(parts(moves, [TOOL])), 41.0
+    np.testing.assert_allclose(ways.volume[[0, 2]], [long * 4 * deep, long * 2 * deep], rtol=0.05)
+    np.testing.assert_allclose(ways.depth[[0, 2]], deep, atol=0.2 if model == "field" else 1e-6)
+    assert ways.volume[1] == 0.0
+    # parts of 1 mm: those over the stock take a mm of the slot each
+    inside = run.ways.volume[np.arange(60) % 60][14:46]
+    np.testing.assert_allclose(inside, 4 * deep, rtol=0.12)
 
 
 def helix(radius, pitch, turns, per=48):
@@ -122,6 +126,7 @@ def test_the_stub_is_that_of_a_twin(radius, pitch, core):
     assert got == (pytest.approx(want, abs=0.06) if want > left else 0.0)
 
 
+@pytest.mark.slow
 def test_a_hollow_end_goes_neither_straight_down_nor_round_its_core():
     down = plunges(["G1 Z-0.5 F200"], HOLLOW)
     assert down and down[0].depth == pytest.approx(1.0, abs=0.01)

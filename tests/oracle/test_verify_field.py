@@ -17,6 +17,7 @@ from verify.kernels.field import brick_tops
 from verify.kernels.grid import cross_columns
 from verify.kernels.stock import CUTTER, HOLDER, NECK, PLUNGE, SHANK
 from verify.material.stock_field import DistanceField, run_field, stock_field
+from verify.material.stock_pass import parts
 from verify.model import ProofSetup
 from verify.moves import BOW, Moves
 
@@ -67,7 +68,8 @@ def test_volumes_taken_say_which_move_took_what():
     run = run_field(stock_field(MESH, block(), 0.2), moves, [tool], block(), bare=True)
     assert run.cut.tolist() == [True, False, False, False, True]
     # the last goes down to half a millimetre lower; over a place its disc is lowest where it leaves, pi R / 4 later
-    np.testing.assert_allclose(run.ways.volume[[0, 4]], [48.0, 48.0 * (0.25 + 0.5 / 18.0 * np.pi / 2.0)], rtol=0.01)
+    taken = run.ways.of_moves(parts(moves, [tool])).volume
+    np.testing.assert_allclose(taken[[0, 4]], [48.0, 48.0 * (0.25 + 0.5 / 18.0 * np.pi / 2.0)], rtol=0.01)
 
 
 def slot(tool, depth=4.0, lean=0.0):

@@ -9,7 +9,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, blocks, prism, terraces, tool
 from verify.kernels.surface.remains import CLOSE, SHARE
 from verify.moves import Moves
-from verify.surface.remains import Remains
+from verify.surface.remains import Rays, Remains, depths_both_ways
 from verify.tool_axes import ToolAxes
 
 FLAT = tool(8.0, 0.0)
@@ -137,3 +137,15 @@ def swept(moves, body, place, points):
             wide = body.radius - r + np.sqrt(np.maximum(r * r - low * low, 0.0))
             out |= (h >= 0.0) & (h <= body.flute_length) & (rho <= wide) & (low <= r)
     return out
+
+
+def test_a_ray_that_a_shallow_cut_drives_out_of_a_thin_edge_ends_in_nothing_that_is_left():
+    back, half, short, tolerance = 12.0, math.radians(7.5), 0.7, 0.25
+    y = back * math.tan(half)
+    part = prism([(0.0, 0.0), (back, -y), (back, y)], [(0, 1, 2)], 6.0)
+    left = Remains(TriangleTree(part.mesh), path((short - 4.0, -20, -8.0), (short - 4.0, 20, -8.0)), [FLAT])
+    up = part.mesh.normals[np.abs(part.mesh.normals[:, 1]) < 0.5]  # the two sides of the edge, and the back
+    up = up[np.argmin(np.abs(up[:, 0]))] if len(up) else np.array([-math.sin(half), 0.0, math.cos(half)])
+    points = np.array([[0.0, 1.0, 0.0], [0.1, 1.0, 0.1 * math.tan(half) * math.copysign(1.0, up[2])]])
+    rays = Rays(points, np.array([[-1.0, 0.0, 0.0], up]), np.array([-short, -0.8 * tolerance]))
+    assert agrees(depths_both_ways(left, rays, np.array([0]), 2, tolerance)[0], short)

@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.cutting_mechanics import effective_diameter
 from geometry.mesh import F64
 from toolpath.feeds.feed_scheduling import Pace
 from toolpath.linking.linker import FLUTE_SHARE, Linker
@@ -39,7 +40,6 @@ from toolpath.stock.cut_history import Depths, Walked
 from toolpath.stock.engagement import SKIN_SHARE, UNBOUNDED
 from toolpath.stock.stock_map import SURE_RIM, StockMap
 from toolpath.strategies import depth_layers
-from toolpath.tool_deflection import effective_diameter
 from toolpath.workingsteps import Workingstep
 from zones.machinable_area import AreaForm
 from zones.reach.tip_field import TipField

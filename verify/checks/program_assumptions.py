@@ -22,6 +22,11 @@ from verify.model import ProofSetup
 from verify.program.move_kinds import FEED
 
 STILL = 1e-9  # mm or rad: less is rounding
+FREE_PATH = Assumed(AssumedKind.PATH_MODE, "the written path",
+                    "parameters of the control decide how far it rounds corners; the error bound leaves that out",
+                    "state an exact stop (G61, G60) or a tolerance (G187 E, G641 ADIS, CYCLE832, cycle 32) before the "
+                    "first feed move")
+"""That no word of a program bounds how far the control leaves its path."""
 
 
 def rapids_decided(read: Sequence[FramedProgram], setup: ProofSetup) -> tuple[list[FramedProgram], ProofSetup]:
@@ -53,9 +58,7 @@ def program_assumptions(read: Sequence[FramedProgram], tools: Sequence[ToolBody]
     for r in read:
         yield from r.program.open
     if any(r.program.unbounded for r in read):
-        yield Assumed(AssumedKind.PATH_MODE, "the written path", "parameters of the control decide how far it rounds "
-                      "corners; the error bound leaves that out", "state an exact stop (G61, G60) or a tolerance "
-                      "(G187 E, G641 ADIS, CYCLE832, cycle 32) before the first feed move")
+        yield FREE_PATH
 
 
 def _several_axes(r: FramedProgram, tools: Sequence[ToolBody]) -> NDArray[np.bool_]:
@@ -69,4 +72,4 @@ def _several_axes(r: FramedProgram, tools: Sequence[ToolBody]) -> NDArray[np.boo
     return np.asarray((p.kind != FEED) & (several > 1) & (low_places(p, tools, r.setup) < clear))
 
 
-__all__ = ["program_assumptions", "rapids_decided"]
+__all__ = ["FREE_PATH", "program_assumptions", "rapids_decided"]

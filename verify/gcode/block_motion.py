@@ -83,6 +83,7 @@ class BlockMotion(FrameWords):
         if coordinates:
             return self.log.error("coordinates in a block with G4: some controls move, some dwell")
         self.dwell += values["P"]
+        self.log.dwells.append((self.log.line, self.log.count, values["P"]))
         return None
 
     def _target(self, axes: list[float | None]) -> list[float]:

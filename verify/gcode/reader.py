@@ -86,7 +86,8 @@ class Reader(BlockMotion):
                        log.turned.minutes(np.linalg.norm(end - start, axis=1), feed),
                        log.turned.poses(len(table), self.machine), tuple(log.notes), speed, coolant, log.changes,
                        dialect, log.unbounded, tuple(log.pauses), log.leaves, tuple(log.places), cut_off,
-                       open=() if self.control is None else tuple(self.control.assumed), cools=log.cools)
+                       open=() if self.control is None else tuple(self.control.assumed), cools=log.cools,
+                       dwells=tuple(log.dwells))
 
     def served(self, key: int | str) -> float:
         """A parameter that the control serves (``verify.gcode.flow.system_parameters``)."""

@@ -111,14 +111,15 @@ def _box(p, z0, z1, wide):
 
 
 @njit(**KERNEL)
-def _cut_brick(stock, tile, brick, p, cutter, steep, end_radius, twist, engaged, totals):
+def _cut_brick(stock, tile, brick, p, cutter, steep, end_radius, twist, engaged, parted, totals):
     """Lower the nodes of one brick by piece p.
 
     totals : added to: volume, volume by the end, 1 where stock was touched, the end's volume times the square of
              how far from the middle of the end it was, as a share of its radius, and the area on which it stands
-             then; last, how high over the tip the stock that went stood
+             then
 
     engaged : (parts,) int64, sectors of the cutter that met stock, added to, by even parts of the move
+    parted  : (parts, 2) int64, 1e-9 mm³ taken, and 1e-9 mm: how high over the tip the stock stood, by these parts
 
     Returns the new top.
     """
@@ -163,11 +164,13 @@ def _cut_brick(stock, tile, brick, p, cutter, steep, end_radius, twist, engaged,
                     if d < v - LEAST_CUT:
                         field[i, j, k] = d
                         gone = (share(v, h) - share(d, h)) * h * h * h
+                        on = min(max((qx * dx + qy * dy) / max(dx * dx + dy * dy, 1e-18), 0.0), 1.0)
+                        k_part = min(int(on * len(engaged)), len(engaged) - 1)
+                        parted[k_part, 0] += round(gone * VOLUME_UNITS)
+                        if v > 0.0 >= d:
+                            parted[k_part, 1] = max(parted[k_part, 1], round((qz - on * dz + 0.5 * h) * VOLUME_UNITS))
                         if v > 0.0:
                             totals[2] = 1.0
-                            if d <= 0.0:
-                                on = min(max((qx * dx + qy * dy) / max(dx * dx + dy * dy, 1e-18), 0.0), 1.0)
-                                totals[5] = max(totals[5], qz - on * dz + 0.5 * h)
                             plan = math.sqrt(dx * dx + dy * dy)
                             if d <= 0.0 and plan > 0.0:
                                 aside = min(abs(dx * qy - dy * qx) / plan, radius)
@@ -194,7 +197,7 @@ def _cut_brick(stock, tile, brick, p, cutter, steep, end_radius, twist, engaged,
 
 
 @njit(**KERNEL)
-def _cut(stock, bricks, p, cutter, steep, end_radius, twist, engaged, totals):
+def _cut(stock, bricks, p, cutter, steep, end_radius, twist, engaged, parted, totals):
     """Lower the nodes of a tile by a cutting part on piece p."""
     origin, h, band = stock.origin, stock.step, stock.band
     tile, tops = bricks.nodes, bricks.tops
@@ -216,7 +219,7 @@ def _cut(stock, bricks, p, cutter, steep, end_radius, twist, engaged, totals):
                 if gap(qx, qy, qz, dx, dy, dz, dx * dx + dy * dy, cutter) - half >= top:
                     continue
                 tops[bi, bj, bk] = _cut_brick(stock, tile, (bi, bj, bk), p, cutter, steep, end_radius, twist, engaged,
-                                              totals)
+                                              parted, totals)
 
 
 @njit(**KERNEL)
@@ -335,17 +338,18 @@ def _any_depth(best):
 
 @njit(**KERNEL)
 def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, twists, free, steep, tools: ToolArrays,
-               limits: ContactLimits, taken, engaged: EngagedArrays, events):
+               limits: ContactLimits, taken, parted, engaged: EngagedArrays, events):
     """Work all moves in order through the nodes of one tile, in place.
 
     tile   : (6,) int64, index, first and stop node in x, y, z
     twists : (m,) float64, rad, of the X that a tool sees a move in, row w, in the frame of the sectors
     free   : (m,) bool, rapids that need no clearance
     steep  : (m,) bool, feed moves that go down along the tool steeper than a ramp
-    taken  : (m, 5) int64, added to; 1e-9 mm³: what each move takes, and what the end of a steep one does; whole
+    taken  : (m, 4) int64, added to; 1e-9 mm³: what each move takes, and what the end of a steep one does; whole
              numbers, so that sums do not depend on the order of tiles; 1 where stock was touched and no share of a cell
              went; third what the end does times the square of the share of its radius it is from the middle; fourth
-             1e-9 mm² of stock right under the end; fifth 1e-9 mm, depth of cut along the tool axis
+             1e-9 mm² of stock right under the end
+    parted : (p, 2) int64, as ``verify.kernels.stock.CutTotals.taken``
     Returns the number of events found, which may exceed the table.
     """
     field, origin, h, band = stock
@@ -358,7 +362,7 @@ def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, tw
     solid = np.zeros(6, np.int64)
     bricks = TileArrays(tile, tops, solid)
     changing = _solid(tops, band, solid)
-    best, trial, piece, totals = np.zeros((16, 5)), np.zeros((16, 5)), np.empty(PIECE), np.zeros(6)
+    best, trial, piece, totals = np.zeros((16, 5)), np.zeros((16, 5)), np.empty(PIECE), np.zeros(5)
     rows = np.zeros((1, 6)) if len(bodies) == 0 else bodies
     sx, sy, sz = (tile[1] - tile[0] - 1) * h, (tile[3] - tile[2] - 1) * h, (tile[5] - tile[4] - 1) * h
     cx, cy = origin[0] + tile[0] * h + 0.5 * sx, origin[1] + tile[2] * h + 0.5 * sy
@@ -398,7 +402,7 @@ def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, tw
             near = not _beside(seen, 0.0, cutter.length, cutter.radius + grow)
             if near and feed:
                 _cut(stock, bricks, piece, cutter, steep[m], ends_radius[k], twists[m], sectors[parts[m]:parts[m + 1]],
-                     totals)
+                     parted[parts[m]:parts[m + 1]], totals)
             elif near:
                 _meet(stock, bricks, piece, rows[0], True, cutter, grow, TOUCHING, best)
             _look(stock, bricks, piece, tools, k, seen, feed, free[m], grow, slack, best)
@@ -407,7 +411,6 @@ def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, tw
             taken[m, 1] += round(totals[1] * VOLUME_UNITS)
             taken[m, 2] += round(totals[3] * VOLUME_UNITS)
             taken[m, 3] += round(totals[4] * VOLUME_UNITS)
-            taken[m, 4] = max(taken[m, 4], round(totals[5] * VOLUME_UNITS))
             cuts += 1
             if cuts % 64 == 0:
                 changing = _solid(tops, band, solid)

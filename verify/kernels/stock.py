@@ -84,7 +84,8 @@ class LineHistory(NamedTuple):
 class CutTotals(NamedTuple):
     """What a pass adds up, changed in place.
 
-    taken : (m, 2) int64, 1e-9 mm³ that each move takes, and 1e-9 mm: its deepest cut along the tool axis
+    taken : (p, 2) int64, 1e-9 mm³ that each part of a move takes (parts as in ``EngagedArrays``), and 1e-9 mm: its
+            deepest cut along the tool axis
     open  : (1,) uint8, set where some line would be dug deeper than the skin if nothing paid for it
     """
 
@@ -155,7 +156,7 @@ def _lower(lines, box, a, d, cutter, end_radius, skin, descents, m, history, eng
     """Lower the lines under feed move m.
 
     end_radius : mm, of the end of the tool that cuts straight down; skin : mm that it may dig
-    totals     : CutTotals
+    totals     : CutTotals, of the parts of this move
     engaged    : (parts,) int64, sectors of the cutter that met stock, added to, by even parts of the move
 
     Returns whether any stock went, and whether the flutes were under stock.
@@ -163,7 +164,7 @@ def _lower(lines, box, a, d, cutter, end_radius, skin, descents, m, history, eng
     height, origin, step, bottom = lines
     steep, earned, gone_on = descents.steep[m], descents.earned[m], descents.way[m]
     since, dug, come, begun, whole, _stub = history
-    volume, deepest = 0.0, 0.0
+    taken, count, cell = totals.taken, len(engaged), step * step * UNITS
     i0, i1, j0, j1 = box
     radius, corner, length, cone = cutter
     cut, under = False, False
@@ -201,8 +202,9 @@ def _lower(lines, box, a, d, cutter, end_radius, skin, descents, m, history, eng
             height[i, j] = low
             if gone > 1e-6:
                 cut = True
-                volume += max(low + gone - max(low, bottom), 0.0)
-                deepest = max(deepest, low + gone - max(a[2] + s * d[2], bottom))
+                k = min(int(s * count), count - 1)
+                taken[k, 0] += max(round((low + gone - max(low, bottom)) * cell), 1)
+                taken[k, 1] = max(taken[k, 1], round((low + gone - max(a[2] + s * d[2], bottom)) * UNITS))
             if plan > 0.0:
                 # a round end lowers a line bit by bit: what counts is all it takes off the line on its way over it
                 way = gone_on + s * plan
@@ -228,9 +230,6 @@ def _lower(lines, box, a, d, cutter, end_radius, skin, descents, m, history, eng
                 whole[i - i0, j - j0] += gone
                 if whole[i - i0, j - j0] > skin:
                     totals.open[0] = 1
-    if cut:
-        totals.taken[m, 0] += max(round(volume * step * step * UNITS), 1)
-        totals.taken[m, 1] = max(totals.taken[m, 1], round(deepest * UNITS))
     return cut, under
 
 
@@ -409,7 +408,8 @@ def stock_tile(box, lines: LineArrays, moves: MoveArrays, free, descents: Descen
         cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3])
         if feeds[m]:
             went, below = _lower(lines, box, a, d, cutter, ends_radius[k], skins[k], descents, m, history,
-                                 sectors[parts[m]:parts[m + 1]], totals, best)
+                                 sectors[parts[m]:parts[m + 1]],
+                                 CutTotals(totals.taken[parts[m]:parts[m + 1]], totals.open), best)
             if stubs:
                 _leave_stubs(lines, box, a, d, cutter, descents.core[k], descents.left[k], history.stub, best)
             if below:

@@ -150,14 +150,15 @@ def _of_origin(events: F64, run: StockPass, lost: int, origin: NDArray[np.int64]
         return StockPass(events, run.lost + lost, run.cut, run.engaged, run.ways)
     events = events.copy()
     events[:, 0] = origin[events[:, 0].astype(np.int64)]
-    cut, volume, depth = np.zeros(len(given), np.bool_), np.zeros(len(given)), np.zeros(len(given))
+    cut = np.zeros(len(given), np.bool_)
     cut[origin[run.cut]] = True
     first, there = parts(moves, tools), parts(given, tools)
     engaged, of = np.zeros(there[-1], np.int64), np.repeat(np.arange(len(moves)), np.diff(first))
     part = there[origin[of]] + (np.arange(len(of)) - first[of]) * moves.feed[of]
     np.bitwise_or.at(engaged, part, run.engaged)
-    np.add.at(volume, origin, run.ways.volume)
-    np.maximum.at(depth, origin, run.ways.depth)
+    volume, depth = np.zeros(there[-1]), np.zeros(there[-1])
+    np.add.at(volume, part, run.ways.volume)
+    np.maximum.at(depth, part, run.ways.depth)
     return StockPass(events, run.lost + lost, cut, engaged, Ways(volume, depth))
 
 

@@ -26,7 +26,6 @@ from verify.kernels.stock import PLUNGE
 from verify.kernels.tables import ContactLimits
 from verify.material.stock_pass import (
     StockPass,
-    Ways,
     descents,
     end_radii,
     event_table,
@@ -35,6 +34,7 @@ from verify.material.stock_pass import (
     noted,
     parts,
     tables_for,
+    ways_of,
 )
 from verify.material.tiles import run_tiles
 from verify.model import ProofSetup, StockKind
@@ -195,22 +195,24 @@ def run_field(field: DistanceField, moves: Moves, tools: Sequence[ToolBody], set
     x, y = sector_frames(moves.axes, len(moves))
     twists = np.arctan2((axes.about * y).sum(axis=1), (axes.about * x).sum(axis=1))
     first = parts(moves, tools)
-    sums, spare = tables_for(threads, (len(moves), 5))
+    sums, spare = tables_for(threads, (len(moves), 4))
     tables, blank_table = tables_for(threads, (int(first[-1]),))
+    parted, free_parted = tables_for(threads, (int(first[-1]), 2))
 
     def job(tile: NDArray[np.int64]) -> Callable[[], object]:
         def work() -> object:
-            events, taken, engaged = event_table(), spare.get(), blank_table.get()
-            n = field_tile(stock, tile, steps, turns, twists, free, steep, sizes, limits, taken,
+            events, taken, engaged, own = event_table(), spare.get(), blank_table.get(), free_parted.get()
+            n = field_tile(stock, tile, steps, turns, twists, free, steep, sizes, limits, taken, own,
                            EngagedArrays(first, engaged), events)
+            free_parted.put(own)
             spare.put(taken)
             blank_table.put(engaged)
             return noted(events), n
         return work
 
     events, lost = gather(run_tiles([job(t) for t in _tiles(field.values.shape)], threads, progress))
-    taken, engaged = np.sum([t[:, :4] for t in sums], axis=0), np.bitwise_or.reduce(tables)
-    ways = Ways(taken[:, 0] / VOLUME_UNITS, np.max([t[:, 4] for t in sums], axis=0) / VOLUME_UNITS)
+    taken, engaged = np.sum(sums, axis=0), np.bitwise_or.reduce(tables)
+    ways = ways_of(parted)
     end = ends[moves.tool]
     aside = np.linalg.norm(_across(moves.end - moves.start, axes.middle), axis=1)
     over = (np.pi * end**2 + 2.0 * end * aside)
@@ -219,7 +221,7 @@ def run_field(field: DistanceField, moves: Moves, tools: Sequence[ToolBody], set
     partly = (aside <= 0.25 * end) & (stands < WHOLE * over) & (stands > MIN_NODES * field.step**2)
     over = np.where(partly, stands, over)[:, None]
     plunges = _plunges(moves, axes, taken[:, [1, 2]] / VOLUME_UNITS / over, end,
-                       descents(moves, tools, setup, ways)[1],
+                       descents(moves, tools, setup, ways.of_moves(first))[1],
                        setup.plunge_skin * 2.0 * cutters[:, 0], round_off(tools))
     return StockPass(np.concatenate([events, plunges]), lost, taken[:, 0] > 0, engaged, ways)
 

@@ -36,7 +36,7 @@ from verify.blank.blank import blank_cylinder, blank_mesh, stock_bounds
 from verify.kernels.bodies import body_tile
 from verify.kernels.engaged import EngagedArrays
 from verify.kernels.heights import raise_offset
-from verify.kernels.stock import PLUNGE, UNITS, CutTotals, DescentArrays, LineArrays, stock_tile
+from verify.kernels.stock import PLUNGE, CutTotals, DescentArrays, LineArrays, stock_tile
 from verify.kernels.tables import ContactLimits
 from verify.material.stock_pass import (
     StockPass,
@@ -51,6 +51,7 @@ from verify.material.stock_pass import (
     parts,
     tables_for,
     ways_before,
+    ways_of,
 )
 from verify.material.tiles import CellGrid, run_tiles
 from verify.model import ProofSetup, StockKind
@@ -138,8 +139,9 @@ def run_stock(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup:
     last = int(np.flatnonzero(descents(moves, tools, setup)[0] & run.cut)[-1])
     rows = np.flatnonzero(moves.feed[:last + 1])
     chosen = np.isin(np.arange(len(moves)), rows)
+    ways = run.ways.of_moves(parts(moves, tools)).only(chosen)
     second, _ = _run(StockLines(field.origin, field.step, start, field.bottom), moves.only(chosen), tools, setup,
-                     run.ways.only(chosen), again, threads, StageProgress(progress).span(0.8, 1.0))
+                     ways, again, threads, StageProgress(progress).span(0.8, 1.0))
     plunges = second.events[second.events[:, 1] == PLUNGE]
     plunges[:, 0] = rows[plunges[:, 0].astype(np.int64)]
     events = np.concatenate([run.events[run.events[:, 1] != PLUNGE], plunges])
@@ -166,7 +168,7 @@ def _run(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     nx, ny = field.height.shape
     first = parts(moves, tools)
     tables, spare = tables_for(threads, (int(first[-1]),))
-    sums, free_sums = tables_for(threads, (len(moves), 2))
+    sums, free_sums = tables_for(threads, (int(first[-1]), 2))
     blocks = [(i, j) for i in range(0, nx, BLOCK) for j in range(0, ny, BLOCK)] if chosen is None else list(chosen)
     undecided = np.zeros(len(blocks), np.uint8)
 
@@ -181,8 +183,7 @@ def _run(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup: Proo
         return work
 
     events, lost = gather(run_tiles([job(k, *b) for k, b in enumerate(blocks)], threads, progress))
-    taken = Ways(np.sum([t[:, 0] for t in sums], axis=0) / UNITS, np.max([t[:, 1] for t in sums], axis=0) / UNITS)
-    run = StockPass(events, lost, cut.astype(bool), np.bitwise_or.reduce(tables), taken, under.astype(bool))
+    run = StockPass(events, lost, cut.astype(bool), np.bitwise_or.reduce(tables), ways_of(sums), under.astype(bool))
     return run, [b for b, is_open in zip(blocks, undecided.tolist(), strict=True) if is_open]
 
 

@@ -16,6 +16,7 @@ from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from verify.kernels.clash import ASIDE
 from verify.kernels.engaged import WINDOW
+from verify.kernels.stock import UNITS
 from verify.model import ProofSetup
 from verify.moves import Moves
 
@@ -110,7 +111,7 @@ def parts(moves: Moves, tools: Sequence[ToolBody]) -> NDArray[np.int64]:
 
 @dataclass(frozen=True, eq=False)
 class Ways:
-    """What each of m moves takes off the stock.
+    """What each of m moves, or parts of moves, takes off the stock.
 
     volume : (m,) float64, mm³
     depth  : (m,) float64, mm, deepest cut along the tool axis: the highest stock over the tip where the flutes take it
@@ -123,6 +124,23 @@ class Ways:
         """The moves where ``chosen`` (m,) bool is true."""
         return Ways(self.volume[chosen], self.depth[chosen])
 
+    def of_moves(self, first: NDArray[np.int64]) -> Ways:
+        """The same by move.
+
+        first : (n + 1,) int64, index, first part of each move, as ``parts``
+        """
+        if len(first) < 2:
+            return Ways(np.zeros(0), np.zeros(0))
+        return Ways(np.add.reduceat(self.volume, first[:-1]), np.maximum.reduceat(self.depth, first[:-1]))
+
+
+def ways_of(tables: Sequence[NDArray[np.int64]]) -> Ways:
+    """What parts of moves take, added up over the tables of all threads.
+
+    tables : (p, 2) int64 each, 1e-9 mm³ and 1e-9 mm, as ``verify.kernels.stock.CutTotals``
+    """
+    return Ways(np.sum([t[:, 0] for t in tables], axis=0) / UNITS, np.max([t[:, 1] for t in tables], axis=0) / UNITS)
+
 
 @dataclass(frozen=True, eq=False)
 class StockPass:
@@ -132,7 +150,7 @@ class StockPass:
     lost   : number of events lost because a table is full
     cut    : (m,) bool, moves that removed stock
     engaged : (p,) int64, bits, sectors of the cutter in stock (``verify.kernels.engaged``), by parts of moves
-    ways   : Ways, what each move takes
+    ways   : Ways, what each of the p parts takes
     under  : (m,) bool, moves whose flutes were under stock, or None where that makes no difference
     """
 

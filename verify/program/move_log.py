@@ -29,7 +29,7 @@ class Log:
     cools   : whether a word says that the coolant is on or off
     path_stated : number of moves before the first word of a path mode (G61, G64), None without one
     functions : first line of each M word that counts as a function of the machine
-    speeds, unknown, stops, blend, leaves, changes, unbounded, pauses, places : as in ``Program``
+    speeds, unknown, stops, blend, leaves, changes, unbounded, pauses, places, dwells : as in ``Program``
     rows : latest moves as (start x, y, z, end x, y, z, kind, feed, tool, line), mm and mm/min; call ``flush`` at 65 536
     """
 
@@ -53,6 +53,7 @@ class Log:
         self.blend = self.leaves = 0.0
         self.changes = 0
         self.places: list[tuple[int, int, float]] = []
+        self.dwells: list[tuple[int, int, float]] = []
         self.unbounded = False
         self.cools = False
         self.path_stated: int | None = None

@@ -115,6 +115,7 @@ class Program:
     stops   : tool changes, the end, and ways to a fixed place of the machine, where their height is known
     assumed : words that the first move needs and the program has not stated before it
     blend   : mm, largest rounding of a corner that G64 P allows
+    dwells  : line, number of moves before it and s of each G4
     places  : coordinates of the machine (G53) by line: line, axis 0 to 2, and mm
     planes  : security planes of a STEP-NC file, and retract planes that lie lower than the path before them ends
     open    : what it leaves to the control
@@ -163,6 +164,7 @@ class Program:
     planes: tuple[TravelPlane, ...] = ()
     open: tuple[Assumed, ...] = ()
     cools: bool = True
+    dwells: tuple[tuple[int, int, float], ...] = ()
 
     def __len__(self) -> int:
         return len(self.start)

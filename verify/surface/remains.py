@@ -141,7 +141,7 @@ class Rays(NamedTuple):
 
 
 def _ends(tree: TriangleTree, rays: Rays, rows: NDArray[np.int64]) -> F64:
-    """(m, 3) places at which rays (k,) meet what is left, without rays whose cut leaves by the far side of an edge."""
+    """(m, 3) places where rays (k,) meet what is left; without rays whose cut goes out at the far side of an edge."""
     there = rays.points[rows] + np.minimum(rays.residual[rows], 0.0)[:, None] * rays.normals[rows]
     cut = np.flatnonzero(rays.residual[rows] < -CLOSE)
     kept = np.ones(len(rows), np.bool_)

@@ -24,6 +24,7 @@ from verify.model import Finding, ProofSetup, ScoredSamples
 from verify.moves import Moves
 from verify.progress import Report, silent
 from verify.surface.between_samples import ClosePoints, close_points, judged_places
+from verify.surface.cutter_ends import end_depths, tip_gouges, turning_feet
 from verify.surface.excluded_faces import CutPlaces, excluded_cuts
 from verify.surface.guard_points import (
     CLOSER_SHARE,
@@ -42,7 +43,6 @@ from verify.surface.guard_points import (
 from verify.surface.remains import Rays, Remains, depths_both_ways
 from verify.surface.removal import residual_on_normals
 from verify.surface.sample_scores import RAY_ERROR
-from verify.surface.tip_gouges import end_depths, tip_gouges
 
 MIN_REACH = 1.0
 SEED_BATCH = 4000  # places that are looked at more closely at a time
@@ -150,8 +150,12 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
                            lambda f: tell(0.75 + 0.05 * f))
     even = len(table)
     tree = TriangleTree(part.mesh)
+    feet, wide = turning_feet(tree, moves, tools, setup.gouge_tolerance)
+    if len(feet.triangle):
+        table += shot.rays(feet.points, feet.normals, part.mesh.face_ids[feet.triangle], np.zeros(len(feet.triangle)),
+                           lambda f: tell(0.8 + 0.05 * f), full=True)
     table += _followed(tree, shot)
-    table = _at_ends(_deepened(table, even, tree, shot, lambda f: tell(0.8 + 0.2 * f)), tree, shot)
+    table = _at_ends(_deepened(table, even, tree, shot, lambda f: tell(0.85 + 0.15 * f)), tree, shot)
     gouged = np.flatnonzero((table.residual < -setup.gouge_tolerance - RAY_ERROR) & (table.mover >= 0))
     tips = tip_gouges(part.mesh, moves, tools, source, setup.gouge_tolerance + RAY_ERROR)
     row = np.arange(len(table))  # the stock on an edge belongs to two faces, so an edge has no allowance
@@ -162,7 +166,7 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
         _in_allowance(table, (row < on_edge) | ((row >= first) & (row < even)), setup, source),
         _excluded(table, slice(len(s), on_edge), part.mesh, shot, source),
         max([float(-table.residual.min(initial=0.0)), 0.0, *(f.depth for f in tips)]), guard.points, edge, close,
-        table.residual[first:even], shot.reach, wide_samples(part.mesh))
+        table.residual[first:even], shot.reach, [*wide_samples(part.mesh), *wide])
 
 
 def _followed(tree: TriangleTree, shot: _Shooting) -> _Table:

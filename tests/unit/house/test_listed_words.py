@@ -8,7 +8,7 @@ from tests.source_tree import ROOT
 from verify.model import FindingKind
 from zones.remainder.reasons import Reason
 
-OF_THE_JOB = {"coverage", "nothing_cut"}
+OF_THE_JOB = {"coverage", "load", "nothing_cut"}
 """Kinds that reports have for the whole job."""
 REPORTS = ("report.py", "verification_report.py")
 ALL = {*map(str, FindingKind), *OF_THE_JOB}

@@ -11,6 +11,7 @@ import pytest
 from benchmarks.passes import feeds_sweep
 from benchmarks.passes.feeds_sweep import MACHINES, OVERRIDES, faults, varied
 from examples.demo import demo_setup
+from geometry.cutting_mechanics import effective_diameter
 from schemas.materials import MATERIALS
 from service.cutting_data import MAX_CHIP_THINNING, chip_thinning, cutting_data
 from service.from_wire import parse_setup, tool_bodies
@@ -19,7 +20,7 @@ from service.stages.job_inputs import JobInputs
 from tests.synthetic_plan import BALL as SLIM
 from tests.synthetic_plan import step
 from toolpath.planning.job_plan import LATTICE_CARE
-from toolpath.tool_deflection import DeflectionEstimate, effective_diameter, left_by_layers
+from toolpath.tool_deflection import DeflectionEstimate, left_by_layers
 
 BALL = {"id": "T1", "number": 1, "kind": "ball", "diameter_mm": 3, "flutes": 2}
 FLAT = {"id": "T2", "number": 2, "kind": "flat", "diameter_mm": 4, "flutes": 4}

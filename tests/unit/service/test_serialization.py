@@ -15,6 +15,8 @@ from tests.synthetic_plan import BALL
 from toolpath.counterexamples import Counterexamples, HighWall
 from toolpath.planning.job_plan import Plan
 from toolpath.workingsteps import ArcSpan, Trajectory, TrajectoryKind, Workingstep
+from verify.assumptions import Assumed, AssumedKind
+from verify.cutting_words import ProgramCaution
 from verify.model import Finding, FindingKind
 from zones.lattice import Lattice
 
@@ -70,6 +72,12 @@ def test_a_plan_and_what_proofs_found_come_back(planned_step):
     assert pack(back, known) == pack(plan, known)
     found = Counterexamples({"T1": np.zeros((1, 3))}, left={"Z1": np.array([3, 4])}, unheld=(HighWall(2.0, 1.0, 0.1),))
     assert pack(unpack(pack(found))) == pack(found)
+
+
+def test_assumptions_and_cautions_of_a_proof_come_back():
+    said = (Assumed(AssumedKind.TABLE, 0.5, "a tool may run into the table", "machine.table_z_mm"),
+            ProgramCaution("dwell", 1, "p", 9, "stands", 133.0, 10.0, "lift"))
+    assert unpack(pack(said)) == said
 
 
 def test_a_tool_other_than_the_one_that_is_known_is_not_named_by_its_id(planned_step):

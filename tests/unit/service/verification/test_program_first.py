@@ -1,17 +1,23 @@
 """What a program of others leaves open about itself: its control, and the sense of the rotary axes."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
 from geometry.errors import SetupError
+from output.gcode.dialects import DIALECTS, Switches
+from output.gcode.program_writer import write_program
+from schemas.machine import DIALECT_ENDINGS
 from service.from_wire import parse_setup
 from service.verification.program_first import read_first
 from service.verification.rotary_sense import sense_in_header
+from tests.synthetic_plan import clamped
 from verify.assumptions import AssumedKind
 from verify.kinematics import Kinematics
 
 HEAD = "G21 G90 G17 G94 G54\nG91 G28 Z0.\nG90\nT1 M6\nS900 M3\nG0 A0 C0\nG43.4 H1\nG0 X0. Y0. Z50.\nG61\n"
+AC = Kinematics("table-table-AC")
 PLAIN = "G21 G90 G17 G94 G54\nT1 M6\nG43 H1\nG0 X1. Y1. Z9.\nM30\n"
 
 
@@ -48,6 +54,20 @@ def test_heads_are_not_asked():
     assert read.read.poses is not None and {a.what for a in read.assumed} == {AssumedKind.COOLANT}
 
 
+@pytest.mark.parametrize(("word", "gauge", "asked"), [("G43", None, True), ("G43", 90, False), ("G43.4", None, False)])
+def test_a_gauge_length_is_asked_for_where_the_head_tilts_without_a_kept_tip(word, gauge, asked):
+    tool = {"id": "T1", "kind": "ball", "diameter_mm": 6, **({} if gauge is None else {"gauge_length_mm": gauge})}
+    machine = {"kind": "5-axis", "kinematics": "head-head-AC", "pivots_mm": [[0, 0, 100]]}
+    own = parse_setup(json.dumps({"tools": [tool], "machine": machine}))
+    text = HEAD.replace("G43.4", word) + "G0 A30.\nG1 X10. F500.\nM30\n"
+    if not asked:
+        assert read_first(own, text, dialect="fanuc").read.poses is not None
+        return
+    with pytest.raises(SetupError) as caught:
+        read_first(own, text, dialect="fanuc")
+    assert caught.value.code == "no_gauge_length" and caught.value.subjects == ("T1",)
+
+
 def test_our_header_states_the_sense():
     """A program of ours says which way it counts; that the machine counts so too stays an assumption."""
     read = first("G0 A30.\nG1 X10. F500.\n", head="(TABLE AXES: A ISO 841, C RIGHT-HANDED)\n")
@@ -57,6 +77,16 @@ def test_our_header_states_the_sense():
     machine = Kinematics("table-table-BC")
     assert sense_in_header("(Table axes: A right-handed, C right-handed)", machine) is None
     assert sense_in_header("(Table axes: B right-handed)", machine) is None
+
+
+@pytest.mark.parametrize("dialect", DIALECT_ENDINGS)
+@pytest.mark.parametrize("sense", [(1, 1), (-1, 1), (-1, -1)])
+def test_the_header_of_every_control_is_understood(dialect, sense):
+    job = clamped("table-table-AC")
+    turned = replace(job, clamping=replace(job.clamping, machine=replace(job.clamping.machine, sense=sense)))
+    assert sense_in_header(write_program(turned, DIALECTS[dialect](Switches())), AC).sense == sense
+    heads = write_program(clamped("head-head-AC"), DIALECTS[dialect](Switches()))
+    assert sense_in_header(heads, AC) is None and "table axes" not in heads.lower()
 
 
 @pytest.mark.parametrize(("ending", "dialects", "taken", "others"), [

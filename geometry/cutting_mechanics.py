@@ -1,0 +1,149 @@
+"""Force on a milling tool in its cut, its deflection and the stress in it.
+
+Notation
+    F, E, I : force, N; modulus, N/mm2; second moment pi d^4 / 64, mm4
+    z       : height above the tip, mm
+    kc, mc  : specific cutting force of a chip of 1 mm by 1 mm, N/mm2, and its exponent
+    a, ae   : depth and width of cut, mm
+    b       : length of the edge in the cut, mm
+    fz, h   : feed per tooth and thickness of the chip, mm
+    phi     : engaged angle, rad
+
+Planner and proof use the same formulas; docs/theory/feeds.md has sources and omissions.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from geometry.mesh import F64
+from geometry.tool_body import ToolBody
+
+CARBIDE = 600e3
+"""N/mm2, modulus of cemented carbide."""
+STRENGTH, ROD, SIZE_EXPONENT = 4000.0, 3.3, 0.25
+"""N/mm2, bending stress at which rods of cemented carbide break (transverse rupture strength, ISO 3327); the diameter
+of such a rod, mm; and how the strength falls with the diameter: 3 / m for a Weibull modulus m of 12 [Weibull1951]."""
+CORE = 0.8
+"""Diameter of a solid bar as stiff as the flutes, of the diameter of the cutter."""
+
+
+def compliance(tool: ToolBody, modulus: float = CARBIDE) -> float:
+    """Deflection of the tip for each N of force, mm/N, for a tool held at the nose of its holder [Timoshenko1955].
+
+    The force acts at the tip, square to the axis. The tool is a stepped bar: flutes as a bar of ``CORE`` of the
+    diameter, neck, shank. The moment at the height z is F z, so tip / F = sum (z1^3 - z0^3) / (3 E I) over the
+    cylinders from z0 to z1. Shear and the holder's compliance are left out.
+    """
+    total, low = 0.0, 0.0
+    for top, wide in _bars(tool):
+        if top > low:
+            total += (top**3 - low**3) / (3.0 * modulus * math.pi * wide**4 / 64.0)
+            low = top
+    return total
+
+
+def strength(diameter: float) -> float:
+    """Bending stress at which a round bar of cemented carbide breaks, N/mm2: larger bars have larger flaws.
+
+    diameter : mm
+
+    >>> strength(3.3), round(strength(8.0))
+    (4000.0, 3206)
+    """
+    return STRENGTH * float((ROD / diameter) ** SIZE_EXPONENT)
+
+
+def bending_stress(tool: ToolBody, force: float, depth: float) -> tuple[float, float]:
+    """Bending stress in a tool held at the nose of its holder, and the strength there, N/mm2 [Timoshenko1955].
+
+    force : N, square to the axis, spread evenly over the cut; depth : mm, of the cut
+
+    The moment at the height z is F (z - a / 2), and the stress of a round bar 32 M / (pi d^3). It is greatest at the
+    upper end of flutes, neck or shank; that of the largest share of the strength counts. Flutes count as a bar of
+    ``CORE`` of the diameter.
+
+    >>> rod = ToolBody("T1", 1, 8.0, 0.0, 20.0, 8.0, 20.0, 8.0, 35.0)
+    >>> [round(x) for x in bending_stress(rod, 1000.0, 10.0)]
+    [597, 3206]
+    """
+    worst, low = (0.0, STRENGTH), 0.0
+    for top, wide in _bars(tool):
+        if top > low:
+            here = 32.0 * force * max(top - 0.5 * depth, 0.0) / (math.pi * wide**3), strength(wide)
+            worst, low = max(worst, here, key=lambda pair: pair[0] / pair[1]), top
+    return worst
+
+
+def _bars(tool: ToolBody) -> tuple[tuple[float, float], ...]:
+    """Upper end and diameter of the bars that a tool consists of, from the tip on, mm."""
+    return ((tool.flute_length, CORE * tool.diameter), (tool.neck_length, tool.neck_diameter),
+            (tool.stickout, tool.shank_diameter))
+
+
+def effective_diameter(diameter: float, corner_radius: float, depth: float) -> float:
+    """Diameter of a cutter at the height ``depth`` above its tip, all mm: D - 2 r + 2 sqrt(a (2 r - a)) in the corner.
+
+    >>> round(effective_diameter(10.0, 5.0, 1.0), 9), effective_diameter(10.0, 0.0, 1.0)
+    (6.0, 10.0)
+    """
+    if depth >= corner_radius:
+        return diameter
+    return diameter - 2.0 * corner_radius + 2.0 * math.sqrt(depth * (2.0 * corner_radius - depth))
+
+
+def engaged_angle(tool: ToolBody, depth: float, width: float) -> float:
+    """Engaged angle of a side cut at the effective diameter D, rad: cos(phi) = 1 - 2 ae / D; pi in a slot
+    [Altintas2012].
+
+    depth, width : mm
+
+    >>> round(math.degrees(engaged_angle(ToolBody("T1", 1, 10.0, 0.0, 20.0, 10.0, 20.0, 10.0, 40.0), 5.0, 2.5)), 9)
+    60.0
+    """
+    wide = effective_diameter(tool.diameter, tool.corner_radius, depth)
+    return math.acos(max(-1.0, 1.0 - 2.0 * width / wide)) if wide > 0.0 else math.pi
+
+
+def cutting_force(kc: float, mc: float, per_tooth: float, depth: float, width: float, tool: ToolBody,
+                  flutes: int) -> float:
+    """Cutting force of a milling tool, N: that of all teeth in the cut, of at least one [Kienzle1952].
+
+    kc, mc                   : N/mm2 and its exponent
+    per_tooth, depth, width  : mm
+
+    F = max(1, z phi / (2 pi)) b h^(1 - mc) kc, where h = fz sin(kappa) (1 - cos(phi)) / phi is the mean thickness of
+    the chip over the engaged angle, b the length of the edge up to the depth with its round corner as a chord, and
+    sin(kappa) = a / b.
+    """
+    if depth <= 0.0 or width <= 0.0:
+        return 0.0
+    r = tool.corner_radius
+    low = min(depth, r)
+    edge = math.hypot(low, math.sqrt(low * (2.0 * r - low))) + depth - low
+    phi = engaged_angle(tool, depth, width)
+    chip = per_tooth * depth / edge * (1.0 - math.cos(phi)) / phi
+    return float(max(1.0, flutes * phi / (2.0 * math.pi)) * edge * chip ** (1.0 - mc) * kc)
+
+
+def cutting_forces(kc: float, mc: float, per_tooth: F64, depth: F64, width: F64, tool: ToolBody, flutes: int) -> F64:
+    """Cutting force of n cuts, as ``cutting_force`` [Kienzle1952].
+
+    kc, mc                  : N/mm2 and its exponent
+    per_tooth, depth, width : (n,) float64, mm; depths and widths above 0
+
+    Returns (n,) float64, N.
+    """
+    r = tool.corner_radius
+    low = np.minimum(depth, r)
+    edge = np.hypot(low, np.sqrt(low * (2.0 * r - low))) + depth - low
+    wide = np.where(depth >= r, tool.diameter, tool.diameter - 2.0 * r + 2.0 * np.sqrt(low * (2.0 * r - low)))
+    phi = np.arccos(np.clip(1.0 - 2.0 * width / wide, -1.0, 1.0))
+    chip = per_tooth * depth / edge * (1.0 - np.cos(phi)) / phi
+    return np.asarray(np.maximum(1.0, flutes * phi / (2.0 * math.pi)) * edge * chip**(1.0 - mc) * kc)
+
+
+__all__ = ["CARBIDE", "CORE", "bending_stress", "compliance", "cutting_force", "cutting_forces", "effective_diameter",
+           "engaged_angle", "strength"]

@@ -1,0 +1,91 @@
+"""Ends of cutters where paths turn, against closed forms on an inclined plane and at a wall."""
+
+import math
+
+import numpy as np
+import pytest
+
+from geometry.mesh_queries.bvh import TriangleTree
+from tests.hand_parts import prism, terraces, tool
+from verify.moves import Moves
+from verify.surface.cutter_ends import turning_feet
+
+DEG = 20.0
+WIDE = 30.0
+HIGH = WIDE * math.tan(math.radians(DEG))
+NORMAL = np.array([math.sin(math.radians(DEG)), 0.0, math.cos(math.radians(DEG))])
+
+
+def slope():
+    """A wedge that falls along X from HIGH to 0."""
+    part = prism([(0.0, 0.0), (WIDE, 0.0), (0.0, HIGH)], [(0, 1, 2)], 10.0)
+    return TriangleTree(part.mesh)
+
+
+def moves(*tips):
+    at = np.array(tips, float)
+    n = len(at) - 1
+    return Moves(at[:-1].copy(), at[1:].copy(), np.ones(n, bool), np.zeros(n, np.int32))
+
+
+def tip_of(body, depth, x=12.0, y=1.234):
+    """The tip of a tool over x that stands ``depth`` mm deep in the slope."""
+    ring, ball = body.radius - body.corner_radius, body.corner_radius
+    face = HIGH - (x - ring) * math.tan(math.radians(DEG))  # under the middle of the corner, uphill
+    return np.array([x, y, face + (ball - depth) / NORMAL[2] - ball])
+
+
+@pytest.mark.parametrize("body", [tool(6.0, 0.0), tool(6.0, 3.0), tool(6.0, 1.0), tool(0.12, 0.0), tool(0.12, 0.06)])
+@pytest.mark.parametrize("depth", [0.012, 0.002])
+def test_the_deepest_place_of_a_dip_into_a_slope_is_found(body, depth):
+    tip = tip_of(body, depth)
+    feet, _ = turning_feet(slope(), moves(tip + [0, 0, 2.0], tip, tip + [0, 0, 2.0]), [body], 1.2 * depth)
+    assert len(feet.points)
+    ring, ball = body.radius - body.corner_radius, body.corner_radius
+    deepest = tip + [-ring - ball * NORMAL[0], 0.0, ball * (1.0 - NORMAL[2])]
+    away = np.linalg.norm(feet.points - (deepest + depth * NORMAL), axis=1)
+    assert away.min() < max(0.012 * body.radius, 1e-6)  # along the rim, where the depth hardly changes
+    assert feet.normals[away.argmin()] == pytest.approx(NORMAL, abs=1e-6)
+
+
+def test_a_path_that_goes_on_gives_none_and_neither_does_one_that_stays_within_the_tolerance():
+    body = tool(6.0, 3.0)
+    row = [tip_of(body, 0.05, y=y) for y in (-14.0, 0.0, 14.0)]
+    assert not len(turning_feet(slope(), moves(*row), [body], 0.01)[0].points)
+    tip = tip_of(body, 0.0039)
+    assert not len(turning_feet(slope(), moves(tip + [0, 0, 2.0], tip, tip + [0, 0, 2.0]), [body], 0.01)[0].points)
+
+
+def test_the_depths_are_those_of_the_dips():
+    body, depths = tool(1.0, 0.5), [0.02, 0.05, 0.011]
+    tips = [tip_of(body, d, y=3.0 * k) for k, d in enumerate(depths)]
+    path = [p for tip in tips for p in (tip + [0, 0, 2.0], tip, tip + [0, 0, 2.0])]
+    feet, _ = turning_feet(slope(), moves(*path), [body], 0.01)
+    own = [feet.depth[np.abs(feet.points[:, 1] - 3.0 * k) < 0.1].max() for k in range(3)]
+    assert own == pytest.approx(depths, abs=1e-6)
+    assert (np.diff(feet.depth) <= 0.0).all()
+
+
+def test_a_thin_tool_is_followed_along_its_way():
+    body = tool(0.12, 0.06)
+    row = [tip_of(body, 0.02, y=y) for y in (-0.5, 0.5)]
+    feet, _ = turning_feet(slope(), moves(row[0] - [0, 40.0, 0], *row, row[1] + [0, 40.0, 0]), [body], 0.01)
+    gaps = np.diff(np.unique(np.round(feet.points[:, 1], 6)))
+    assert len(feet.points) > 180 and gaps.max() < 0.11
+
+
+def test_few_places_along_a_long_way_are_told():
+    body = tool(6.0, 0.0)
+    tips = [np.array([15.0, y, 12.0]) for y in (-8.0, 8.0) * 1000]
+    _, notes = turning_feet(slope(), moves(*tips), [body], 0.01)
+    assert len(notes) == 1 and notes[0].what == "between_samples" and "T1" in notes[0].effect and notes[0].value > 0.5
+    assert not turning_feet(slope(), moves(*tips[:100]), [body], 0.01)[1]
+
+
+def test_a_stretch_of_a_wall_that_is_bitten_from_the_side():
+    mesh = terraces([0, 20, 40], [0, 30], [[0.0, 8.0]], -5.0)
+    body = tool(6.0, 0.0)
+    out, bite = np.array([15.0, 10.0, 0.0]), np.array([17.03, 10.0, 0.0])
+    feet, _ = turning_feet(TriangleTree(mesh), moves(out, bite, out), [body], 0.01)
+    on_wall = feet.points[np.abs(feet.points[:, 0] - 20.0) < 1e-9]
+    assert len(on_wall) and np.abs(on_wall[:, 1] - 10.0).min() < 0.02 and on_wall[:, 2].max() == pytest.approx(0.05)

@@ -1,0 +1,309 @@
+"""Load on the tools in their cuts, held against physical bounds and against the words of tool and material.
+
+Over a bound no cutter of the kind survives: finding ``load``. Between the recommendation and the bound: a caution.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.cutting_mechanics import bending_stress, compliance, cutting_forces, effective_diameter
+from geometry.mesh import F64
+from geometry.tool_body import ToolBody
+from verify.checks.program_sequence import FramedProgram
+from verify.cutting_words import CuttingWords, ProgramCaution
+from verify.findings import Source
+from verify.material.stock_pass import StockPass, parts
+from verify.model import Finding, FindingKind
+from verify.moves import Moves
+
+CHIP_SHARE = 0.2
+"""Feed per tooth over the diameter that no cutter bears. High-feed mills reach 0.083 [HighFeed2026], router bits 0.064
+[CutterShop2026]."""
+SPEED_TIMES = 30.0
+"""Cutting speed over the recommended one that no cutter bears. High-speed cutting reaches 28 [Schulz1992]."""
+RECOMMENDED_TIMES = 2.0
+"""Chip and speed over the recommended ones that give a caution: the recommendations are deliberately low."""
+WINDOW, SPACINGS = 0.5, 4.0  # radii of way, and spacings of the stock, over which a cut is measured; the greater counts
+DWELL_TURNS = 10.0  # turns of the spindle that a tool may stand in its cut: a spot face takes three
+ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class CutSequence:
+    """The m moves of all programs with what they do in the stock.
+
+    moves, source, run, first : of the proof; first part of each move, as ``verify.material.stock_pass.parts``
+    stretches, of : the parts as moves, and (p,) int64, index, the move of each
+    feed    : (m,) float64, mm/min of the tip; 0 for rapids and where only rotary axes turn
+    speed   : (m,) float64, 1/min; coolant : (m,) bool
+    minutes : (m,) float64, min, time of each move
+    cutter  : (m,) int64, count of tool changes and stops before each move: a fresh cutter may be in the spindle
+    dwells  : line, program, move before and s of each dwell
+    spacing : mm, of the stock
+    """
+
+    moves: Moves
+    source: Source
+    run: StockPass
+    first: NDArray[np.int64]
+    stretches: Moves
+    of: NDArray[np.int64]
+    feed: F64
+    speed: F64
+    coolant: NDArray[np.bool_]
+    minutes: F64
+    cutter: NDArray[np.int64]
+    dwells: tuple[tuple[int, int, int, float], ...]
+    spacing: float
+
+    def place(self, m: int) -> tuple[str, int]:
+        """Program and line of a move."""
+        return self.source.names[self.source.program[m]], int(self.source.line[m])
+
+
+def cut_sequence(read: Sequence[FramedProgram], known: NDArray[np.bool_], run: StockPass, moves: Moves, source: Source,
+                 tools: Sequence[ToolBody], stretches: Moves, of: NDArray[np.int64], took: F64,
+                 spacing: float) -> CutSequence:
+    """The moves of a proof with their feeds, speeds and times.
+
+    known     : (n,) bool, which moves of the programs the proof counts
+    stretches : (p,) parts of moves, as ``verify.material.engagement.in_parts``; of : (p,) int64, index, move of each
+    took  : (m,) float64, min, time of each counted move; spacing : mm, of the stock
+    """
+    programs = [r.program for r in read]
+    length = np.linalg.norm(moves.end - moves.start, axis=1)
+    minutes = np.concatenate([np.zeros(0), *(p.minutes for p in programs)])[known]
+    feed = np.divide(length, minutes, out=np.zeros(len(moves)), where=moves.feed & (minutes > 0.0))
+    speed = np.concatenate([np.zeros(0), *(p.speed if len(p.speed) else np.zeros(len(p)) for p in programs)])[known]
+    coolant = np.concatenate([np.zeros(0, np.bool_), *(p.coolant if len(p.coolant) else np.zeros(len(p), np.bool_)
+                                                       for p in programs)])[known]
+    changed, begun = [np.zeros(0, np.int64)], 0
+    dwells: list[tuple[int, int, int, float]] = []
+    row = np.cumsum(known) - 1  # the last counted move up to each move of the programs
+    for k, p in enumerate(programs):
+        stops = np.zeros(len(p) + 1, np.int64)
+        np.add.at(stops, [s.moves for s in p.pauses if s.event in ("tool change", "M0")], 1)
+        changed.append(np.cumsum(stops[:-1]) + (changed[-1][-1] + 1 if len(changed[-1]) else 0))
+        dwells.extend((line, k, int(row[begun + before - 1]), seconds) for line, before, seconds in p.dwells
+                      if before > 0 and row[begun + before - 1] >= 0)
+        begun += len(p)
+    return CutSequence(moves, source, run, parts(moves, tools), stretches, of, feed, speed, coolant, took,
+                       np.concatenate(changed)[known], tuple(dwells), spacing)
+
+
+def loads(cuts: CutSequence, tools: Sequence[ToolBody],
+          words: Mapping[int, CuttingWords]) -> tuple[list[Finding], list[ProgramCaution]]:
+    """Findings of loads that no cutter bears, and cautions where a program exceeds its tools' words, tool by tool.
+
+    words : by T number; a tool that is absent is not judged
+
+    Notes
+    -----
+    Depth and width of a cut are measured on the stock over ``WINDOW`` of the radius: the depth a is the highest stock
+    over the tip that went, the width V / (L a). Force, deflection and stress follow from them [Kienzle1952]
+    [Timoshenko1955]. Moves steeper than 45 degrees have no such force.
+    """
+    findings: list[Finding] = []
+    cautions: list[ProgramCaution] = []
+    ways = cuts.run.ways.of_moves(cuts.first)
+    for k, tool in enumerate(tools):
+        said = words.get(tool.number)
+        rows = np.flatnonzero((cuts.moves.tool == k) & cuts.run.cut & cuts.moves.feed & (cuts.feed > 0.0))
+        if said is None or not len(rows) or tool.named == "tap":
+            continue
+        judge = _Judge(cuts, tool, said, rows)
+        for found, caution in (judge.chips(), judge.speeds(ways.depth), judge.forces(k)):
+            findings.extend(found)
+            cautions.extend(caution)
+        cautions.extend(judge.stated())
+        cautions.extend(judge.descents())
+        cautions.extend(judge.standing())
+    return findings, cautions
+
+
+Judged = tuple[list[Finding], list[ProgramCaution]]
+
+
+@dataclass(frozen=True, eq=False)
+class _Judge:
+    """One tool: its moves in the cut, ``rows`` (r,) int64, index."""
+
+    cuts: CutSequence
+    tool: ToolBody
+    said: CuttingWords
+    rows: NDArray[np.int64]
+
+    def chips(self) -> Judged:
+        """Feed per tooth."""
+        rows = self.rows[self.cuts.speed[self.rows] > 0.0]
+        per_tooth = self.cuts.feed[rows] / (self.cuts.speed[rows] * self.said.flutes)
+        bound, wanted = CHIP_SHARE * self.tool.diameter, RECOMMENDED_TIMES * self.said.per_tooth
+
+        def text(value: float, i: int) -> str:
+            return (f"T{self.tool.number}: the feed per tooth is {value:.3f} mm at F{self.cuts.feed[rows[i]]:.6g} "
+                    f"S{self.cuts.speed[rows[i]]:g} with {self.said.flutes} teeth")
+        return self._over(rows, per_tooth, bound, wanted, "chip_load", text,
+                          f"{bound:.3f} mm, a fifth of the diameter, is more than any cutter bears",
+                          f"recommended are {self.said.per_tooth:.3f} mm", "feed slower or turn faster",
+                          self.said.per_tooth)
+
+    def speeds(self, depth: F64) -> Judged:
+        """Cutting speed at the largest diameter in the cut; depth : (m,) mm."""
+        rows = self.rows[self.cuts.speed[self.rows] > 0.0]
+        wide = np.array([effective_diameter(self.tool.diameter, self.tool.corner_radius, a)
+                         for a in np.minimum(depth[rows], self.tool.corner_radius + 1.0).tolist()])
+        speed = math.pi * wide * self.cuts.speed[rows] / 1000.0
+        bound, wanted = SPEED_TIMES * self.said.speed, RECOMMENDED_TIMES * self.said.speed
+
+        def text(value: float, i: int) -> str:
+            return f"T{self.tool.number}: cuts at {value:.0f} m/min with S{self.cuts.speed[rows[i]]:g}"
+        return self._over(rows, speed, bound, wanted, "cutting_speed", text,
+                          f"{bound:.0f} m/min is more than any cutter bears in this material",
+                          f"recommended are {self.said.speed:g} m/min", "turn slower", self.said.speed)
+
+    def forces(self, k: int) -> Judged:
+        """Depth and width of cut, deflection of the tip and stress in the tool; k : its place among the tools."""
+        cuts, tool, said = self.cuts, self.tool, self.said
+        if tool.along_axis_only:
+            return [], []
+        last, depth, section = self._sections(k)
+        _, cautions = self._over(last, section, math.inf, said.section, "depth_of_cut", lambda value, i:
+                                 f"T{tool.number}: depth times width of its cut are {value:.1f} mm²", "",
+                                 f"recommended are {said.section:.1f} mm²", "cut in layers, or in narrower steps")
+        per_tooth = np.divide(cuts.feed[last], cuts.speed[last] * said.flutes, out=np.full(len(last), np.inf),
+                              where=cuts.speed[last] > 0.0)
+        # a chip that no tooth can bear is a finding of its own, and no formula holds for it
+        turns = per_tooth <= CHIP_SHARE * tool.diameter
+        last, depth, section = last[turns], depth[turns], section[turns]
+        if said.kc is None or said.mc is None or not len(last):
+            return [], cautions
+        force = cutting_forces(said.kc, said.mc, per_tooth[turns], depth, section / depth, tool, said.flutes)
+        bend = force * compliance(tool)
+        stress, strong = np.array([bending_stress(tool, *pair) for pair in zip(force.tolist(), depth.tolist(),
+                                                                               strict=True)]).T
+
+        def cut(i: int) -> str:
+            return (f"T{tool.number}: its cut of {depth[i]:.2f} mm depth and {section[i] / depth[i]:.2f} mm width at "
+                    f"F{cuts.feed[last[i]]:.6g}")
+        findings, _ = self._over(last, stress / strong, 1.0, math.inf, "load", lambda share, i:
+                                 f"{cut(i)} bends it with {share * strong[i]:.0f} N/mm²",
+                                 "cemented carbide of that diameter breaks", "", "cut in layers or feed slower")
+        limit = float(strong[int(np.argmax(stress / strong))])
+        findings = [replace(f, depth=f.depth * limit, limit=limit) for f in findings]
+        _, bent = self._over(last, bend, math.inf, said.bend, "deflection", lambda value, i:
+                             f"{cut(i)} would bend its tip by {value:.3f} mm", "", f"limit {said.bend:.3f} mm",
+                             "cut in layers, feed slower, or use a shorter or thicker tool")
+        return findings, [*cautions, *bent]
+
+    def _sections(self, k: int) -> tuple[NDArray[np.int64], F64, F64]:
+        """Cuts by windows of way: last move, depth in mm and depth times width in mm² of each."""
+        cuts, tool = self.cuts, self.tool
+        way = cuts.stretches.end - cuts.stretches.start
+        up = np.tile([0.0, 0.0, 1.0], (len(way), 1)) if cuts.moves.axes is None else cuts.moves.axes.middle[cuts.of]
+        length = np.linalg.norm(way, axis=1)
+        flat = np.abs(np.einsum("ij,ij->i", way, up)) <= math.sqrt(0.5) * length
+        own = np.flatnonzero(cuts.stretches.feed & (cuts.stretches.tool == k) & flat & (length > 0.0))
+        if not len(own):
+            return np.zeros(0, np.int64), np.zeros(0), np.zeros(0)
+        window = max(WINDOW * tool.radius, SPACINGS * cuts.spacing)
+        begun = np.cumsum(length[own]) - length[own]
+        new = np.r_[True, (np.diff(own) != 1) | (np.diff(np.floor(begun / window)) != 0.0)]
+        at = np.flatnonzero(new)
+        volume = np.add.reduceat(cuts.run.ways.volume[own], at)
+        depth = np.minimum(np.maximum.reduceat(cuts.run.ways.depth[own], at), tool.flute_length)
+        long = np.maximum(np.add.reduceat(length[own], at), SPACINGS * cuts.spacing)
+        last = cuts.of[own[np.r_[at[1:], len(own)] - 1]]
+        cut = (volume > 0.0) & (depth > ROUNDING)
+        section = np.minimum(volume[cut] / long[cut], tool.diameter * depth[cut])
+        return last[cut], depth[cut], section
+
+    def stated(self) -> Iterator[ProgramCaution]:
+        """Speed, feed, plunge feed, life and coolant, as the tool states them."""
+        cuts, said, rows = self.cuts, self.said, self.rows
+        down = np.maximum(-self._rise(rows), 0.0)
+        for field, value, limit, unit in (("spindle_rpm", cuts.speed[rows], said.rpm, "1/min"),
+                                          ("feed_mm_min", cuts.feed[rows], said.feed, "mm/min"),
+                                          ("plunge_feed_mm_min", cuts.feed[rows] * down, said.plunge_feed, "mm/min")):
+            if limit is not None:
+                over = f"T{self.tool.number}: its {field} is exceeded"
+                yield from self._over(rows, value, math.inf, limit, "tool_data",
+                                      partial("{0}: {2:.6g} {1}".format, over, unit), "",
+                                      f"the tool states {limit:g}", "keep to the figure of the tool, or correct it")[1]
+        if said.life is not None:
+            cutter, of = np.unique(cuts.cutter[rows], return_inverse=True)
+            minutes = np.bincount(of.reshape(-1), cuts.minutes[rows], len(cutter))
+            worst = int(np.argmax(minutes))
+            mine = rows[of.reshape(-1) == worst]
+            if minutes[worst] > said.life * (1.0 + ROUNDING):
+                spent = np.cumsum(cuts.minutes[mine])
+                m = int(mine[min(int(np.searchsorted(spent, said.life)), len(mine) - 1)])
+                yield self._caution("tool_data", m, f"T{self.tool.number}: is in the cut for {minutes[worst]:.3g} min "
+                                    f"without a change; its life_min is {said.life:g}", float(minutes[worst]),
+                                    said.life, "change the cutter before, or correct its life")
+        if said.coolant:
+            dry = rows[~cuts.coolant[rows]]
+            if len(dry):
+                long = float(np.linalg.norm(cuts.moves.end[dry] - cuts.moves.start[dry], axis=1).sum())
+                yield self._caution("coolant", int(dry[0]), f"T{self.tool.number}: cuts {long:.0f} mm dry; the tool "
+                                    "states coolant", long, 0.0, "turn the coolant on (M8)")
+
+    def descents(self) -> Iterator[ProgramCaution]:
+        """Feed of steep ways down in stock, where the tool states no plunge feed and is no drill."""
+        cuts, said = self.cuts, self.said
+        rows = self.rows[(cuts.speed[self.rows] > 0.0) & (self._rise(self.rows) < -math.sqrt(0.5))]
+        if said.plunge_feed is None and not self.tool.cuts_down:
+            per_tooth = cuts.feed[rows] / (cuts.speed[rows] * said.flutes)
+            yield from self._over(rows, per_tooth, math.inf, said.per_tooth, "plunge_feed", lambda value, i: (
+                f"T{self.tool.number}: goes down into stock at F{cuts.feed[rows[i]]:.6g}, {value:.3f} mm a tooth"), "",
+                f"recommended are {said.per_tooth:.3f} mm at most, in the cut", "go down slower")[1]
+
+    def standing(self) -> Iterator[ProgramCaution]:
+        """Dwells at the end of a cut."""
+        cuts, mine = self.cuts, set(self.rows.tolist())
+        for line, program, before, seconds in cuts.dwells:
+            turns = seconds * cuts.speed[before] / 60.0
+            if before in mine and turns > DWELL_TURNS:
+                yield ProgramCaution("dwell", self.tool.number, cuts.source.names[program], line,
+                                     f"T{self.tool.number}: stands in its cut for {seconds:g} s, {turns:.0f} turns",
+                                     float(turns), DWELL_TURNS, "lift the tool before it waits")
+
+    def _rise(self, rows: NDArray[np.int64]) -> F64:
+        """Sine of the slope of moves along the tool axis."""
+        way = self.cuts.moves.end[rows] - self.cuts.moves.start[rows]
+        up = np.array([0.0, 0.0, 1.0]) if self.cuts.moves.axes is None else self.cuts.moves.axes.middle[rows]
+        return np.asarray((way * up).sum(axis=1) / np.maximum(np.linalg.norm(way, axis=1), 1e-12))
+
+    def _over(self, rows: NDArray[np.int64], value: F64, bound: float, wanted: float, kind: str,
+              text: Callable[[float, int], str], why: str, advice: str, remedy: str,
+              limit: float | None = None) -> Judged:
+        """A finding for the largest value over the bound, else a caution for one over the wanted value.
+
+        text : gives the sentence of a value and its place in ``rows``; limit : of the caution, ``wanted`` where None
+        """
+        if not len(rows) or value.max() <= min(bound, wanted) * (1.0 + ROUNDING):
+            return [], []
+        worst = int(np.flatnonzero(value >= value.max() * (1.0 - ROUNDING))[0])
+        m, most = int(rows[worst]), float(value[worst])
+        if most <= bound * (1.0 + ROUNDING):
+            return [], [self._caution(kind, m, f"{text(most, worst)}; {advice}", most,
+                                      wanted if limit is None else limit, remedy)]
+        program, line = self.cuts.place(m)
+        x, y, z = (round(float(v), 6) for v in self.cuts.moves.end[m])
+        over = rows[value > bound * (1.0 + ROUNDING)]
+        return [Finding(FindingKind.LOAD, program, line, None, None, (x, y, z), most, bound,
+                        f"{text(most, worst)}; {why}: {remedy}", len(over), tip=(x, y, z))], []
+
+    def _caution(self, kind: str, m: int, message: str, measured: float, limit: float, remedy: str) -> ProgramCaution:
+        program, line = self.cuts.place(m)
+        return ProgramCaution(kind, self.tool.number, program, line, f"{message} (line {line})", measured, limit,
+                              remedy)
+
+
+__all__ = ["CutSequence", "cut_sequence", "loads"]

@@ -1,0 +1,295 @@
+"""Where ends of cutters press deepest into the part: rays there see pits and lenses that lie between the guard points.
+
+A cut that is narrow to all sides mostly ends where the path turns: down and up, in and out. So the end of a tool is
+looked at wherever a feed move ends at a corner of the path, and at even distances along all feed moves. The points of
+drills and pointed chamfer mills have findings of their own. Coordinates are float64, mm, in the setup frame.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64, TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.nearest import nearest
+from geometry.mesh_queries.rays import first_hits
+from geometry.tool_body import ToolBody
+from verify.assumptions import Assumed, AssumedKind
+from verify.findings import Source, gouge_findings
+from verify.model import Finding
+from verify.moves import Moves
+from verify.surface.guard_points import CLOSER_SHARE, GUARD_SPACING, PATH_BATCH, inside_part, path_places
+from verify.tool_axes import square_to
+
+CORNER = math.cos(math.radians(45.0))  # of the angle by which a path turns at a corner
+STEP = 0.1  # mm between places along the ways
+MOST_RINGS, MOST_BALLS = 50_000, 400_000  # places along the ways of a tool; more get a wider step
+ENDS_AROUND = 8  # places of each ring of ``end_depths``
+TILTS = (0.0, 0.25 * math.pi, 0.5 * math.pi)  # of rings on a corner, from its lowest place to its side
+AROUND = 16  # places round the rim of an end
+ROUNDS = 4  # of the search round the deepest of them
+LIFT, LIFT_SHARE = 0.05, 0.25  # mm, and of the radius: a second rim over the sharp one, for walls
+TOLD = 0.5  # mm: a wider step along the ways is a note
+THIN = 0.05  # mm
+BATCH = 4096  # poses
+INT = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Feet:
+    """Places of the surface over the deepest points of ends, with the normals that lead to these.
+
+    points, normals : (n, 3) float64, mm and unit, setup frame; triangle : (n,) int64, index
+    depth           : (n,) float64, mm, how far the end presses in there
+    """
+
+    points: F64
+    normals: F64
+    triangle: INT
+    depth: F64
+
+    def thinned(self) -> Feet:
+        """The deepest of each cell of ``THIN``, the deepest first."""
+        order = np.lexsort((*self.points.T, -self.depth))
+        cell = np.floor(self.points[order] / THIN).astype(np.int64)
+        rows = order[np.sort(np.unique(cell, axis=0, return_index=True)[1])] if len(order) else order
+        return Feet(self.points[rows], self.normals[rows], self.triangle[rows], self.depth[rows])
+
+
+def turning_feet(tree: TriangleTree, moves: Moves, tools: Sequence[ToolBody],
+                 tolerance: float) -> tuple[Feet, list[Assumed]]:
+    """Places of the surface into which ends of cutters press where paths turn.
+
+    tree      : TriangleTree of the part
+    tools     : those that ``Moves.tool`` refers to
+    tolerance : mm, gouge tolerance; ends that press in by less than 0.4 of it give nothing
+
+    Returns Feet, the deepest first, and what is taken for granted of tools whose ways are so long that few of their
+    places are looked at.
+
+    Notes
+    -----
+    The deepest place on a rim of radius R is searched from 16 places round it, to R / 300. A ball has one sphere.
+    """
+    found, notes = list[Feet](), list[Assumed]()
+    least = CLOSER_SHARE * tolerance
+    for k, tool in enumerate(tools):
+        if tool.cone_height <= 0.0:
+            rows, share = _corners(moves, k)
+            found += [_pressed(tree, *_placed(moves, rows, share, tool, tree.mesh.bounds), tool, lift, least)
+                      for lift in _lifts(tool)]
+        if tool.cone_height <= 0.0 and not _seen(tool, least, tolerance):
+            rows, share, step = _ways(moves, k, tool, tree.mesh.bounds)
+            if step > TOLD:
+                notes.append(Assumed(AssumedKind.BETWEEN_SAMPLES, round(step, 2), f"the paths of {tool.id} are long: a "
+                                     f"smooth dip shorter than {step:.1f} mm may be missed aside of the middle of its "
+                                     "end", "verify a part of the program at a time"))
+            found.append(_pressed(tree, *_placed(moves, rows, share, tool, tree.mesh.bounds), tool, 0.0, least))
+    return _joined(found).thinned(), notes
+
+
+def _joined(parts: Sequence[Feet]) -> Feet:
+    none = np.zeros((0, 3))
+    return Feet(np.concatenate([none, *(f.points for f in parts)]), np.concatenate([none, *(f.normals for f in parts)]),
+                np.concatenate([np.zeros(0, np.int64), *(f.triangle for f in parts)]),
+                np.concatenate([np.zeros(0), *(f.depth for f in parts)]))
+
+
+def _seen(tool: ToolBody, least: float, tolerance: float) -> bool:
+    """Whether every cut of a ball that is too deep covers a guard point by more than ``least`` mm."""
+    round_ = tool.corner_radius >= tool.radius - 1e-12
+    return round_ and 0.5 * (0.87 * GUARD_SPACING) ** 2 / tool.radius + least < tolerance
+
+
+def _corners(moves: Moves, k: int) -> tuple[INT, F64]:
+    """Moves of a tool that end, or begin, at a corner of the path, and the share of the move that is: 1 or 0."""
+    way = moves.end - moves.start
+    length = np.linalg.norm(way, axis=1)
+    way = way / np.maximum(length, 1e-12)[:, None]
+    feed = moves.feed & (moves.tool == k) & (length > 0.0)
+    joined = feed[:-1] & feed[1:] & (np.einsum("ij,ij->i", way[:-1], way[1:]) > CORNER)
+    ends = np.flatnonzero(feed & ~np.append(joined, False))
+    starts = np.flatnonzero(feed & ~np.append(False, feed[:-1]))
+    return np.concatenate([ends, starts]), np.concatenate([np.ones(len(ends)), np.zeros(len(starts))])
+
+
+def _ways(moves: Moves, k: int, tool: ToolBody, bounds: F64) -> tuple[INT, F64, float]:
+    """Even places along the feed moves of a tool that come near the part: moves, shares of them, and mm between two."""
+    low, high = np.minimum(moves.start, moves.end), np.maximum(moves.start, moves.end)
+    near = ((low < bounds[1] + tool.radius) & (high > bounds[0] - tool.radius)).all(axis=1)
+    rows = np.flatnonzero(moves.feed & (moves.tool == k) & near)
+    length = np.linalg.norm(moves.end[rows] - moves.start[rows], axis=1)
+    past = np.cumsum(length)
+    most = MOST_BALLS if tool.corner_radius >= tool.radius - 1e-12 else MOST_RINGS
+    if not len(rows) or past[-1] <= 0.0:
+        return np.zeros(0, np.int64), np.zeros(0), STEP
+    step = max(STEP, float(past[-1]) / most)
+    at = np.arange(0.0, past[-1], step)
+    own = np.minimum(np.searchsorted(past, at, side="right"), len(rows) - 1)
+    return rows[own], 1.0 - (past[own] - at) / np.maximum(length[own], 1e-12), step
+
+
+def _placed(moves: Moves, row: INT, share: F64, tool: ToolBody, bounds: F64) -> tuple[F64, F64]:
+    """Tips and axes, (n, 3) mm and unit, at shares of moves, where the end of the tool can reach the part."""
+    tip = moves.start[row] + share[:, None] * (moves.end - moves.start)[row]
+    axis = np.tile([0.0, 0.0, 1.0], (len(row), 1))
+    if moves.axes is not None:
+        turn = (share * moves.axes.angle[row])[:, None]
+        axis = np.cos(turn) * moves.axes.axis[row] + np.sin(turn) * np.cross(moves.axes.about[row],
+                                                                              moves.axes.axis[row])
+    near = ((tip > bounds[0] - 2.0 * tool.radius) & (tip < bounds[1] + 2.0 * tool.radius)).all(axis=1)
+    both = np.unique(np.round(np.column_stack([tip, axis])[near], 7), axis=0)
+    return both[:, :3], both[:, 3:]
+
+
+def _pressed(tree: TriangleTree, tip: F64, axis: F64, tool: ToolBody, lift: float, least: float) -> Feet:
+    """The deepest place of each pose (n, 3) that presses in by more than ``least`` mm, on a rim ``lift`` mm up."""
+    return _joined([_deepest(tree, tip[i:i + BATCH], axis[i:i + BATCH], tool, lift, least)
+                    for i in range(0, len(tip), BATCH)])
+
+
+def _lifts(tool: ToolBody) -> tuple[float, ...]:
+    return (0.0,) if tool.corner_radius > 0.0 else (0.0, min(LIFT, LIFT_SHARE * tool.radius))
+
+
+def _deepest(tree: TriangleTree, tip: F64, axis: F64, tool: ToolBody, lift: float, least: float) -> Feet:
+    x = square_to(axis)
+    y = np.cross(axis, x)
+    ring, ball = tool.radius - tool.corner_radius, tool.corner_radius
+    middle = tip + (ball + lift) * axis
+
+    def depth(rows: INT, angle: F64) -> tuple[F64, F64, F64, INT]:
+        """How deep the end presses in at angles (k,) rad of poses; feet, ways out, triangles."""
+        at = middle[rows] + ring * (np.cos(angle)[:, None] * x[rows] + np.sin(angle)[:, None] * y[rows])
+        far, triangle, foot = nearest(tree, at, ball if ball > 0.0 else np.inf)
+        met = triangle >= 0
+        inside = met & (np.einsum("ij,ij->i", at - foot, tree.mesh.normals[triangle]) < 0.0)
+        doubtful = np.flatnonzero(inside & (far > least))
+        inside[doubtful] = inside_part(tree, at[doubtful])
+        deep = np.where(met, ball + np.where(inside, far, -far), -np.inf)
+        way = np.where(inside[:, None], foot - at, at - foot) / np.maximum(far, 1e-12)[:, None]
+        flat = far < 1e-9
+        way[flat] = tree.mesh.normals[triangle[flat]]
+        return deep, foot, way, triangle
+
+    n, around = len(tip), 1 if ring <= 0.0 else AROUND
+    every = np.repeat(np.arange(n), around)
+    angle = np.tile(2.0 * math.pi * np.arange(around) / around, n)
+    deep, foot, way, triangle = depth(every, angle)
+    best = np.arange(n) * around + deep.reshape(n, around).argmax(axis=1)
+    rough = ring * (1.0 - math.cos(math.pi / around))  # by which the rim may be deeper between two places
+    rows = np.flatnonzero(deep[best] > least - rough)
+    deep, foot, way, triangle, angle = deep[best], foot[best], way[best], triangle[best], angle[best]
+    span = math.pi / around
+    for _ in range(ROUNDS if around > 1 else 0):
+        for side in (-span, span):
+            turned = angle[rows] + side
+            found = depth(rows, turned)
+            better = found[0] > deep[rows]
+            at = rows[better]
+            deep[at], foot[at], way[at], triangle[at] = (f[better] for f in found)
+            angle[at] = turned[better]
+        span *= 0.5
+    rows = rows[deep[rows] > least]
+    return Feet(foot[rows], way[rows], triangle[rows], deep[rows])
+
+
+def tip_gouges(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], source: Source,
+               tolerance: float) -> list[Finding]:
+    """Findings where feed moves of pointed tools end with the tip more than ``tolerance`` mm inside the part.
+
+    The surface below a point is the farthest from it where a hole ends in a cone: no normal of the cone leads there. So
+    the depth of a tip is its own distance from the part.
+    """
+    pointed = np.array([t.cone_height > 0.0 and t.tip_diameter <= 0.0 for t in tools], np.bool_)
+    if not pointed.any() or not len(moves):
+        return []
+    rows, tree = np.flatnonzero(moves.feed & pointed[moves.tool]), TriangleTree(mesh)
+    tips, which = np.unique(np.round(moves.end[rows], 6), axis=0, return_index=True)
+    depth, triangle, _ = nearest(tree, tips)
+    deep = np.flatnonzero(depth > tolerance)
+    up = np.tile([0.0, 0.0, 1.0], (len(deep), 1))
+    _, met = first_hits(tree, tips[deep], up)
+    # a tip is inside where the surface over it is met from inside
+    inside = deep[(met >= 0) & (mesh.normals[met, 2] > 0.0)]
+    return gouge_findings(tips[inside], mesh.face_ids[triangle[inside]], depth[inside], np.zeros(len(inside)),
+                          rows[which[inside]].astype(np.int32), source, tolerance)
+
+
+def end_depths(tree: TriangleTree, moves: Moves, rows: INT, tools: Sequence[ToolBody],
+               tolerance: float) -> tuple[F64, F64, INT]:
+    """How deep the ends of mills go into the part on some moves.
+
+    rows      : (k,) int64, index, the moves; tools : those that ``Moves.tool`` refers to
+    tolerance : mm; what is less deep counts 0
+
+    Returns
+    -------
+    depth    : (k,) float64, mm, largest distance of a place of the end, inside the part, from the surface
+    place    : (k, 3) float64, mm, setup frame, the place of the surface nearest to it
+    triangle : (k,) int64, index of its triangle, -1 where the depth is 0
+
+    Notes
+    -----
+    Places are the middle of the end and eight on its rim, of a corner eight at each of three heights, in steps of half
+    a radius along the move and at both ends of it. Too small by 8 % of the radius at most on a move straight down.
+    """
+    depth, place, triangle = np.zeros(len(rows)), np.zeros((len(rows), 3)), np.full(len(rows), -1, np.int64)
+    radius = np.array([t.radius for t in tools])[moves.tool[rows]]
+    count = np.ceil(np.linalg.norm((moves.end - moves.start)[rows], axis=1) / (0.5 * radius)).astype(np.int64) + 1
+    ends = np.cumsum(count)
+    first = 0
+    while first < len(rows):
+        last = max(int(np.searchsorted(ends, ends[first] - count[first] + PATH_BATCH, side="right")), first + 1)
+        chosen = rows[first:last]
+        tip, z, of = path_places(moves.only(chosen), count[first:last])
+        near = _near_surface(tree, tip, z, of, moves.tool[chosen], tools)
+        tip, z, of = tip[near], z[near], of[near]
+        tool = moves.tool[chosen][of]
+        for k in np.unique(tool).tolist():
+            mine = np.flatnonzero(tool == k)
+            for at in _end_places(tip[mine], z[mine], tools[k]):
+                away, row, foot = nearest(tree, at)
+                deep = np.flatnonzero(away > np.maximum(depth[first:last][of[mine]], tolerance))
+                deep = deep[inside_part(tree, at[deep])]
+                deep = deep[np.lexsort((deep, -away[deep], of[mine[deep]]))]
+                move, one = np.unique(of[mine[deep]], return_index=True)
+                best = deep[one]
+                depth[first + move], place[first + move], triangle[first + move] = away[best], foot[best], row[best]
+        first = last
+    return depth, place, triangle
+
+
+def _near_surface(tree: TriangleTree, tip: F64, z: F64, of: INT, tool: NDArray[np.int32],
+                  tools: Sequence[ToolBody]) -> NDArray[np.bool_]:
+    """(n,) bool: places of moves that come so near to the surface somewhere that their end may go through it.
+
+    tip, z : (n, 3) float64, mm and unit; of : (n,) int64, index, the move of each; tool : (m,) int32, index, of moves
+    """
+    corner, radius = (np.array(v)[tool][of] for v in ([t.corner_radius for t in tools], [t.radius for t in tools]))
+    away, _, _ = nearest(tree, tip + corner[:, None] * z, float(radius.max(initial=0.0)))
+    ball = corner >= radius - 1e-9
+    through = np.zeros(len(tool), np.bool_)
+    through[of[away < np.where(ball, radius - 1e-4, radius)]] = True
+    return through[of]
+
+
+def _end_places(tip: F64, z: F64, tool: ToolBody) -> list[F64]:
+    """Places of the end of a tool with its tip on (n, 3), mm, and its axis along (n, 3): each an (n, 3) array."""
+    out = [tip]
+    if tool.cone_height > 0.0:
+        return out
+    x = square_to(z)
+    y = np.cross(z, x)
+    corner = tool.corner_radius
+    for tilt in TILTS if corner > 0.0 else TILTS[:1]:
+        wide, high = tool.radius - corner * (1.0 - math.sin(tilt)), corner * (1.0 - math.cos(tilt))
+        if wide > 0.0:
+            out += [tip + wide * (math.cos(t) * x + math.sin(t) * y) + high * z
+                    for t in (2.0 * math.pi * np.arange(ENDS_AROUND) / ENDS_AROUND).tolist()]
+    return out
