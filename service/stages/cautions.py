@@ -119,7 +119,7 @@ def cooled(inputs: JobInputs) -> list[JobCaution]:
 
 
 def uncut_centres(inputs: JobInputs, steps: Sequence[Workingstep]) -> list[JobCaution]:
-    """One caution for each tool that ramps into stock and does not cut to its centre; its core diameter is unknown."""
+    """One caution for each tool that ramps into stock and does not cut to its centre."""
     used = {s.tool.id: s.tool for s in steps if s.operation != "finishing"}
     out = []
     for tool in inputs.tools:
