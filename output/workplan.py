@@ -103,6 +103,7 @@ class Workplan:
     clamping        : on a machine with rotary axes; steps are then in the frame of their access. None: setup frame
     labels          : passed through to headers
     comments        : header lines for the machinist (ASCII, no parentheses)
+    assumed         : header lines on what the proof takes for granted (ASCII)
     figures         : header lines for the figures of the proof, ``output.gcode.proof_header``
     restart         : every step begins as after a tool change, so that a program can be started at each step
     stock_words     : kind of the blank where it is not a box; ``stock`` is then its bounding box
@@ -126,6 +127,7 @@ class Workplan:
     version: str
     labels: dict[str, str] = field(default_factory=dict)
     comments: tuple[str, ...] = ()
+    assumed: tuple[str, ...] = ()
     figures: tuple[str, ...] = ()
     clamping: Clamping | None = None
     restart: bool = False

@@ -149,6 +149,26 @@ class TimeSpent(ReportModel):
     tool_changes: Annotated[int, Field(description="Number of tool changes within programs.")]
 
 
+class Assumption(ReportModel):
+    """Something that the proof takes for granted because neither setup nor program states it. It is no finding."""
+
+    what: Annotated[str, Field(
+        description="dialect, travel, max_rpm, rotary_sense, gauge_length, holder, above_holder, table, rapid_path, "
+                    "path_mode, change_position, coolant or between_samples.", examples=["travel"])]
+    value: Annotated[str | float, Field(description="What the proof takes it to be.", examples=["long enough"])]
+    effect: Annotated[str, Field(description="What may go wrong on a machine where it is otherwise.")]
+    remedy: Annotated[str, Field(description="The field of the setup, or the words of the program, that state it.")]
+
+
+class ProofFacts(ReportModel):
+    """Figures of the proof and what it takes for granted."""
+
+    notes: list[str] = []
+    assumed: Annotated[list[Assumption], Field(
+        description="What the proof takes for granted, each once. Check it against the machine. A program header and "
+                    "the setup sheet name the same.")] = []
+
+
 class Caution(ReportModel):
     """A warning for the machinist that is not a finding."""
 
@@ -189,6 +209,7 @@ class Report(Zones):
         description="Proved area divided by the machinable area that some tool of the setup reaches.")] = None
     machining_time_s: Annotated[float | None, Field(description="Simulated machining time, s.")] = None
     time: TimeSpent | None = None
+    proof: ProofFacts | None = None
     warnings: Annotated[list[Caution], Field(
         description="Warnings. part.warnings has the same as plain sentences.")] = []
     tools: list[ToolUse]
@@ -223,6 +244,7 @@ class Verification(ReportModel):
                     "fixture, shank, holder, corner, sharp corner: the tools of the program cannot touch it. "
                     "not_in_program: the program does not work on the face. pass: places within the error of the "
                     "proof.")] = []
+    proof: ProofFacts | None = None
     warnings: Annotated[list[Caution], Field(
         description="Warnings: the program exceeds what tools and material recommend. They change no state.")] = []
     deviation: Annotated[list[FaceDeviation], Field(description="Figures by face number.")] = []

@@ -193,8 +193,8 @@ class Operations(WireModel):
         description="Faces to machine. null: every face that some access sees. A program that brings another face "
                     "to size is a finding.")] = None
     exclude_faces: Annotated[list[FaceId], Field(
-        description="Faces that are not finished and not checked for stock left. A program that brings one to size is a "
-                    "finding.")] = []
+        description="Faces that are not finished and not checked for stock left. A program that brings one to size is "
+                    "a finding.")] = []
     cut_direction: Annotated[Literal["climb", "conventional", "either"], Field(
         description="Direction of cut on walls.")] = "climb"
     pattern: Annotated[Literal["auto", "zigzag", "one_way", "spiral"], Field(

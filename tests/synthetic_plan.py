@@ -76,6 +76,7 @@ def plan(*steps: Workingstep, **changes: object) -> Workplan:
         stock=StockBox(np.array([0.0, 0.0, 0.0]), np.array([30.0, 20.0, 15.0])), material="Ti-6Al-4V",
         part_sha256="ab" * 32, setup_sha256="cd" * 32, version="0.1.0",
         labels={"order": "Müller's \"4711\" (rush) \\ 20 %", "revision": "B → C 漢 😀"},
+        assumed=("travel: long enough. Else a move may run into the end of an axis. Remedy: state machine.travel_mm",),
         comments=("MSG, not a message to the operator", "clamp at the seat; check runout (0.01)"))
     return Workplan(**{**values, **changes})  # type: ignore[arg-type]
 

@@ -42,8 +42,8 @@ class Moves:
         """The moves for kernels, without axes."""
         return MoveArrays(np.ascontiguousarray(self.start), np.ascontiguousarray(self.end), self.feed, self.tool)
 
-    def only(self, chosen: NDArray[np.bool_]) -> Moves:
-        """The moves where ``chosen`` (m,) bool is true."""
+    def only(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Moves:
+        """The moves where ``chosen`` (m,) bool is true, or those of its rows, (k,) int64, index."""
         axes = None if self.axes is None else self.axes.only(chosen)
         return Moves(self.start[chosen], self.end[chosen], self.feed[chosen], self.tool[chosen], axes)
 

@@ -17,7 +17,7 @@ from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.tool_body import ToolBody
-from verify.assumptions import in_order
+from verify.assumptions import Assumed, AssumedKind, in_order
 from verify.checks.program_assumptions import program_assumptions, rapids_decided
 from verify.checks.program_sequence import FramedProgram, Given, check_numbers, counted, moves_of, read_all, slides_of
 from verify.checks.repeated_passes import repeats
@@ -29,10 +29,12 @@ from verify.findings import (
     ordered,
     residual_findings,
 )
+from verify.kernels.stock import PLUNGE
 from verify.material.collision import DIP
 from verify.material.cutting_loads import cut_sequence, loads
 from verify.material.dogleg_rapids import box_findings
 from verify.material.engagement import engaged_angles, engagement_findings, engagements, in_parts
+from verify.material.fine_plunges import fine_plunges
 from verify.material.material import contacts, dogleg_limits, unseen
 from verify.material.stock_pass import StockPass
 from verify.model import (
@@ -129,9 +131,11 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     loaded, cautions = loads(in_cut, tools, setup.cutting)
     angle = engaged_angles(run.engaged, stretches, tools)
     again, springs = repeats(moves, run.cut, source, _finishes(cuts, setup, len(moves)))
-    findings = [*contact_findings(run.events, moves, source, setup.clearance_rapid, skins),
+    dug = fine_plunges(moves, tools, fine, part.mesh.bounds, setup, threads)
+    dug = dug[~np.isin(dug[:, 0], run.events[run.events[:, 1] == PLUNGE, 0])]
+    findings = [*contact_findings(np.concatenate([run.events, dug]), moves, source, setup.clearance_rapid, skins),
                 *cuts.gouges, *cuts.excluded, *loaded, *_program_findings(framed),
-                *(f for p in framed for f in p.findings(tools)),
+                *(f for p in framed for f in p.findings(tools)), *_unlisted(run.lost, framed),
                 *table_findings([p.program for p in framed], tools, setup),
                 *_idle_findings(framed, run, moves, source, [t for t in fine if t.cone_height <= 0.0], asked),
                 *again, *sideways_findings(moves, run.cut, tools, source),
@@ -147,19 +151,14 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
         unread = None if asked.whole is None else unread_work(asked.whole, framed[0], measured, cutting, tools)
         work, left = work_done(asked, measured, cutting, run.cut, source, unread)
         findings += [*cuts.allowance, *left, *deep_findings(scored.samples, cuts.residual, cuts.mover, cutting, source)]
-    notes = [f"{run.lost} contacts are not listed: the tables are full"] if run.lost else []
-    notes.extend([*cuts.notes, *springs])
-    notes.extend(f"T{t.number} is so thin that a plunge may stay unseen: the stock is sampled every "
-                 f"{met.spacing:.3f} mm" for t in fine)
-    if met.dip > DIP + 1e-9:
-        notes.append(f"a ball may enter a fixture by {met.dip:.3f} mm unseen: the fixtures are too large to be sampled "
-                     "more closely; give smaller boxes where tools go")
-    notes.extend(note for p in framed for note in p.notes())
+    notes = [*springs, *(note for p in framed for note in p.notes())]
+    dips = [Assumed(AssumedKind.BETWEEN_SAMPLES, round(met.dip, 3), "the fixtures are so large that a ball may enter "
+                    f"one by {met.dip:.3f} mm unseen", "give smaller boxes where tools go")] * (met.dip > DIP + 1e-9)
     stages.tell(1.0)
     proof = _proof(findings, cuts, run, framed, known, took, moves, source, setup, scored, zone_ids,
                    engagements(angle, stretches, tools), met.spacing, tuple(notes), support)
     proof = replace(proof, cautions=tuple(cautions), assumed=in_order(
-        [*setup.assumed, *program_assumptions(framed, tools, setup, stated)]))
+        [*setup.assumed, *program_assumptions(framed, tools, setup, stated), *cuts.assumed, *dips]))
     return proof if work is None else replace(proof, work=work)
 
 
@@ -190,6 +189,14 @@ def _settled(scored: ScoredSamples, part: Part, tools: Sequence[ToolBody], setup
 def _program_findings(read: Sequence[FramedProgram]) -> list[Finding]:
     return [Finding(FindingKind.PROGRAM, p.program.name, r.line, None, None, None, 0.0, 0.0, r.message)
             for p in read for r in p.program.remarks]
+
+
+def _unlisted(lost: int, read: Sequence[FramedProgram]) -> list[Finding]:
+    """The finding that more contacts were found than the tables hold."""
+    if not lost:
+        return []
+    return [Finding(FindingKind.PROGRAM, read[0].program.name, 0, None, None, None, 0.0, 0.0,
+                    f"{lost} contacts are not listed, as there are too many: mend those that are listed first", lost)]
 
 
 def _idle_findings(read: Sequence[FramedProgram], run: StockPass, moves: Moves, source: Source,

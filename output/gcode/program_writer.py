@@ -33,6 +33,7 @@ from toolpath.workingsteps import ArcSpan, Trajectory, TrajectoryKind, Workingst
 
 UPRIGHT_TOLERANCE = 1e-6  # rad from Z, up to which no plane is tilted
 _PARTED = re.compile("S[0-9]+([b-z]*)")  # ids of steps, and of their parts after a change to a fresh cutter
+GRANTED = "Taken for granted by the proof, check it on the machine:"
 MIN_DEPTH_BELOW_STOCK = 0.01  # mm below the stock; less is not mentioned in the header
 
 
@@ -388,6 +389,7 @@ def _header(plan: Workplan, d: Dialect, zero: str, tolerance: str) -> list[str]:
         *(d.needs_restart if plan.restart and plan.clamping is None else ()),
         "Tools, all lengths in mm from the tip:",
         *(tool_name(t) for t in _tools_in_use(plan)),
+        *([GRANTED, *plan.assumed] if plan.assumed else ()),
         *plan.comments,
     ]
     return [line for text in texts for line in d.comment(text)]

@@ -82,7 +82,7 @@ def files_table(report: Mapping[str, Any]) -> Table:
 
 
 def cautions_section(report: Mapping[str, Any]) -> SheetSection:
-    """Cautions, warnings and notes."""
+    """Cautions, what is taken for granted, warnings and notes."""
     rows = [(c["kind"].replace("_", " "), ", ".join(c["subjects"]) or NONE, c["message"], c["remedy"])
             for c in report["warnings"]]
     known = {f"{c['message']}; {c['remedy']}" for c in report["warnings"]}
@@ -92,7 +92,16 @@ def cautions_section(report: Mapping[str, Any]) -> SheetSection:
                   none="No caution.")
     lists = (("Of the part and the plan", others), ("Notes of the proof", notes))
     more = [Lines(title, lines) for title, lines in lists if lines]
-    return SheetSection("mind", "Cautions and notes", (table, *more))
+    return SheetSection("mind", "Cautions and notes", (table, assumed_table(report), *more))
+
+
+def assumed_table(report: Mapping[str, Any]) -> Table:
+    """What the proof takes for granted because neither setup nor program states it."""
+    rows = [(a["what"].replace("_", " "), a["value"] if isinstance(a["value"], str) else number(a["value"]),
+             a["effect"], a["remedy"]) for a in report["proof"]["assumed"]]
+    return Table("Taken for granted: check it on your machine, or state it",
+                 ("what", "taken to be", "if it is otherwise", "how to state it"), tuple(rows), (1.4, 1.8, 3.6, 3.6),
+                 none="The proof takes nothing for granted.")
 
 
 def findings_section(report: Mapping[str, Any]) -> SheetSection:
@@ -226,6 +235,6 @@ def proof_section(report: Mapping[str, Any]) -> SheetSection:
     return SheetSection("proof", "The proof", (facts,))
 
 
-__all__ = ["NONE", "SHORT_SHA", "cautions_section", "files_table", "findings_section", "job_section", "minutes",
-           "needed", "number", "place", "proof_section", "ranged", "remainder_table", "share", "steps_table",
+__all__ = ["NONE", "SHORT_SHA", "assumed_table", "cautions_section", "files_table", "findings_section", "job_section",
+           "minutes", "needed", "number", "place", "proof_section", "ranged", "remainder_table", "share", "steps_table",
            "tools_table", "zones_table"]

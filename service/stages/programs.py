@@ -21,6 +21,7 @@ from output.gcode.proof_header import AWAITED, filled
 from output.header_text import decimal
 from output.workplan import FIRST_NUMBER, AccessFrame, Ap238, Assembly, Clamping, StockBox, StockCylinder, Workplan
 from schemas.setup import Access
+from service.setup_assumptions import setup_assumptions
 from service.stages.access_plan import AccessPlan, ProofFrame, WrittenProgram
 from service.stages.blank_model import turned_box
 from service.stages.job_part import JobPart
@@ -30,6 +31,7 @@ from service.version import VERSION
 from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_settings import RotaryAxes
 from toolpath.workingsteps import Workingstep
+from verify.surface.guard_points import wide_samples
 from zones.reach.access_view import View, access_rotation, turned
 
 BOW, SPARE = 1.0 / 800.0, 0.01  # chord error of a swing over the distance from the tip; mm, for rounding
@@ -264,12 +266,19 @@ def _workplan(ready: Prepared, steps: tuple[Workingstep, ...], frame: ProofFrame
                     tuple(t for t in inputs.bodies if t.id in used), clearance, access.work_offset,
                     StockBox(lo, hi), inputs.material_name, ready.part.sha256, inputs.sha256, VERSION,
                     dict(inputs.labels), (*words, *(f"warning: {w}" for w in ready.warnings)),
-                    stock_words=_stock_words(ready), cylinder=_cylinder(ready, frame),
+                    assumed=assumed_words(ready), stock_words=_stock_words(ready), cylinder=_cylinder(ready, frame),
                     stock_mesh=ready.blank.proof_mesh(frame.rotation) if shapes else None,
                     part_mesh=frame.part.mesh if shapes else None, ap238=Ap238(inputs.machine.ap238),
                     coolant=inputs.machine.coolant == "flood",
                     assemblies={b.number: Assembly(gauges[b.number], t.flutes, t.life_min)
                                 for t, b in zip(inputs.tools, inputs.bodies, strict=True)})
+
+
+def assumed_words(ready: Prepared) -> tuple[str, ...]:
+    """Header lines on what the proof takes for granted, one for each entry of ``proof.assumed``."""
+    return tuple(f"{str(a.what).replace('_', ' ')}: {a.value if isinstance(a.value, str) else decimal(a.value)}. "
+                 f"Else {a.effect}. Remedy: {a.remedy}"
+                 for a in (*setup_assumptions(ready.inputs), *wide_samples(ready.part.mesh)))
 
 
 def _stock_words(ready: Prepared) -> str:

@@ -160,11 +160,11 @@ def _file(job: JobPart, d: Decomposition, samples: SurfaceSamples, frame: ProofF
 
 
 def _minded(report: Mapping[str, Any]) -> dict[str, Any]:
-    """Cautions, and the other warnings and notes."""
+    """Cautions, what the proof takes for granted, and the other warnings and notes."""
     cautions = [{k: c[k] for k in ("kind", "message", "remedy", "subjects", "at_mm")}
                 for c in report.get("warnings", ())]
     known = {f"{c['message']}; {c['remedy']}" for c in cautions}
-    return {"cautions": cautions,
+    return {"cautions": cautions, "assumed": list(report["proof"].get("assumed", ())),
             "notes": [*(w for w in report["part"]["warnings"] if w not in known), *report["proof"]["notes"]]}
 
 

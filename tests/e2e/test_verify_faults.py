@@ -300,7 +300,7 @@ def test_what_is_taken_for_granted_is_told():
 def test_blending_is_in_the_error_bound():
     lines = program()
     assert run(lines).error_bound == pytest.approx(0.001001)
-    lines[1] += " G64 P0.001 Q0"
+    lines[1] = lines[1].replace("G61", "G64 P0.001 Q0")
     assert run(lines).error_bound == pytest.approx(0.002001) and run(lines).no_findings
 
 

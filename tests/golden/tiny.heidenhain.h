@@ -19,28 +19,31 @@
 18 ; Machine zero of Z is taken to be the top of its travel
 19 ; Tools, all lengths in mm from the tip:
 20 ; T1: ball D3, corner R1.5, flute length 9, neck D2.8 to 20, shank D6, stickout 45
-21 LBL "S01"
-22 CYCL DEF 32.0 TOLERANCE
-23 CYCL DEF 32.1 T0.001
-24 CYCL DEF 247 DATUM SETTING ~
+21 ; Taken for granted by the proof, check it on the machine:
+22 ; travel: long enough. Else a move may run into the end of an axis. Remedy: state
+23 ; machine.travel_mm
+24 LBL "S01"
+25 CYCL DEF 32.0 TOLERANCE
+26 CYCL DEF 32.1 T0.001
+27 CYCL DEF 247 DATUM SETTING ~
     Q339=+1 ;DATUM NUMBER
-25 L Z+0 R0 FMAX M91
-26 ; T1: ball D3, corner R1.5, flute length 9, neck D2.8 to 20, shank D6, stickout 45
-27 TOOL CALL 1 Z S12000
-28 ; S01 Z3 finishing waterline T1: F12 F13; Z 10 down to 4
-29 M3
-30 M8
-31 L Z+25 R0 FMAX
-32 L X+0 Y+0 R0 FMAX
-33 L Z+6 R0 FMAX
-34 L Z+5 R0 F200
-35 L X+10 R0 F600
-36 L Y+2.5
-37 L X+0 Z+4.5
-38 L Z+6
-39 L Z+25 R0 FMAX
-40 M5
-41 M9
-42 L Z+0 R0 FMAX M91
-43 M30
-44 END PGM demo MM
+28 L Z+0 R0 FMAX M91
+29 ; T1: ball D3, corner R1.5, flute length 9, neck D2.8 to 20, shank D6, stickout 45
+30 TOOL CALL 1 Z S12000
+31 ; S01 Z3 finishing waterline T1: F12 F13; Z 10 down to 4
+32 M3
+33 M8
+34 L Z+25 R0 FMAX
+35 L X+0 Y+0 R0 FMAX
+36 L Z+6 R0 FMAX
+37 L Z+5 R0 F200
+38 L X+10 R0 F600
+39 L Y+2.5
+40 L X+0 Z+4.5
+41 L Z+6
+42 L Z+25 R0 FMAX
+43 M5
+44 M9
+45 L Z+0 R0 FMAX M91
+46 M30
+47 END PGM demo MM

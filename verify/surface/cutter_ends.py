@@ -19,15 +19,18 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.nearest import nearest
 from geometry.mesh_queries.rays import first_hits
 from geometry.tool_body import ToolBody
+from verify.assumptions import Assumed, AssumedKind
 from verify.findings import Source, gouge_findings
 from verify.model import Finding
 from verify.moves import Moves
-from verify.surface.guard_points import CLOSER_SHARE, GUARD_SPACING, inside_part
+from verify.surface.guard_points import CLOSER_SHARE, GUARD_SPACING, PATH_BATCH, inside_part, path_places
 from verify.tool_axes import square_to
 
 CORNER = math.cos(math.radians(45.0))  # of the angle by which a path turns at a corner
 STEP = 0.1  # mm between places along the ways
 MOST_RINGS, MOST_BALLS = 50_000, 400_000  # places along the ways of a tool; more get a wider step
+ENDS_AROUND = 8  # places of each ring of ``end_depths``
+TILTS = (0.0, 0.25 * math.pi, 0.5 * math.pi)  # of rings on a corner, from its lowest place to its side
 AROUND = 16  # places round the rim of an end
 ROUNDS = 4  # of the search round the deepest of them
 LIFT, LIFT_SHARE = 0.05, 0.25  # mm, and of the radius: a second rim over the sharp one, for walls
@@ -59,20 +62,21 @@ class Feet:
 
 
 def turning_feet(tree: TriangleTree, moves: Moves, tools: Sequence[ToolBody],
-                 tolerance: float) -> tuple[Feet, list[str]]:
+                 tolerance: float) -> tuple[Feet, list[Assumed]]:
     """Places of the surface into which ends of cutters press where paths turn.
 
     tree      : TriangleTree of the part
     tools     : those that ``Moves.tool`` refers to
     tolerance : mm, gouge tolerance; ends that press in by less than 0.4 of it give nothing
 
-    Returns Feet, the deepest first, and notes on tools whose ways are so long that few of their places are looked at.
+    Returns Feet, the deepest first, and what is taken for granted of tools whose ways are so long that few of their
+    places are looked at.
 
     Notes
     -----
     The deepest place on a rim of radius R is searched from 16 places round it, to R / 300. A ball has one sphere.
     """
-    found, notes = list[Feet](), list[str]()
+    found, notes = list[Feet](), list[Assumed]()
     least = CLOSER_SHARE * tolerance
     for k, tool in enumerate(tools):
         if tool.cone_height <= 0.0:
@@ -82,8 +86,9 @@ def turning_feet(tree: TriangleTree, moves: Moves, tools: Sequence[ToolBody],
         if tool.cone_height <= 0.0 and not _seen(tool, least, tolerance):
             rows, share, step = _ways(moves, k, tool, tree.mesh.bounds)
             if step > TOLD:
-                notes.append(f"the ways of {tool.id} are long: its end is checked every {step:.1f} mm and at corners; "
-                             "a smooth dip may lie in between")
+                notes.append(Assumed(AssumedKind.BETWEEN_SAMPLES, round(step, 2), f"the paths of {tool.id} are long: a "
+                                     f"smooth dip shorter than {step:.1f} mm may be missed aside of the middle of its "
+                                     "end", "verify a part of the program at a time"))
             found.append(_pressed(tree, *_placed(moves, rows, share, tool, tree.mesh.bounds), tool, 0.0, least))
     return _joined(found).thinned(), notes
 
@@ -214,3 +219,77 @@ def tip_gouges(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], sour
     inside = deep[(met >= 0) & (mesh.normals[met, 2] > 0.0)]
     return gouge_findings(tips[inside], mesh.face_ids[triangle[inside]], depth[inside], np.zeros(len(inside)),
                           rows[which[inside]].astype(np.int32), source, tolerance)
+
+
+def end_depths(tree: TriangleTree, moves: Moves, rows: INT, tools: Sequence[ToolBody],
+               tolerance: float) -> tuple[F64, F64, INT]:
+    """How deep the ends of mills go into the part on some moves.
+
+    rows      : (k,) int64, index, the moves; tools : those that ``Moves.tool`` refers to
+    tolerance : mm; what is less deep counts 0
+
+    Returns
+    -------
+    depth    : (k,) float64, mm, largest distance of a place of the end, inside the part, from the surface
+    place    : (k, 3) float64, mm, setup frame, the place of the surface nearest to it
+    triangle : (k,) int64, index of its triangle, -1 where the depth is 0
+
+    Notes
+    -----
+    Places are the middle of the end and eight on its rim, of a corner eight at each of three heights, in steps of half
+    a radius along the move and at both ends of it. Too small by 8 % of the radius at most on a move straight down.
+    """
+    depth, place, triangle = np.zeros(len(rows)), np.zeros((len(rows), 3)), np.full(len(rows), -1, np.int64)
+    radius = np.array([t.radius for t in tools])[moves.tool[rows]]
+    count = np.ceil(np.linalg.norm((moves.end - moves.start)[rows], axis=1) / (0.5 * radius)).astype(np.int64) + 1
+    ends = np.cumsum(count)
+    first = 0
+    while first < len(rows):
+        last = max(int(np.searchsorted(ends, ends[first] - count[first] + PATH_BATCH, side="right")), first + 1)
+        chosen = rows[first:last]
+        tip, z, of = path_places(moves.only(chosen), count[first:last])
+        near = _near_surface(tree, tip, z, of, moves.tool[chosen], tools)
+        tip, z, of = tip[near], z[near], of[near]
+        tool = moves.tool[chosen][of]
+        for k in np.unique(tool).tolist():
+            mine = np.flatnonzero(tool == k)
+            for at in _end_places(tip[mine], z[mine], tools[k]):
+                away, row, foot = nearest(tree, at)
+                deep = np.flatnonzero(away > np.maximum(depth[first:last][of[mine]], tolerance))
+                deep = deep[inside_part(tree, at[deep])]
+                deep = deep[np.lexsort((deep, -away[deep], of[mine[deep]]))]
+                move, one = np.unique(of[mine[deep]], return_index=True)
+                best = deep[one]
+                depth[first + move], place[first + move], triangle[first + move] = away[best], foot[best], row[best]
+        first = last
+    return depth, place, triangle
+
+
+def _near_surface(tree: TriangleTree, tip: F64, z: F64, of: INT, tool: NDArray[np.int32],
+                  tools: Sequence[ToolBody]) -> NDArray[np.bool_]:
+    """(n,) bool: places of moves that come so near to the surface somewhere that their end may go through it.
+
+    tip, z : (n, 3) float64, mm and unit; of : (n,) int64, index, the move of each; tool : (m,) int32, index, of moves
+    """
+    corner, radius = (np.array(v)[tool][of] for v in ([t.corner_radius for t in tools], [t.radius for t in tools]))
+    away, _, _ = nearest(tree, tip + corner[:, None] * z, float(radius.max(initial=0.0)))
+    ball = corner >= radius - 1e-9
+    through = np.zeros(len(tool), np.bool_)
+    through[of[away < np.where(ball, radius - 1e-4, radius)]] = True
+    return through[of]
+
+
+def _end_places(tip: F64, z: F64, tool: ToolBody) -> list[F64]:
+    """Places of the end of a tool with its tip on (n, 3), mm, and its axis along (n, 3): each an (n, 3) array."""
+    out = [tip]
+    if tool.cone_height > 0.0:
+        return out
+    x = square_to(z)
+    y = np.cross(z, x)
+    corner = tool.corner_radius
+    for tilt in TILTS if corner > 0.0 else TILTS[:1]:
+        wide, high = tool.radius - corner * (1.0 - math.sin(tilt)), corner * (1.0 - math.cos(tilt))
+        if wide > 0.0:
+            out += [tip + wide * (math.cos(t) * x + math.sin(t) * y) + high * z
+                    for t in (2.0 * math.pi * np.arange(ENDS_AROUND) / ENDS_AROUND).tolist()]
+    return out

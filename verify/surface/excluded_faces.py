@@ -1,9 +1,9 @@
 """Faces that the setup does not let machine, and feed moves that bring them to size all the same.
 
-A feed move brings a place to size where it takes off more than the gouge tolerance and leaves no more than a finished
-face may have. A tool that finishes the face beside it cannot help that: it runs along a wall whose floor it finishes. So
-a place does not count where the same tool touches it from a position in which it finishes another face. Coordinates are
-float64, mm, in the frame of the proof.
+A feed move brings a place to size where it takes off more than the gouge tolerance and leaves no more than a
+finished face may have. A tool that finishes the face beside it cannot help that: it runs along a wall while it finishes
+the floor. So a place does not count where the same tool touches it from a position in which it finishes another face.
+Coordinates are float64, mm, in the frame of the proof.
 """
 
 from __future__ import annotations

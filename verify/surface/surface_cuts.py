@@ -17,29 +17,35 @@ from geometry.mesh import F64, I32, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.tool_body import ToolBody
+from verify.assumptions import Assumed
 from verify.blank.blank import stock_on_normals
 from verify.findings import Source, allowance_findings, gouge_findings
 from verify.model import Finding, ProofSetup, ScoredSamples
 from verify.moves import Moves
-from verify.progress import Report
+from verify.progress import Report, silent
 from verify.surface.between_samples import ClosePoints, close_points, judged_places
-from verify.surface.cutter_ends import tip_gouges, turning_feet
+from verify.surface.cutter_ends import end_depths, tip_gouges, turning_feet
 from verify.surface.excluded_faces import CutPlaces, excluded_cuts
 from verify.surface.guard_points import (
     CLOSER_SHARE,
-    SURE,
+    FINE,
     closer_points,
     closer_seeds,
     convex_edges,
-    guard_notes,
+    fine_moves,
+    first_points,
     guard_samples,
     guard_spacing,
+    path_points,
+    wide_samples,
+    worth_a_look,
 )
 from verify.surface.remains import Rays, Remains, depths_both_ways
 from verify.surface.removal import residual_on_normals
 from verify.surface.sample_scores import RAY_ERROR
 
 MIN_REACH = 1.0
+SEED_BATCH = 4000  # places that are looked at more closely at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +59,7 @@ class SurfaceCuts:
     guard, edge : (g, 3) and (e, 3) float64, mm, points that watch for gouges on faces and along edges, setup frame
     close     : ClosePoints, c of them; close_residual : (c,) float64, mm of stock on their normals
     reach     : mm, height above the part up to which stock was followed
-    notes     : to report
+    assumed   : what is taken for granted between the points
     """
 
     residual: F64
@@ -67,7 +73,7 @@ class SurfaceCuts:
     close: ClosePoints
     close_residual: F64
     reach: float
-    notes: list[str]
+    assumed: list[Assumed]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +89,9 @@ class _Table:
 
     def __len__(self) -> int:
         return len(self.points)
+
+    def only(self, rows: NDArray[np.int64]) -> _Table:
+        return _Table(*(getattr(self, f)[rows] for f in ("points", "normals", "face", "area", "residual", "mover")))
 
     def __add__(self, more: _Table) -> _Table:
         return _Table(*(np.concatenate([getattr(self, f), getattr(more, f)])
@@ -141,11 +150,12 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
                            lambda f: tell(0.75 + 0.05 * f))
     even = len(table)
     tree = TriangleTree(part.mesh)
-    feet, notes = turning_feet(tree, moves, tools, setup.gouge_tolerance)
+    feet, wide = turning_feet(tree, moves, tools, setup.gouge_tolerance)
     if len(feet.triangle):
         table += shot.rays(feet.points, feet.normals, part.mesh.face_ids[feet.triangle], np.zeros(len(feet.triangle)),
                            lambda f: tell(0.8 + 0.05 * f), full=True)
-    table, left_out = _deepened(table, part, tree, even, shot, lambda f: tell(0.85 + 0.15 * f))
+    table += _followed(tree, shot)
+    table = _at_ends(_deepened(table, even, tree, shot, lambda f: tell(0.85 + 0.15 * f)), tree, shot)
     gouged = np.flatnonzero((table.residual < -setup.gouge_tolerance - RAY_ERROR) & (table.mover >= 0))
     tips = tip_gouges(part.mesh, moves, tools, source, setup.gouge_tolerance + RAY_ERROR)
     row = np.arange(len(table))  # the stock on an edge belongs to two faces, so an edge has no allowance
@@ -156,23 +166,83 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
         _in_allowance(table, (row < on_edge) | ((row >= first) & (row < even)), setup, source),
         _excluded(table, slice(len(s), on_edge), part.mesh, shot, source),
         max([float(-table.residual.min(initial=0.0)), 0.0, *(f.depth for f in tips)]), guard.points, edge, close,
-        table.residual[first:even], shot.reach, [*guard_notes(part.mesh, left_out), *notes])
+        table.residual[first:even], shot.reach, [*wide_samples(part.mesh), *wide])
 
 
-def _deepened(table: _Table, part: Part, tree: TriangleTree, even: int, shot: _Shooting,
-              tell: Report) -> tuple[_Table, int]:
-    """More rays round the places that are cut, and the depths of all gouges; and how many places were left out."""
+def _followed(tree: TriangleTree, shot: _Shooting) -> _Table:
+    """Rays from places under the paths of fine tools, those of them that are cut."""
+    kept = [_none()]
+    for points, row in path_points(tree, shot.moves, shot.tools, shot.setup.gouge_tolerance):
+        kept.append(_cut(_close_rays(tree, shot, points, tree.mesh.normals[row], row), shot))
+    return sum(kept[1:], kept[0])
+
+
+def _none() -> _Table:
+    none, rows = np.zeros((0, 3)), np.zeros(0, np.int32)
+    return _Table(none, none, rows, np.zeros(0), np.zeros(0), rows)
+
+
+def _close_rays(tree: TriangleTree, shot: _Shooting, points: F64, normals: F64, row: NDArray[np.int64]) -> _Table:
+    """Rays from places close together, which stand for no area, of triangles ``row`` (n,)."""
+    return shot.rays(points, normals, tree.mesh.face_ids[row], np.zeros(len(row)), silent, full=True)
+
+
+def _cut(table: _Table, shot: _Shooting) -> _Table:
+    """The rays of a table that are cut deep enough for a closer look."""
+    return table.only(np.flatnonzero((table.residual < -CLOSER_SHARE * shot.setup.gouge_tolerance)
+                                     & (table.mover >= 0)))
+
+
+def _deepened(table: _Table, even: int, tree: TriangleTree, shot: _Shooting, tell: Report) -> _Table:
+    """More rays round the places that are cut, and the depths of all gouges.
+
+    even : count of rays that lie evenly over the part
+    """
     tolerance = shot.setup.gouge_tolerance
-    near = np.flatnonzero((table.residual < -CLOSER_SHARE * tolerance) & (table.mover >= 0))
+    near = _cut(table, shot)
     if not len(near):
-        return table, 0
-    seeds, left_out = closer_seeds(table.points[near], table.residual[near], table.mover[near], SURE * tolerance)
-    points, normals, row = closer_points(tree, seeds)
-    table += shot.rays(points, normals, part.mesh.face_ids[row], np.zeros(len(row)), lambda f: tell(0.5 * f), full=True)
-    deep = np.flatnonzero((table.residual < -tolerance) & (table.mover >= 0))
+        return table
+    doubtful, deep = closer_seeds(near.points, near.residual, near.mover, tolerance)
+    looks, kept = len(doubtful) + len(deep), [table]
+    for i in range(0, len(doubtful), SEED_BATCH):
+        seeds = doubtful[i:i + SEED_BATCH]
+        first = _close_rays(tree, shot, *first_points(tree, seeds))
+        deep = np.concatenate([deep, seeds[worth_a_look(first.residual, tolerance)]])
+        kept.append(_gouged(first, shot))
+        tell(0.25 * (i + len(seeds)) / looks)
+    for i in range(0, len(deep), SEED_BATCH):
+        seeds = deep[i:i + SEED_BATCH]
+        kept.append(_gouged(_close_rays(tree, shot, *closer_points(tree, seeds)), shot))
+        tell(0.25 + 0.25 * (i + len(seeds)) / len(deep))
+    table = sum(kept[1:], kept[0])
+    rows = np.flatnonzero((table.residual < -tolerance) & (table.mover >= 0))
     rays, left = Rays(table.points, table.normals, table.residual), Remains(tree, shot.moves, shot.tools, shot.threads)
-    table.residual[deep] = -depths_both_ways(left, rays, deep, even, tolerance, lambda f: tell(0.5 + 0.5 * f))
-    return table, left_out
+    table.residual[rows] = -depths_both_ways(left, rays, rows, even, tolerance, lambda f: tell(0.5 + 0.5 * f))
+    return table
+
+
+def _at_ends(table: _Table, tree: TriangleTree, shot: _Shooting) -> _Table:
+    """The gouges of a table as deep as the ends of the tools go, and those of fine tools that no ray meets."""
+    tolerance = shot.setup.gouge_tolerance + RAY_ERROR
+    gouged = np.flatnonzero((table.residual < -tolerance) & (table.mover >= 0))
+    gouged = gouged[np.lexsort((gouged, table.residual[gouged], table.mover[gouged]))]
+    mover, first = np.unique(table.mover[gouged], return_index=True)
+    small = np.array([t.radius <= FINE for t in shot.tools])
+    fine = fine_moves(tree.mesh, shot.moves, shot.tools, shot.setup.gouge_tolerance)
+    rows = np.union1d(mover, fine[small[shot.moves.tool[fine]]]).astype(np.int64)
+    depth, place, triangle = end_depths(tree, shot.moves, rows, shot.tools, tolerance)
+    deepest = gouged[first]
+    known = depth[np.searchsorted(rows, mover)]
+    table.residual[deepest] = np.minimum(table.residual[deepest], -known)
+    new = np.flatnonzero((depth > 0.0) & ~np.isin(rows, mover))
+    return table + _Table(place[new], tree.mesh.normals[triangle[new]], tree.mesh.face_ids[triangle[new]],
+                          np.zeros(len(new)), -depth[new], rows[new].astype(np.int32))
+
+
+def _gouged(table: _Table, shot: _Shooting) -> _Table:
+    """The rays that are gouges, and the deepest of all."""
+    rows = np.flatnonzero((table.residual < -shot.setup.gouge_tolerance) & (table.mover >= 0))
+    return table.only(rows if len(rows) else np.array([int(np.argmin(table.residual))]))
 
 
 def _excluded(table: _Table, guard: slice, mesh: TriangleMesh, shot: _Shooting, source: Source) -> list[Finding]:

@@ -30,7 +30,7 @@ export class JobView {
   readonly scene: JobScene;
   private head: ViewHead | null = null;
   private readonly stage = el("div", { class: "stage" });
-  private readonly status = el("p", { class: "status", role: "status" });
+  private readonly status = el("p", { class: "status", role: "status", tabindex: 0 });
   private readonly busy = el("p", { class: "busy" }, "Loading…");
   private readonly legend = el("div", { class: "legend" });
   private readonly panel = el("aside", { class: "panel", "aria-label": "Job details" });

@@ -4,7 +4,7 @@ import type { Mode } from "../scene/part";
 import type { JobFiles } from "../shared/api";
 import { add, duration, el, figure, percent } from "../shared/dom";
 import { fileList } from "../shared/files";
-import type { ViewHead } from "../shared/view-file";
+import type { ViewAssumption, ViewHead } from "../shared/view-file";
 import { spaced } from "../shared/wording";
 import { remainderList, zoneList } from "./area-lists";
 import type { FindingList } from "./finding-list";
@@ -33,6 +33,7 @@ export function buildPanel(h: ViewHead, files: JobFiles, parts: PanelParts): (HT
   return [facts(h), colours(h, parts.modes),
     clean ? null : group(`Findings (${findingCount(h)})`, true, parts.findings.build(h)),
     cautionCount(h) ? group(`Cautions and notes (${cautionCount(h)})`, false, cautionList(h, parts.onPlace)) : null,
+    h.assumed?.length ? group(`Taken for granted (${h.assumed.length})`, false, assumedList(h.assumed)) : null,
     h.zones.length ? group(`Zones (${h.zones.length})`, clean && innerWidth > 700, zoneList(h, parts.onHighlight)) : null,
     h.remainder.length ? group(`Remainder (${h.remainder.length})`, clean, remainderList(h, parts.onHighlight, parts.onPlace)) : null,
     h.steps.length ? group(`Tool paths (${h.steps.length})`, parts.stepsOpen, parts.steps.build(h)) : null,
@@ -74,4 +75,11 @@ function cautionList(h: ViewHead, onPlace: (point: P3) => void): HTMLElement {
       c.at_mm ? el("button", { type: "button", class: "link", onclick: () => onPlace(c.at_mm!) }, "Show place") : null));
   for (const note of h.notes ?? []) add(list, el("li", {}, note));
   return list;
+}
+
+function assumedList(assumed: ViewAssumption[]): HTMLElement {
+  const list = el("ul", { class: "cautions" });
+  for (const a of assumed)
+    add(list, el("li", {}, el("strong", {}, spaced(a.what)), `: ${a.value}. Otherwise ${a.effect}. Remedy: ${a.remedy}.`));
+  return el("div", {}, el("p", { class: "hint" }, "Neither setup nor program states this. Check it on your machine."), list);
 }

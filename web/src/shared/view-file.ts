@@ -100,6 +100,13 @@ export interface Named {
   walls?: string[];
 }
 
+export interface ViewAssumption {
+  what: string;
+  value: string | number;
+  effect: string;
+  remedy: string;
+}
+
 export interface ViewHead {
   version: number;
   kind: "plan" | "verify";
@@ -127,6 +134,8 @@ export interface ViewHead {
   found?: Record<string, number>;
   cautions?: ViewCaution[];
   notes?: string[];
+  /** What the proof takes for granted; missing in files of earlier versions. */
+  assumed?: ViewAssumption[];
   facts: {
     coverage: number | null;
     reach_coverage: number | null;

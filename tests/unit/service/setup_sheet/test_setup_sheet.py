@@ -90,7 +90,9 @@ def report_of(state: str, findings: list[dict[str, Any]]) -> dict[str, Any]:
         "time": {"in_cut_s": 600.0, "in_air_s": 60.0, "rapid_s": 6.0, "retracts": 17, "tool_changes": 1},
         "machining_time_s": 660.0, "coverage": 0.98765, "reach_coverage": 1.0, "gouge_max_mm": 0.0031,
         "proof": {"samples": 31415, "error_bound_mm": 0.002, "cutting_length_mm": 2718.0,
-                  "notes": ["a note of the proof"]},
+                  "notes": ["a note of the proof"],
+                  "assumed": [{"what": "between_samples", "value": 0.25, "effect": "a narrow gouge may be missed",
+                               "remedy": "verify a piece"}]},
         "steps": [{"id": s.id, "name": "S01 layers rougher Z1 Z2" if s.zone is None else s.name, "zone": s.zone,
                    "tool": s.tool.id, "operation": s.operation, "strategy": s.strategy, "spindle_rpm": 12000.0,
                    "feed_mm_min": 600.0 + k, "machining_time_s": 222.0, "fresh_cutter": k == 2}
@@ -167,7 +169,8 @@ def test_all_that_the_report_names_is_on_both(proved):
         "another process, as a tool would be 22.5 times as long as", "G54", "X1.5 Y0 Z7", "Z25", "Z-4",
         "4 below the blank",
         "X -1 to 41, Y -2 to 22, Z -3 to 14", "X 0 to 40, Y 0 to 20, Z 0 to 13", "fixture 1", "-20 to -5",
-        "T1 lasts for 20 min", "have 2 cutters at hand", "a face was mended", "a note of the proof", "abababababababab",
+        "T1 lasts for 20 min", "have 2 cutters at hand", "a face was mended", "a note of the proof",
+        "between samples", "0.25", "a narrow gouge may be missed", "verify a piece", "abababababababab",
         "cdcdcdcdcdcdcdcd", "25.12", "Ø2.8", "81 gauge length", "0.0031 mm", "The proof has no finding",
         "program.linuxcnc.ngc", "31415", "Ti-6Al-4V"]
     for text in both(proved):

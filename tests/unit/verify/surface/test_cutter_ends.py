@@ -74,11 +74,11 @@ def test_a_thin_tool_is_followed_along_its_way():
     assert len(feet.points) > 180 and gaps.max() < 0.11
 
 
-def test_few_places_along_a_long_way_are_a_note():
+def test_few_places_along_a_long_way_are_told():
     body = tool(6.0, 0.0)
     tips = [np.array([15.0, y, 12.0]) for y in (-8.0, 8.0) * 1000]
     _, notes = turning_feet(slope(), moves(*tips), [body], 0.01)
-    assert len(notes) == 1 and "T1" in notes[0] and "0.6 mm" in notes[0]
+    assert len(notes) == 1 and notes[0].what == "between_samples" and "T1" in notes[0].effect and notes[0].value > 0.5
     assert not turning_feet(slope(), moves(*tips[:100]), [body], 0.01)[1]
 
 

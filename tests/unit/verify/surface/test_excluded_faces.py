@@ -75,7 +75,7 @@ def test_a_tool_that_finishes_the_walls_may_touch_the_floor_beside_them_alone():
 
 
 def test_the_rest_of_a_face_that_the_tool_goes_over_is_found():
-    """The top is faced to size by the tool that finishes the walls: places near their rims may be touched, others not."""
+    """The tool that finishes the walls faces the top too: it may touch places near their rims, and no others."""
     both = [*program()[:-4], *faced(0.0)[5:]]
     _, found = run(both, [TOP])
     assert {f.face for f in found} == {f"F{TOP}"} and 40 * 30 - 26 * 18 < found[0].area < 40 * 30 - 20 * 12

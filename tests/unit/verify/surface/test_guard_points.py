@@ -8,15 +8,19 @@ from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.nearest import nearest
 from geometry.mesh_queries.rays import first_hits
-from tests.hand_parts import box_mesh, dome, slope_field
+from tests.hand_parts import box_mesh, dome, slope_field, tool
+from verify.moves import Moves
 from verify.surface.guard_points import (
     DEEP_A_MOVE,
-    MAX_SEEDS,
+    DEEP_APART,
     closer_points,
     closer_seeds,
+    first_points,
     gouge_depths,
-    guard_notes,
     guard_samples,
+    path_points,
+    wide_samples,
+    worth_a_look,
 )
 
 RADIUS = 15.0
@@ -76,19 +80,45 @@ def test_places_round_the_lowest_samples_are_looked_at_closely():
     assert [len(part) for part in closer_points(tree, points[:0])] == [0, 0, 0]
 
 
-def test_a_large_gouge_leaves_room_for_small_ones():
-    """30,000 samples cut 0.3 mm deep by few moves, 40 cut little: round all of these is looked."""
+def test_no_number_of_places_uses_up_the_closer_looks():
+    """Samples within the tolerance are looked at all, however many there are; of gouges the deepest of each move."""
     rng = np.random.default_rng(1)
     points = np.concatenate([rng.uniform(0, 30, (30_000, 3)) * [1, 1, 0], rng.uniform(50, 80, (40, 3)) * [1, 1, 0]])
     residual = np.concatenate([rng.uniform(-0.31, -0.3, 30_000), rng.uniform(-0.03, -0.011, 40)])
     mover = np.concatenate([rng.integers(20, size=30_000), np.full(40, 99)]).astype(np.int32)
-    seeds, left_out = closer_seeds(points, residual, mover, 0.05)
-    assert left_out == 0 and len(seeds) == 20 * DEEP_A_MOVE + 40
-    assert cKDTree(seeds).query(points[30_000:])[0].max() == 0.0
+    doubtful, deep = closer_seeds(points, residual, mover, 0.05)
+    assert len(doubtful) == 40 and cKDTree(doubtful).query(points[30_000:])[0].max() == 0.0
+    assert 20 < len(deep) <= 20 * DEEP_A_MOVE
     lowest = [points[mover == m][residual[mover == m].argmin()] for m in range(20)]
-    assert cKDTree(seeds).query(np.array(lowest))[0].max() == 0.0
-    seeds, left_out = closer_seeds(points, residual / 30.0, mover, 0.05)
-    assert len(seeds) == MAX_SEEDS and left_out > 1000
+    assert cKDTree(deep).query(np.array(lowest))[0].max() < DEEP_APART * 3**0.5
+    doubtful, deep = closer_seeds(points, residual / 30.0, mover, 0.05)
+    cells = np.unique(np.floor(points / 0.15).astype(np.int64), axis=0)
+    assert len(doubtful) == len(cells) and not len(deep)
+
+
+def test_a_first_look_tells_where_a_closer_one_is_needed():
+    tree = TriangleTree(dome(RADIUS))
+    seeds = np.array([[0.0, 0.0, 0.0], [2.0, 1.0, -0.17]])
+    places, _, row = first_points(tree, seeds)
+    assert len(places) == len(row) == 18 and cKDTree(places[:9]).query(seeds[:1])[0].max() < 1.1e-3
+    assert np.linalg.norm(places[9:] - seeds[1], axis=1).max() < 0.15
+    even, odd = np.full(9, -0.008), np.array([*[-0.004] * 8, -0.008])
+    assert worth_a_look(np.concatenate([even, odd, even - 0.003]), 0.01).tolist() == [False, True, True]
+
+
+@pytest.mark.parametrize("diameter", [0.04, 0.12, 1.0])
+def test_the_path_of_a_fine_tool_is_looked_at_wherever_it_is(diameter):
+    """A pit and a groove in the dome: the surface over the middle of both is looked at."""
+    tree, body = TriangleTree(dome(RADIUS)), tool(diameter, 0.0, neck=30.0)
+    start = np.array([[1.234, 2.345, 1.0], [-3.0, 1.0, -0.4]])
+    end = np.array([[1.234, 2.345, -0.5], [-1.0, 1.0, -0.3]])
+    moves = Moves(start, end, np.ones(2, np.bool_), np.zeros(2, np.int32))
+    places = np.concatenate([p for p, _ in path_points(tree, moves, [body], 0.01)])
+    mouth = nearest(tree, np.array([[1.234, 2.345, -0.236]]))[2]
+    assert cKDTree(places).query(mouth)[0].max() < 0.25 * diameter
+    assert np.abs(nearest(tree, places)[0]).max() < 1e-9
+    assert not list(path_points(tree, moves, [tool(6.0, 3.0)], 0.01))
+    assert not list(path_points(tree, moves.only(np.zeros(2, np.bool_)), [body], 0.01))
 
 
 def test_the_depth_of_a_stretch_is_the_largest_distance_on_it():
@@ -129,6 +159,7 @@ def test_a_dimple_anywhere_is_deep_enough_at_some_sample(lean):
 def test_it_is_said_where_samples_lie_wider_apart_than_usual():
     flat = np.array([[0, 0, 0], [300, 0, 0], [300, 200, 0], [0, 200, 0]], float)
     mesh = TriangleMesh(flat, np.array([[0, 1, 2], [0, 2, 3]], np.int32), np.zeros(2, np.int32))
-    (note,) = guard_notes(mesh)
-    assert "0.24 mm apart" in note and len(guard_samples(mesh)) == pytest.approx(1e6, rel=0.01)
-    assert guard_notes(dome(RADIUS)) == []
+    (told,) = wide_samples(mesh)
+    assert told.what == "between_samples" and told.value == pytest.approx(0.245, abs=0.001)
+    assert len(guard_samples(mesh)) == pytest.approx(1e6, rel=0.01)
+    assert wide_samples(dome(RADIUS)) == []
