@@ -18,11 +18,14 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.tool_body import ToolBody
 from verify.assumptions import in_order
+from verify.checks.changed_tools import as_collisions
+from verify.checks.empty_spindle import with_nose
 from verify.checks.program_assumptions import program_assumptions, rapids_decided
 from verify.checks.program_sequence import FramedProgram, Given, check_numbers, counted, moves_of, read_all, slides_of
 from verify.checks.repeated_passes import repeats
 from verify.checks.sideways_cuts import sideways_findings
 from verify.checks.table_clearance import table_findings
+from verify.checks.taken_for_granted import granted
 from verify.findings import (
     Source,
     contact_findings,
@@ -108,6 +111,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     framed = read_all(programs, part, tools, setup, spindle_tool, stages.span(0.0, READ), read)
     stated = setup.dogleg is not None
     framed, setup = rapids_decided(framed, setup)
+    tools = with_nose(tools, framed, setup)
     moves, source = moves_of(framed, tools)
     if asked is not None:
         scored = _settled(scored, part, tools, setup, moves, threads, stages.span(READ, SETTLED))
@@ -129,7 +133,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     loaded, cautions = loads(in_cut, tools, setup.cutting)
     angle = engaged_angles(run.engaged, stretches, tools)
     again, springs = repeats(moves, run.cut, source, _finishes(cuts, setup, len(moves)))
-    findings = [*contact_findings(run.events, moves, source, setup.clearance_rapid, skins),
+    met_by = contact_findings(run.events, moves, source, skins, tools)
+    findings = [*as_collisions(met_by, [p.program for p in framed]),
                 *cuts.gouges, *cuts.excluded, *loaded, *_program_findings(framed),
                 *(f for p in framed for f in p.findings(tools)),
                 *table_findings([p.program for p in framed], tools, setup),
@@ -155,11 +160,12 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
         notes.append(f"a ball may enter a fixture by {met.dip:.3f} mm unseen: the fixtures are too large to be sampled "
                      "more closely; give smaller boxes where tools go")
     notes.extend(note for p in framed for note in p.notes())
+    taken = [*setup.assumed, *program_assumptions(framed, tools, setup, stated),
+             *granted(framed, part, moves, source, tools, setup, threads)]
     stages.tell(1.0)
     proof = _proof(findings, cuts, run, framed, known, took, moves, source, setup, scored, zone_ids,
                    engagements(angle, stretches, tools), met.spacing, tuple(notes), support)
-    proof = replace(proof, cautions=tuple(cautions), assumed=in_order(
-        [*setup.assumed, *program_assumptions(framed, tools, setup, stated)]))
+    proof = replace(proof, cautions=tuple(cautions), assumed=in_order(taken))
     return proof if work is None else replace(proof, work=work)
 
 
