@@ -74,8 +74,8 @@ def difference(proved: Program, other: Program) -> str:
 def _careless(p: Program) -> str:
     """First tool change, stop or end at which the spindle is not home, in words; '' where there is none.
 
-    Our own programs send the spindle home there, since the operator inserts a new cutter by hand. On LinuxCNC they empty
-    the spindle before they stop for a fresh cutter, because the control does not load a tool that it holds.
+    Our own programs send the spindle home there, since the operator inserts a new cutter by hand. On LinuxCNC they
+    empty the spindle before they stop for a fresh cutter, because the control does not load a tool that it holds.
     """
     control, changes = CONTROLS.get(p.dialect), 0
     for pause in p.pauses:
