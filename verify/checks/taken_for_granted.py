@@ -27,11 +27,12 @@ def granted(read: Sequence[FramedProgram], part: Part, moves: Moves, source: Sou
 
     part, moves : in the frame of the proof, mm; ``tools`` are those that ``moves`` refers to
     """
-    return [*_lengths(read, setup), *_holders(part, moves, source, tools, setup, threads),
+    return [*length_assumptions(read, setup), *_holders(part, moves, source, tools, setup, threads),
             *_above_holders(part, moves, tools, setup), *_table(read, setup), *_changes(read)]
 
 
-def _lengths(read: Sequence[FramedProgram], setup: ProofSetup) -> Iterator[Assumed]:
+def length_assumptions(read: Sequence[FramedProgram], setup: ProofSetup) -> Iterator[Assumed]:
+    """The gauge lengths that tips of a tilted head depend on and the setup does not state."""
     used = sorted({t for r in read for t in r.program.by_joints} - setup.gauge_given)
     if used:
         value = ", ".join(f"T{t} {setup.gauge_length.get(t, 0.0):g} mm" for t in used)
@@ -105,4 +106,4 @@ def _changes(read: Sequence[FramedProgram]) -> Iterator[Assumed]:
                       "state machine.change_position, or send Z home before the tool change")
 
 
-__all__ = ["granted"]
+__all__ = ["granted", "length_assumptions"]

@@ -8,7 +8,10 @@ from geometry.tool_body import HolderFrustum, ToolBody
 from tests.pocket_case import block
 from verify.assumptions import AssumedKind
 from verify.checks.empty_spindle import SMALLEST_NOSE
+from verify.checks.program_sequence import FramedProgram
+from verify.checks.taken_for_granted import length_assumptions
 from verify.gcode.reader import read_program
+from verify.kinematics import Kinematics
 from verify.model import NcProgram, ProofSetup, ScoredSamples, StockKind
 from verify.prove import prove
 from verify.tool_bodies import NOSE_LENGTH, Bodies
@@ -96,3 +99,18 @@ def test_what_stands_above_a_holder_and_under_the_part_is_told():
     taken = {a.what: str(a.value) for a in proved("G0 X60", "G0 Z-12.5", "G0 Z15").assumed}
     assert "ends 62.5 mm above the top" in taken[AssumedKind.ABOVE_HOLDER]
     assert "deepest under the part 2.500 mm (p, line 9)" in taken[AssumedKind.TABLE]
+
+
+@pytest.mark.parametrize(("given", "told"), [(frozenset(), True), (frozenset({1}), False)])
+def test_gauge_lengths_of_a_tilted_head_without_tool_centre_point_control_are_told(given, told):
+    head = Kinematics("head-table-BC", ((0.0, 0.0, 150.0), (0.0, 0.0, -50.0)))
+    text = HEAD + "G0 Z60 B30\nG1 X5 F500\nG0 Z90\nB0\nM5\nM30\n%\n"
+    p = read_program(text, tools={1}, kinematics=head, gauge_length={1: 75.0})
+    assert p.by_joints == {1}
+    setup = ProofSetup(gauge_length={1: 75.0}, gauge_given=given, kinematics=head)
+    framed = FramedProgram(p, None, setup, np.array([[-20.0, -15, -10], [20, 15, 0]]))
+    found = list(length_assumptions([framed], setup))
+    assert [(a.what, a.value) for a in found] == ([(AssumedKind.GAUGE_LENGTH, "T1 75 mm")] if told else [])
+    upright = read_program(text.replace(" B30", "").replace("B0\n", ""), tools={1}, kinematics=head,
+                           gauge_length={1: 75.0})
+    assert upright.by_joints == frozenset()
