@@ -91,6 +91,17 @@ class Machine(WireModel):
                     "axes at 0. Tools stay clearance_mm.rapid above it; on a 3-axis machine a tool that cuts may come "
                     "down to it. If the spindle nose is wider than the holder, add it as the last segment of "
                     "tools[].holder. null: tilted tools stay above the bottom of the blank.")] = None
+    change_position: Annotated[list[BoundedNumber] | None, Field(
+        min_length=1, max_length=3,
+        description="Place of the spindle face while a tool is changed (M6), mm, in the setup frame with the rotary "
+                    "axes at 0: [Z], or [X, Y, Z]. With [Z] alone X and Y stay. The control goes there by itself. "
+                    "null: LinuxCNC changes the tool where the spindle stands, so a longer tool then hangs lower. "
+                    "Other controls are taken to go above everything.")] = None
+    nose_diameter_mm: Annotated[Number | None, Field(
+        ge=1, le=1000, description="Diameter of the spindle nose, mm. The nose is then a body 200 mm high that begins "
+                                   "gauge_length_mm over the tip of each tool, and at the program's Z where the "
+                                   "spindle is empty. null: nothing is checked above a holder, and the nose of an "
+                                   "empty spindle is taken to be 69.832 mm wide (taper 30 of DIN 2079).")] = None
     orientations: Annotated[Literal["find", "given"], Field(
         description="find: a 5-axis machine also uses other tool axes for areas that the accesses of the setup do not "
                     "reach. given: it uses those accesses only. No effect on a 3-axis machine.")] = "find"
@@ -138,6 +149,8 @@ class Machine(WireModel):
         if absent := [d for d in self.dialects if d not in DIALECT_ENDINGS]:
             raise ValueError(f"dialect {', '.join(map(repr, absent))} is not built yet; "
                              f"use {', '.join(DIALECT_ENDINGS)}")
+        if self.change_position is not None and len(self.change_position) == 2:
+            raise ValueError("machine.change_position has 1 number, Z, or 3, X, Y and Z")
         if len(set(self.dialects)) != len(self.dialects):
             raise ValueError("machine.dialects names a dialect more than once")
         if self.travel_mm is not None and min(self.travel_mm) <= 0:

@@ -143,7 +143,12 @@ class Clearance(WireModel):
     neck: Annotated[Number, Field(ge=0, le=100, description="Of the neck, mm.")] = 0.05
     shank: Annotated[Number, Field(ge=0, le=100, description="Of the shank, mm.")] = 0.2
     holder: Annotated[Number, Field(ge=0, le=100, description="Of the holder, mm.")] = 1.0
-    rapid: Annotated[Number, Field(ge=0, le=100, description="Of the whole tool during a rapid, mm.")] = 1.0
+    rapid: Annotated[Number, Field(ge=0, le=100, description="Of the whole tool during a rapid, mm, aside and to what "
+                                                             "is below it.")] = 1.0
+    approach: Annotated[Number, Field(
+        ge=0, le=100, description="Of the whole tool to what is below it, in a rapid straight down before a cut, mm. "
+                                  "Where it is larger than rapid, rapid holds. A rapid straight up needs no "
+                                  "clearance.")] = 0.2
 
 
 class Quality(WireModel):

@@ -329,6 +329,11 @@ def gauge_lengths(tools: Sequence[Tool], bodies: Sequence[ToolBody]) -> dict[int
             body.stickout + sum(h.length for h in body.holder) for t, body in zip(tools, bodies, strict=True)}
 
 
+def gauges_given(tools: Sequence[Tool]) -> frozenset[int]:
+    """T numbers of the tools whose gauge length the setup states."""
+    return frozenset(t.number for t in tools if t.gauge_given and t.number is not None)
+
+
 def face_numbers(ids: list[str]) -> tuple[int, ...]:
     """Face numbers of face ids: ``["F12"]`` gives ``(12,)``."""
     return tuple(int(i[1:]) for i in ids)

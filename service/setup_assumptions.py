@@ -17,9 +17,6 @@ def setup_assumptions(inputs: JobInputs) -> tuple[Assumed, ...]:
         out.append(Assumed(AssumedKind.MAX_RPM, "fast enough",
                            f"{', '.join(open_rpm)} may turn faster than spindle or tool allow",
                            "state machine.max_rpm, or max_rpm of each tool"))
-    if machine.table_z_mm is None:
-        out.append(Assumed(AssumedKind.TABLE, "below everything", "a tool may run into the table",
-                           "state machine.table_z_mm"))
     return tuple(out)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64, I32
+from geometry.tool_body import ToolBody
 from verify.kernels.stock import CUTTER, FIXTURE, HOLDER, NECK, PLUNGE, SHANK
 from verify.model import Finding, FindingKind
 from verify.moves import Moves
@@ -20,6 +21,8 @@ MAX_FINDINGS = 200
 KEPT_OF_A_KIND = MAX_FINDINGS // len(FindingKind)
 NEAR = 5.0
 LINES_APART = 5
+SAME_PLACE = 1e-6  # mm
+SAME_WIDTH = 0.05  # mm: relief of less than half of it aside is no relief
 BODY_NAMES = {CUTTER: "cutting part", NECK: "neck", SHANK: "shank", HOLDER: "holder"}
 
 
@@ -71,12 +74,15 @@ def worst_of(groups: NDArray[np.int64], depth: F64) -> list[NDArray[np.int64]]:
     return [rows for rows in np.split(order, cuts) if len(rows)]
 
 
-def contact_findings(events: F64, moves: Moves, source: Source, rapid_clearance: float,
-                     skins: F64) -> list[Finding]:
+def contact_findings(events: F64, moves: Moves, source: Source, skins: F64,
+                     tools: Sequence[ToolBody]) -> list[Finding]:
     """Findings of the events that a pass over the stock collected.
 
     events : (e, 7) float64, rows of ``verify.material.stock_pass.StockPass``, mm, setup frame
     skins  : (m,) float64, mm, depth that each move may plunge
+
+    A neck or shank as wide as the cutting part runs along the walls of its own cut. Where it enters by no more than the
+    skin, it rubs; deeper it collides.
     """
     if len(events) == 0:
         return []
@@ -89,7 +95,14 @@ def contact_findings(events: F64, moves: Moves, source: Source, rapid_clearance:
         r = rows[0]
         m = move[r]
         depth, clearance = float(events[r, 2]), float(events[r, 3])
-        kind, text, limit = _contact(int(code[r]), bool(feed[m]), depth, clearance, rapid_clearance, float(skins[m]))
+        kind, text, limit = _contact(int(code[r]), bool(feed[m]), depth, clearance, float(skins[m]))
+        beside = _runs_beside(int(code[r]), tools[moves.tool[m]])
+        if kind is FindingKind.COLLISION and beside and depth - clearance <= skins[m]:
+            kind = FindingKind.RUBBING
+        if source.tool[m] == 0:
+            text = text.replace(BODY_NAMES[CUTTER], "spindle nose")
+            if depth > clearance:
+                kind, limit = FindingKind.COLLISION, 0.0
         lines = source.line[move[rows]]
         out.append(Finding(kind, source.names[source.program[m]], int(source.line[m]), None, None,
                            _point(events[r, 4:7]), depth if kind == FindingKind.PLUNGE else max(depth - clearance, 0.0)
@@ -99,6 +112,12 @@ def contact_findings(events: F64, moves: Moves, source: Source, rapid_clearance:
     return out
 
 
+def _runs_beside(code: int, tool: ToolBody) -> bool:
+    """Whether a contact with stock or part is that of a neck or shank as wide as the cutting part."""
+    wide = {NECK: tool.neck_diameter, SHANK: tool.shank_diameter}.get(code)
+    return wide is not None and abs(tool.diameter - wide) <= SAME_WIDTH
+
+
 def _nearest(start: F64, end: F64, place: F64) -> F64:
     """(3,) float64, mm: the point of a straight move that is nearest to ``place``."""
     way = end - start
@@ -106,8 +125,7 @@ def _nearest(start: F64, end: F64, place: F64) -> F64:
     return np.asarray(start + (min(max(float((place - start) @ way) / size, 0.0), 1.0) if size > 0.0 else 1.0) * way)
 
 
-def _contact(code: int, feed: bool, depth: float, clearance: float, rapid_clearance: float,
-             skin: float) -> tuple[FindingKind, str, float]:
+def _contact(code: int, feed: bool, depth: float, clearance: float, skin: float) -> tuple[FindingKind, str, float]:
     if code == PLUNGE:
         return (FindingKind.PLUNGE, f"a descent steeper than the ramp angle takes {depth:.3f} mm of stock with the "
                 f"end of the tool ({skin:.3f} mm allowed)", skin)
@@ -115,8 +133,8 @@ def _contact(code: int, feed: bool, depth: float, clearance: float, rapid_cleara
     gap = clearance - depth
     if not feed:
         text = f"a rapid takes the {body} into {obstacle}" if gap < 0 else \
-            f"a rapid brings the {body} to {gap:.3f} mm of {obstacle} (clearance {rapid_clearance:g} mm)"
-        return FindingKind.RAPID, text, rapid_clearance
+            f"a rapid brings the {body} to {gap:.3f} mm of {obstacle} (clearance {clearance:g} mm)"
+        return FindingKind.RAPID, text, clearance
     if gap < 0:
         return FindingKind.COLLISION, f"the {body} enters {obstacle} by {-gap:.3f} mm", 0.0
     text = f"the {body} comes to {gap:.3f} mm of {obstacle} (clearance {clearance:.3f} mm)"

@@ -66,6 +66,8 @@ class ProofSetup:
     stock_mesh    : TriangleMesh, closed, normals outwards, mm, of a blank of kind step, or None
     fixtures      : boxes as (2, 3) float64 corners, mm; each stands down to the table
     clearance_*   : mm, radial. A body nearer than this to part, stock or fixture rubs; in a rapid it is a finding.
+    clearance_rapid : mm, in every direction, also to what is below the tool
+    clearance_approach : mm, to what is below the tool in a rapid straight down before a cut; not over clearance_rapid
     scallop_height, gouge_tolerance, stock_allowance : mm, the budget -gouge <= residual - allowance <= scallop
     ramp_angle    : rad, steepest descent into stock
     ramp_angles   : rad by T number, for tools that have another one
@@ -75,6 +77,9 @@ class ProofSetup:
     acceleration  : mm/s², for times
     travel        : (3,) float64, mm, span of the moves of a program that the machine allows in X, Y and Z, or None
     gauge_length  : mm by T number, from the spindle face to the tip; counted in Z against the travel
+    gauge_given   : T numbers of the tools whose gauge length the setup states
+    change_position : mm, setup frame, Z or X, Y and Z of the spindle face at a tool change, or None
+    nose_diameter : mm, of the spindle nose, or None
     dogleg        : whether a rapid moves each axis at its own speed, so that its path is not a straight line; None: by
                     the dialect of the programs
     max_feed      : mm/min of any feed move, or None
@@ -106,6 +111,7 @@ class ProofSetup:
     clearance_shank: float = 0.2
     clearance_holder: float = 1.0
     clearance_rapid: float = 1.0
+    clearance_approach: float = 0.2
     scallop_height: float = 0.01
     gouge_tolerance: float = 0.01
     stock_allowance: float = 0.0
@@ -117,6 +123,9 @@ class ProofSetup:
     acceleration: float = 1000.0
     travel: F64 | None = None
     gauge_length: Mapping[int, float] = field(default_factory=dict)
+    gauge_given: frozenset[int] = frozenset()
+    change_position: tuple[float, ...] | None = None
+    nose_diameter: float | None = None
     dogleg: bool | None = None
     work_offset: str = "G54"
     max_feed: float | None = None

@@ -18,11 +18,14 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.tool_body import ToolBody
 from verify.assumptions import Assumed, AssumedKind, in_order
+from verify.checks.changed_tools import as_collisions
+from verify.checks.empty_spindle import with_nose
 from verify.checks.program_assumptions import program_assumptions, rapids_decided
 from verify.checks.program_sequence import FramedProgram, Given, check_numbers, counted, moves_of, read_all, slides_of
 from verify.checks.repeated_passes import repeats
 from verify.checks.sideways_cuts import sideways_findings
 from verify.checks.table_clearance import table_findings
+from verify.checks.taken_for_granted import granted
 from verify.findings import (
     Source,
     contact_findings,
@@ -110,6 +113,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     framed = read_all(programs, part, tools, setup, spindle_tool, stages.span(0.0, READ), read)
     stated = setup.dogleg is not None
     framed, setup = rapids_decided(framed, setup)
+    tools = with_nose(tools, framed, setup)
     moves, source = moves_of(framed, tools)
     if asked is not None:
         scored = _settled(scored, part, tools, setup, moves, threads, stages.span(READ, SETTLED))
@@ -133,7 +137,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     again, springs = repeats(moves, run.cut, source, _finishes(cuts, setup, len(moves)))
     dug = fine_plunges(moves, tools, fine, part.mesh.bounds, setup, threads)
     dug = dug[~np.isin(dug[:, 0], run.events[run.events[:, 1] == PLUNGE, 0])]
-    findings = [*contact_findings(np.concatenate([run.events, dug]), moves, source, setup.clearance_rapid, skins),
+    met_by = contact_findings(np.concatenate([run.events, dug]), moves, source, skins, tools)
+    findings = [*as_collisions(met_by, [p.program for p in framed]),
                 *cuts.gouges, *cuts.excluded, *loaded, *_program_findings(framed),
                 *(f for p in framed for f in p.findings(tools)), *_unlisted(run.lost, framed),
                 *table_findings([p.program for p in framed], tools, setup),
@@ -154,11 +159,12 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     notes = [*springs, *(note for p in framed for note in p.notes())]
     dips = [Assumed(AssumedKind.BETWEEN_SAMPLES, round(met.dip, 3), "the fixtures are so large that a ball may enter "
                     f"one by {met.dip:.3f} mm unseen", "give smaller boxes where tools go")] * (met.dip > DIP + 1e-9)
+    taken = [*setup.assumed, *program_assumptions(framed, tools, setup, stated), *cuts.assumed, *dips,
+             *granted(framed, part, moves, source, tools, setup, threads)]
     stages.tell(1.0)
     proof = _proof(findings, cuts, run, framed, known, took, moves, source, setup, scored, zone_ids,
                    engagements(angle, stretches, tools), met.spacing, tuple(notes), support)
-    proof = replace(proof, cautions=tuple(cautions), assumed=in_order(
-        [*setup.assumed, *program_assumptions(framed, tools, setup, stated), *cuts.assumed, *dips]))
+    proof = replace(proof, cautions=tuple(cautions), assumed=in_order(taken))
     return proof if work is None else replace(proof, work=work)
 
 

@@ -15,6 +15,7 @@ from verify.kernels.tables import ToolArrays
 from verify.model import ProofSetup
 
 NO_HOLDER = 200.0  # mm, length of shank above the stickout where the setup names no holder
+NOSE_LENGTH = 200.0  # mm, height of the spindle nose
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +87,9 @@ def _frusta(tool: ToolBody, setup: ProofSetup) -> list[tuple[float, float, float
     for part in tool.holder:
         out.append((z, z + part.length, 0.5 * part.diameter, 0.5 * part.diameter_top, setup.clearance_holder, HOLDER))
         z += part.length
+    if tool.holder and setup.nose_diameter is not None:
+        face, nose = max(z, setup.gauge_length.get(tool.number, z)), 0.5 * setup.nose_diameter
+        out.append((face, face + NOSE_LENGTH, nose, nose, setup.clearance_holder, HOLDER))
     if not tool.holder:
         # the holder is unknown: at least the shank goes on
         out.append((max(z, top), max(z, top) + NO_HOLDER, shank, shank, setup.clearance_shank, SHANK))

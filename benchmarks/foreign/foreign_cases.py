@@ -236,7 +236,7 @@ CASES = (
     Foreign("arcspiral", _nc("arcspiral"), 3.175, True, 12.0, (-55, -55, -8, 55, 55, 0), 0.25),
     Foreign("cds", _nc("cds"), 6.35, False, 30.0, _inch(0, 0, 0, 4, 4, 2), 0.25),
     Foreign("flowsnake", _nc("flowsnake"), 0.06, True, 2.0, (-0.2, -0.2, -0.5, 4.2, 4.2, 0.02), 0.008),
-    Foreign("hole-circle", _nc("hole-circle"), 6.0, False, 20.0, (-50, -45, -15, 50, 45, 0), 0.25),
+    Foreign("hole-circle", _nc("hole-circle"), 6.0, False, 20.0, (-50, -45, -15, 50, 45, -1), 0.25),
     Foreign("polar", _nc("polar"), 6.0, False, 20.0, (-70, -70, -20, 135, 90, 0), 0.4),
     Foreign("spiral", _nc("spiral"), 3.175, False, 12.0, (-55, -55, -8, 55, 55, 0), 0.25),
     Foreign("tort", _nc("tort"), 2.0, True, 80.0, (-35, -35, -22, 52, 54, 5), 0.2),

@@ -183,6 +183,8 @@ class _ThreeAxisProgram(_ProgramText):
             if self.plan.restart:
                 self._label(step)
                 self.lines += [*self._modes(), *self.dialect.up()]
+            elif self.tool is not None and step.tool != self.tool:
+                self.lines += self.dialect.before_change()
             self._put_in(step)
         self.lines += self.dialect.comment(step_words(step))
         self._set_speed(step)
@@ -258,6 +260,8 @@ class _FiveAxisProgram(_ProgramText):
                 self.lines += self._modes()
             elif self.tool == step.tool and not step.fresh:  # same tool, other speed: it is not raised
                 self.lines += self.dialect.rise()
+            elif self.tool is not None and step.tool != self.tool:
+                self.lines += self.dialect.before_change()
             self._put_in(step)
         self.lines += self.dialect.comment(step_words(step))
         self._set_speed(step)

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from schemas.setup import Lean
-from service.from_wire import face_numbers
+from service.from_wire import face_numbers, gauges_given
 from service.setup_assumptions import planned_sense, setup_assumptions
 from service.stages.access_plan import ProofFrame
 from service.stages.job_inputs import RAMP_ANGLE, JobInputs
@@ -81,6 +81,7 @@ def proof_setup(job: JobPart, view: View | ProofFrame, *, foreign: bool = False)
         stock_mesh=job.blank.proof_mesh(view.rotation),
         fixtures=fixture_boxes(job, view), clearance_neck=c.neck,
         clearance_shank=c.shank, clearance_holder=c.holder, clearance_rapid=c.rapid,
+        clearance_approach=c.approach,
         scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,
         stock_allowance=q.stock_allowance_mm, ramp_angle=RAMP_ANGLE, ramp_angles=inputs.ramp_angles(foreign=foreign),
         cores=inputs.cores, cutting=inputs.cutting,
@@ -88,9 +89,11 @@ def proof_setup(job: JobPart, view: View | ProofFrame, *, foreign: bool = False)
         work_offset=access_of(job, view).work_offset,
         travel=None if machine.travel_mm is None else np.array(machine.travel_mm, dtype=np.float64),
         gauge_length=inputs.gauge_lengths,
+        gauge_given=gauges_given(inputs.tools),
         line_spacing=min(ProofSetup.line_spacing, inputs.engagement_spacing),
-        dogleg=_own_speeds(inputs, foreign), max_feed=machine.max_feed_mm_min,
-        max_engaged=inputs.max_engaged, max_rpm=inputs.max_rpm,
+        change_position=None if machine.change_position is None else tuple(machine.change_position),
+        nose_diameter=machine.nose_diameter_mm, dogleg=_own_speeds(inputs, foreign),
+        max_feed=machine.max_feed_mm_min, max_engaged=inputs.max_engaged, max_rpm=inputs.max_rpm,
         table=table_height(inputs, job.blank) if tabled else None,
         table_known=machine.table_z_mm is not None, free_ratio=FREE_RATIO, walls_in_turn=in_turn(job),
         kinematics=inputs.kinematics, rotary_limits=inputs.rotary_limits,

@@ -93,7 +93,7 @@ class JobInputs:
                    tuple(setup.access), tuple(setup.tools), bodies, _cut_table(setup, bodies),
                    gauge_lengths(setup.tools, bodies), setup.machine, setup.stock,
                    tuple(np.array(f.box_mm, dtype=np.float64) for f in setup.fixtures),
-                   Clearances(c.neck, c.shank, c.holder, c.rapid), setup.quality, setup.operations,
+                   Clearances(c.neck, c.shank, c.holder, c.rapid, c.approach), setup.quality, setup.operations,
                    setup.material, material_name(setup), rates_of(setup))
 
     @property

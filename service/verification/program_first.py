@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from geometry.errors import SetupError
 from schemas.machine import Machine
 from schemas.setup import Setup
-from service.from_wire import check_spindle_tool, gauge_lengths, machine_kinematics, tool_bodies
+from service.from_wire import check_spindle_tool, gauge_lengths, gauges_given, machine_kinematics, tool_bodies
 from service.verification.rotary_sense import assumed_sense, check_gauges, check_sense, sense_in_header
 from verify.assumptions import Assumed, AssumedKind
 from verify.gcode.dialects import dialect_of, dialects_left
@@ -70,7 +70,8 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
 
     def reading(of: Kinematics | None, program: NcProgram = nc, longer: Mapping[int, float] | None = None) -> Program:
         return read_one(program, tools, work_offset=own.work_offset, gouge_tolerance=setup.quality.gouge_tolerance_mm,
-                        kinematics=of, gauge_length={**gauges, **(longer or {})}, spindle_tool=spindle_tool)
+                        kinematics=of, gauge_length={**gauges, **(longer or {})}, spindle_tool=spindle_tool,
+                        change=setup.machine.change_position, gauge_given=gauges_given(setup.tools))
 
     if dialect is None and not is_exchange_file(text):
         assumed.extend(_assumed_dialect(nc.dialect, dialects_left(text, ending, _stated_dialects(setup))))

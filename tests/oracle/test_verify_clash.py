@@ -9,8 +9,9 @@ from geometry.tool_body import HolderFrustum, ToolBody
 from tests.oracle.turning_twin import random_moves, seen, signed
 from verify.kernels.clash import TOUCHING, is_lift
 from verify.kernels.frustum import Frustum, contact
-from verify.kernels.stock import CUTTER, FIXTURE, HOLDER, NECK, SHANK
+from verify.kernels.stock import CUTTER, FIXTURE, HOLDER, NECK, ROUNDING, SHANK
 from verify.material.collision import FIXTURE_SPACING, MAX_FIXTURE_POINTS, fixture_points, run_clashes
+from verify.material.stock_pass import BESIDE
 from verify.model import ProofSetup
 from verify.moves import BOW, Moves
 from verify.tool_axes import ToolAxes
@@ -58,6 +59,22 @@ def cutter_depth(rho, h, tool, grow, slack, off):
     return out
 
 
+def apart(rho, h, z0, z1, r0, r1):
+    """Distance of points to a standing frustum, as the least of those to its three sides; 0 inside."""
+    out = np.full(rho.shape, np.inf)
+    for a, b in (((0, z0), (r0, z0)), ((r0, z0), (r1, z1)), ((r1, z1), (0, z1))):
+        d = np.subtract(b, a)
+        s = np.clip(((rho - a[0]) * d[0] + (h - a[1]) * d[1]) / max(d @ d, 1e-30), 0.0, 1.0)
+        out = np.minimum(out, np.hypot(rho - a[0] - s * d[0], h - a[1] - s * d[1]))
+    return np.where((h >= z0) & (h <= z1) & (rho <= r0 + (r1 - r0) * (h - z0) / (z1 - z0)), 0.0, out)
+
+
+def near_depth(gap, room, clearance, off):
+    """How much nearer than the room of a rapid, as an event of ``clearance`` counts it."""
+    gap = gap.min(axis=-1) - off
+    return np.where(gap < room - ROUNDING, clearance - np.maximum(gap, 0.0), 0.0)
+
+
 def twin(points, fixed, moves, tool, setup, off):
     """{(move, code): depth} of standing tools at 4001 places of every move, grown by ``off`` mm all round."""
     rows, out = Bodies.of([tool], setup).rows, {}
@@ -71,12 +88,15 @@ def twin(points, fixed, moves, tool, setup, off):
         if not feed or fixed.any():
             slack = np.where(fixed, TOUCHING, setup.gouge_tolerance)
             depth = cutter_depth(rho, h, tool, grow, slack, off)
+            depth = np.maximum(depth, near_depth(signed(rho, h, tool), grow, grow, off))
             found.append((CUTTER, np.where(fixed | (not feed), depth, 0.0)))
         for row in rows:
             beside = max(row[2], row[3]) <= tool.radius + 1e-9
-            slack = np.where(fixed | (not beside), TOUCHING, setup.gouge_tolerance)
+            slack = np.where(fixed | (not beside), TOUCHING, BESIDE)
             extra = 0.0 if feed else -row[4] if lift else grow - min(grow, row[4])
-            found.append((int(row[5]), body_depth(rho, h, row, extra, slack, off)))
+            gap = apart(rho, h, row[0], row[1], row[2] - row[4], row[3] - row[4])
+            found.append((int(row[5]), np.maximum(body_depth(rho, h, row, extra, slack, off),
+                                                  near_depth(gap, grow, row[4] + extra, off))))
         for code, depth in found:
             for held in (False, True):
                 worst = float(depth[fixed == held].max(initial=0.0))

@@ -101,7 +101,8 @@ def read_all(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], s
         share = stages.span(done / total, (done + len(nc.text)) / total)
         program = known[k] if known is not None else read_one(
             nc, tools, work_offset=own.work_offset, gouge_tolerance=setup.gouge_tolerance, kinematics=setup.kinematics,
-            gauge_length=setup.gauge_length, spindle_tool=spindle_tool, report=share)
+            gauge_length=setup.gauge_length, spindle_tool=spindle_tool, report=share, change=setup.change_position,
+            gauge_given=setup.gauge_given)
         read.append(FramedProgram(from_above(program, top + setup.clearance_rapid), nc.turn, own, bounds))
         done += len(nc.text)
     return read
@@ -129,6 +130,8 @@ def moves_of(read: Sequence[FramedProgram], tools: Sequence[ToolBody]) -> tuple[
     """Moves of all programs, one after the other. Moves without a tool, and of no length, are left out.
 
     tools : of the moves; ``Moves.tool`` is the place in this sequence
+
+    A feed move of tool 0, the empty spindle, counts as a rapid: it cuts nothing.
     """
     programs = [r.program for r in read]
     row = {t.number: i for i, t in enumerate(tools)}
@@ -145,7 +148,7 @@ def moves_of(read: Sequence[FramedProgram], tools: Sequence[ToolBody]) -> tuple[
     if any(r.turn is not None or r.program.poses is not None for r in read):
         axes = ToolAxes.between(np.concatenate([_axes(r, True) for r in read])[known],
                                 np.concatenate([_axes(r, False) for r in read])[known])
-    return (Moves(np.ascontiguousarray(start), np.ascontiguousarray(end), kind == FEED, tool, axes),
+    return (Moves(np.ascontiguousarray(start), np.ascontiguousarray(end), (kind == FEED) & (number > 0), tool, axes),
             Source(tuple(p.name for p in programs), which, line, number))
 
 

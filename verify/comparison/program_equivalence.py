@@ -74,7 +74,8 @@ def difference(proved: Program, other: Program) -> str:
 def _careless(p: Program) -> str:
     """First tool change, stop or end at which the spindle is not home, in words; '' where there is none.
 
-    Our own programs send the spindle home there, since the operator inserts a new cutter by hand.
+    Our own programs send the spindle home there, since the operator inserts a new cutter by hand. On LinuxCNC they
+    empty the spindle before they stop for a fresh cutter, because the control does not load a tool that it holds.
     """
     control, changes = CONTROLS.get(p.dialect), 0
     for pause in p.pauses:
@@ -84,6 +85,8 @@ def _careless(p: Program) -> str:
                 return f"line {pause.line} of {p.name}: {pause.event} while the spindle is not home"
             if control is not None and control.gives_up_length and pause.counted:
                 return f"line {pause.line} of {p.name}: {pause.event} while the length offset is on"
+        if pause.event == "M0" and control is None and pause.tool:
+            return f"line {pause.line} of {p.name}: M0 for a fresh cutter while T{pause.tool} is in the spindle"
         changes += pause.event == "tool change"
     return ""
 

@@ -8,8 +8,8 @@ from collections.abc import Callable, Collection, Mapping
 import numpy as np
 
 from verify.gcode.block_words import COMPENSATES, CYCLES, MOTION_CODES, SAVES, WORK_OFFSETS, Block, BlockError
-from verify.gcode.rotary_words import Rotary
 from verify.gcode.saved_modes import SavedModes
+from verify.gcode.tool_changes import ToolChanges
 from verify.kinematics import Kinematics
 from verify.program.move_log import Log
 from verify.program.program import NAN, Pause, StopPoint
@@ -18,7 +18,7 @@ INCH = 25.4
 PATH_MODES: frozenset[float] = frozenset({61, 61.1, 64})
 
 
-class Modes(Rotary):
+class Modes(ToolChanges):
     """State, log, and all modes that a block sets before it moves.
 
     tools       : T numbers of the tool table; any number where None
@@ -126,7 +126,7 @@ class Modes(Rotary):
             self.stop("tool change")
             if s.selected != s.tool:
                 self.log.changes += s.tool > 0
-                self._leave([False, False, True])
+                self._change_tool(s.selected, s.tool > 0 or self.loaded)
             s.tool, s.spindle, self.loaded = s.selected, False, True
         if 3 in ms or 4 in ms:
             s.spindle = True

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -87,7 +87,8 @@ class Reader(BlockMotion):
                        log.turned.poses(len(table), self.machine), tuple(log.notes), speed, coolant, log.changes,
                        dialect, log.unbounded, tuple(log.pauses), log.leaves, tuple(log.places), cut_off,
                        open=() if self.control is None else tuple(self.control.assumed), cools=log.cools,
-                       dwells=tuple(log.dwells))
+                       dwells=tuple(log.dwells), swaps=tuple(log.swaps), unplaced=tuple(log.unplaced),
+                       by_joints=frozenset(log.by_joints))
 
     def served(self, key: int | str) -> float:
         """A parameter that the control serves (``verify.gcode.flow.system_parameters``)."""
@@ -248,7 +249,8 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
                  work_offset: str = "G54", blend_limit: float = BLEND_LIMIT, kinematics: Kinematics | None = None,
                  gauge_length: Mapping[int, float] | None = None, spindle_tool: int = 0,
                  report: Report = silent, dialect: str = LINUXCNC, radii: Mapping[int, float] | None = None,
-                 names: Mapping[str, int] | None = None) -> Program:
+                 names: Mapping[str, int] | None = None, change: Sequence[float] | None = None,
+                 lengths: Mapping[int, float] | None = None) -> Program:
     """Read a program of three, four or five axes.
 
     text        : the program
@@ -263,6 +265,8 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
     dialect     : one of ``verify.gcode.dialects.DIALECTS``
     radii       : mm by T number, radius of the cutting part, for cutter radius compensation
     names       : T numbers by the ids of the tools, for programs that name their tools
+    change      : mm, setup frame, Z or X, Y and Z of the spindle face at a tool change; None where it is not stated
+    lengths     : mm by T number, spindle face to tip, of the tools whose length is known
 
     Returns
     -------
@@ -296,6 +300,8 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
                            remedy="give a tool of the table as spindle_tool")
     reader = Reader(Log(name), tools, work_offset, blend_limit, kinematics, gauge_length, spindle_tool)
     reader.radii, reader.names = dict(radii or {}), dict(names or {})
+    reader.change = None if change is None else tuple(change)
+    reader.hangs, reader.stays = {0: 0.0, **(lengths or {})}, dialect == LINUXCNC
     return reader.read(text, report, dialect)
 
 

@@ -97,7 +97,10 @@ class Rotary:
         """mm from the spindle face to the tip, 0 where tips do not depend on it; None where tips cannot be computed."""
         if self.machine is None or self.machine.pivots is None:
             return None
-        return self.gauge.get(self.s.tool) if self.machine.tilts_head else 0.0
+        if not self.machine.tilts_head:
+            return 0.0
+        self.log.by_joints.add(self.s.tool)
+        return self.gauge.get(self.s.tool)
 
     def _timing(self, feed: float, length: float, turn: list[float] | None) -> tuple[float, float]:
         """Rate, mm/min, and minutes of a feed block; minutes are nan where length and rate give them.

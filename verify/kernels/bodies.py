@@ -55,7 +55,7 @@ def body_tile(tile, cells: CellArrays, points, moves: MoveArrays, radii, bodies,
 
     points : (n, 3) float64, mm, sorted by cell; radii : (k,) float64, mm, of the cutting parts
     bodies : (b, 6) float64, mm; rows body_first[k]:body_first[k + 1] belong to tool k
-    slack  : mm of overlap that a body beside its own cut may have
+    slack  : mm of overlap that a body no wider than the cutting part may have
     """
     best = np.zeros((16, 5))
     count = 0

@@ -1,8 +1,8 @@
 """Bodies of tools that lean or turn against points of the part and of fixtures.
 
 Notation as in ``pose``; body and event rows as in ``stock``; points in chunks of nested balls as in ``turned``. In a
-rapid everything is grown radially by the rapid clearance, the cutting part too; a straight lift along the tool leaves
-the place it stands in with no clearance asked.
+rapid everything is grown radially by the rapid clearance, the cutting part too, and keeps the room of the rapid in
+every direction; a straight lift along the tool leaves the place it stands in with no clearance asked.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from numba import njit
 
 from geometry.kernels.cutter_sizes import CutterSizes
 from geometry.kernels.options import KERNEL
-from verify.kernels.frustum import Frustum, contact, no_deeper
+from verify.kernels.frustum import Frustum, clear_of, contact, no_deeper
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import beside, carried
-from verify.kernels.stock import CUTTER, FIXTURE, _note, _worse, known_depth
-from verify.kernels.tables import F64, AxisArrays, Bool, ContactLimits, MoveArrays, ToolArrays
+from verify.kernels.stock import CUTTER, FIXTURE, ROUNDING, _note, _worse, known_depth
+from verify.kernels.tables import F64, AxisArrays, Bool, ContactLimits, MoveArrays, RapidArrays, ToolArrays
 
 TOUCHING = 1e-3
 ASIDE = 5e-3  # mm a straight lift may end beside its axis: coordinates of programs have two or three decimals
@@ -76,15 +76,28 @@ def _meet_point(p, x, y, z, cutter, bodies, b, grow, slack, known):
 
 
 @njit(**KERNEL)
-def _traverse(p, chunk, cloud, held, every, cutter, bodies, b, grow, slack, best):
+def _clear_point(p, x, y, z, cutter, bodies, b):
+    """Distance of a point to body b of a tool on piece p, mm; b < 0 is the cutting part; 0 inside."""
+    qx, qy, qz, dx, dy, dz = view(p, x, y, z)
+    if b < 0:
+        return max(carried(qx, qy, qz, dx, dy, dz, cutter.radius - cutter.corner, cutter.corner, cutter.length,
+                           cutter.cone), 0.0)
+    body = bodies[b]
+    return clear_of(qx, qy, qz, dx, dy, dz, Frustum(body[0], body[1], body[2] - body[4], body[3] - body[4]), False)
+
+
+@njit(**KERNEL)
+def _traverse(p, chunk, cloud, held, every, cutter, bodies, b, grow, room, slack, best):
     """One body of a tool on piece p against the points of a chunk; of fixtures alone unless ``every``.
 
     held : whether the chunk has points of fixtures
     """
-    z0, z1, wide, clearance, code = 0.0, cutter.length, cutter.radius + grow, grow, CUTTER
+    z0, z1, wide, clearance, code = 0.0, cutter.length, cutter.radius + max(grow, room), grow, CUTTER
     if b >= 0:
-        z0, z1, wide = bodies[b, 0], bodies[b, 1], max(bodies[b, 2], bodies[b, 3]) + grow
+        z0, z1, wide = bodies[b, 0], bodies[b, 1], max(bodies[b, 2], bodies[b, 3])
         clearance, code = bodies[b, 4] + grow, int(bodies[b, 5])
+        wide = max(wide + grow, wide - bodies[b, 4] + room)
+    z0, z1 = z0 - room, z1 + room
     of_fixture, known = known_depth(best, code + FIXTURE, clearance), known_depth(best, code, clearance)
     known = of_fixture if not every else min(known, of_fixture) if held else known
     points, fixed = cloud.points, cloud.fixed
@@ -105,22 +118,23 @@ def _traverse(p, chunk, cloud, held, every, cutter, bodies, b, grow, slack, best
                         depth = _meet_point(p, points[i, 0], points[i, 1], points[i, 2], cutter, bodies, b, grow,
                                             TOUCHING if fixed[i] else slack,
                                             known_depth(best, code + (FIXTURE if fixed[i] else 0), clearance))
+                        into = code + (FIXTURE if fixed[i] else 0)
                         if depth > 0.0:
-                            _worse(best, code + (FIXTURE if fixed[i] else 0), depth, clearance, points[i, 0],
-                                   points[i, 1], points[i, 2])
+                            _worse(best, into, depth, clearance, points[i, 0], points[i, 1], points[i, 2])
+                        if room > 0.0 and known_depth(best, into, room) < room:
+                            gap = _clear_point(p, points[i, 0], points[i, 1], points[i, 2], cutter, bodies, b)
+                            if gap < room - ROUNDING:
+                                _worse(best, into, room - gap, room, points[i, 0], points[i, 1], points[i, 2])
 
 
 @njit(**KERNEL)
-def clash_chunk(chunk, cloud: PointArrays, moves: MoveArrays, axes: AxisArrays, free, tools: ToolArrays,
+def clash_chunk(chunk, cloud: PointArrays, moves: MoveArrays, axes: AxisArrays, rapids: RapidArrays, tools: ToolArrays,
                 limits: ContactLimits, events):
-    """Events of all moves with the points of one chunk; returns their number, which may exceed the table.
-
-    free : (m,) bool, rapids that need no clearance
-    """
+    """Events of all moves with the points of one chunk; returns their number, which may exceed the table."""
     starts, ends, feeds, tool = moves
     axis, about, angle, bow = axes
     cutters, _ends_radius, reach, bodies, body_first = tools
-    rapid_grow, slack = limits
+    free, rooms = rapids
     fixed, t3 = cloud.fixed, cloud.balls[3]
     best, piece = np.zeros((16, 5)), np.empty(PIECE)
     x, y, z, rad = t3[chunk, 0], t3[chunk, 1], t3[chunk, 2], t3[chunk, 3]
@@ -130,21 +144,21 @@ def clash_chunk(chunk, cloud: PointArrays, moves: MoveArrays, axes: AxisArrays, 
     count = 0
     for m in range(len(starts)):
         k, feed = tool[m], feeds[m]
-        far = reach[k] + rad + bow + rapid_grow
+        far = reach[k] + rad + bow + limits.rapid
         if near_segment2(x, y, z, starts[m], ends[m]) > far * far:
             continue
         cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3])
-        grow = 0.0 if feed or free[m] else rapid_grow
+        grow = 0.0 if feed or free[m] else limits.rapid
         length2 = (ends[m, 0] - starts[m, 0]) ** 2 + (ends[m, 1] - starts[m, 1]) ** 2 + (ends[m, 2] - starts[m, 2]) ** 2
         n = pieces(angle[m], math.sqrt(length2), reach[k], bow)
         for part in range(n):
             fill_piece(piece, starts[m], ends[m], axis[m], about[m], angle[m], part, n)
             if held or not feed:
-                _traverse(piece, chunk, cloud, held, not feed, cutter, bodies, -1, grow, slack, best)
+                _traverse(piece, chunk, cloud, held, not feed, cutter, bodies, -1, grow, rooms[m], limits.slack, best)
             for b in range(body_first[k], body_first[k + 1]):
                 extra = 0.0 if feed else -bodies[b, 4] if free[m] else grow - min(grow, bodies[b, 4])
                 beside = max(bodies[b, 2], bodies[b, 3]) <= cutter.radius + 1e-9
-                _traverse(piece, chunk, cloud, held, True, cutter, bodies, b, extra, slack if beside else TOUCHING,
-                          best)
+                _traverse(piece, chunk, cloud, held, True, cutter, bodies, b, extra, rooms[m],
+                          limits.beside if beside else TOUCHING, best)
         count = _note(events, count, m, best)
     return count

@@ -26,12 +26,12 @@ from geometry.kernels.cutter_sizes import CutterSizes
 from geometry.kernels.options import KERNEL
 from verify.kernels.clash import TOUCHING, is_lift
 from verify.kernels.engaged import LEAST_DEPTH, EngagedArrays, bottom, edge_radius, sector_bits
-from verify.kernels.frustum import Frustum, contact_of_ball, no_deeper
+from verify.kernels.frustum import Frustum, clear_of, contact_of_ball, no_deeper
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import beside, carried
 from verify.kernels.rays import gap, plan_distance
-from verify.kernels.stock import CUTTER, _note, _worse, known_depth
-from verify.kernels.tables import F64, I64, AxisArrays, ContactLimits, MoveArrays, ToolArrays
+from verify.kernels.stock import CUTTER, ROUNDING, _note, _worse, known_depth
+from verify.kernels.tables import F64, I64, AxisArrays, ContactLimits, MoveArrays, RapidArrays, ToolArrays
 
 LEAST_CUT = 1e-5
 NEAR = 1e-9  # mm, more than rounding of a distance
@@ -223,13 +223,17 @@ def _cut(stock, bricks, p, cutter, steep, end_radius, twist, engaged, parted, to
 
 
 @njit(**KERNEL)
-def _meet(stock, bricks, p, body, is_cutter, cutter, grow, slack, best):
-    """Find the stock of a tile that one body of a tool, grown by ``grow``, takes in on piece p."""
+def _meet(stock, bricks, p, body, is_cutter, cutter, grow, room, slack, best):
+    """Find the stock of a tile that one body of a tool, grown by ``grow``, takes in on piece p, or is within ``room``
+    of."""
     field, origin, h, _band = stock
     tile, tops, solid = bricks
-    z0, z1, wide, clearance, code = 0.0, cutter.length, cutter.radius + grow, grow, CUTTER
+    z0, z1, wide, clearance, code = 0.0, cutter.length, cutter.radius + max(grow, room), grow, CUTTER
+    bare = Frustum(body[0], body[1], body[2] - body[4], body[3] - body[4])
     if not is_cutter:
-        z0, z1, wide, clearance, code = body[0], body[1], max(body[2], body[3]) + grow, body[4] + grow, int(body[5])
+        z0, z1, clearance, code = body[0], body[1], body[4] + grow, int(body[5])
+        wide = max(max(body[2], body[3]) + grow, max(bare.r0, bare.r1) + room)
+    z0, z1 = z0 - room, z1 + room
     box = _box(p, z0, z1, wide)
     nx, ny, nz = tops.shape
     a0, a1 = _bricks(box[0] - h, box[3] + h, origin[0], h, tile[0], nx)
@@ -261,18 +265,23 @@ def _meet(stock, bricks, p, body, is_cutter, cutter, grow, slack, best):
                             x, y, z = origin[0] + i * h, origin[1] + j * h, origin[2] + k * h
                             qx, qy, qz, dx, dy, dz = view(p, x, y, z)
                             if is_cutter:
-                                bare = v - carried(qx, qy, qz, dx, dy, dz, cutter.radius - cutter.corner, cutter.corner,
-                                                   cutter.length, cutter.cone)
-                                depth = grow + bare if bare > slack else 0.0
+                                gap = carried(qx, qy, qz, dx, dy, dz, cutter.radius - cutter.corner, cutter.corner,
+                                              cutter.length, cutter.cone) - v
+                                depth = grow - gap if gap < -slack else 0.0
                                 if depth == 0.0 and known_depth(best, code, grow) < grow:
                                     depth = grow - beside(qx, qy, qz, dx, dy, dz, cutter, v, grow, slack)
                             else:
                                 # the ball of radius v round the node is stock
                                 depth = contact_of_ball(qx, qy, qz, dx, dy, dz,
-                                                        Frustum(z0, z1, body[2] + grow, body[3] + grow), v, clearance,
-                                                        slack, known_depth(best, code, clearance))
+                                                        Frustum(body[0], body[1], body[2] + grow, body[3] + grow), v,
+                                                        clearance, slack, known_depth(best, code, clearance))
+                                gap = math.inf
+                                if room > 0.0 and known_depth(best, code, room) < room:
+                                    gap = clear_of(qx, qy, qz, dx, dy, dz, bare, False) - v
                             if depth > 0.0:
                                 _worse(best, code, depth, clearance, x, y, z)
+                            if gap < room - ROUNDING:
+                                _worse(best, code, room - max(gap, 0.0), room, x, y, z)
 
 
 @njit(**KERNEL)
@@ -309,16 +318,16 @@ def _beside(seen, z0, z1, wide):
 
 
 @njit(**KERNEL)
-def _look(stock, bricks, p, tools, k, seen, feed, free, grow, slack, best):
+def _look(stock, bricks, p, tools, k, seen, feed, free, grow, room, limits, best):
     """Find the stock of a tile that neck, shank and holder of tool k take in on piece p."""
     cutters, bodies = tools.cutters, tools.bodies
     cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3])
     for b in range(tools.first[k], tools.first[k + 1]):
         extra = 0.0 if feed else -bodies[b, 4] if free else grow - min(grow, bodies[b, 4])
-        if _beside(seen, bodies[b, 0], bodies[b, 1], max(bodies[b, 2], bodies[b, 3]) + extra):
+        if _beside(seen, bodies[b, 0] - room, bodies[b, 1] + room, max(bodies[b, 2], bodies[b, 3]) + max(extra, room)):
             continue
-        loose = slack if max(bodies[b, 2], bodies[b, 3]) <= cutter.radius + 1e-9 else TOUCHING
-        _meet(stock, bricks, p, bodies[b], False, cutter, extra, loose, best)
+        loose = limits.beside if max(bodies[b, 2], bodies[b, 3]) <= cutter.radius + 1e-9 else TOUCHING
+        _meet(stock, bricks, p, bodies[b], False, cutter, extra, room, loose, best)
 
 
 @njit(**KERNEL)
@@ -337,13 +346,12 @@ def _any_depth(best):
 
 
 @njit(**KERNEL)
-def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, twists, free, steep, tools: ToolArrays,
-               limits: ContactLimits, taken, parted, engaged: EngagedArrays, events):
+def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, twists, rapids: RapidArrays, steep,
+               tools: ToolArrays, limits: ContactLimits, taken, parted, engaged: EngagedArrays, events):
     """Work all moves in order through the nodes of one tile, in place.
 
     tile   : (6,) int64, index, first and stop node in x, y, z
     twists : (m,) float64, rad, of the X that a tool sees a move in, row w, in the frame of the sectors
-    free   : (m,) bool, rapids that need no clearance
     steep  : (m,) bool, feed moves that go down along the tool steeper than a ramp
     taken  : (m, 4) int64, added to; 1e-9 mm³: what each move takes, and what the end of a steep one does; whole
              numbers, so that sums do not depend on the order of tiles; 1 where stock was touched and no share of a cell
@@ -356,7 +364,7 @@ def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, tw
     starts, ends, feeds, tool = moves
     axis, about, angle, bow = axes
     cutters, ends_radius, reach, bodies, _first = tools
-    rapid_grow, slack = limits
+    free, rooms = rapids
     parts, sectors = engaged
     tops = brick_tops(field, tile[0], tile[1], tile[2], tile[3], tile[4], tile[5])
     solid = np.zeros(6, np.int64)
@@ -373,11 +381,11 @@ def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, tw
         if not changing:
             break
         k, feed = tool[m], feeds[m]
-        far = reach[k] + rad + band + bow + rapid_grow
+        far = reach[k] + rad + band + bow + limits.rapid
         if near_segment2(cx, cy, cz, starts[m], ends[m]) > far * far:
             continue
         cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3])
-        grow = 0.0 if feed or free[m] else rapid_grow
+        grow = 0.0 if feed or free[m] else limits.rapid
         length2 = (ends[m, 0] - starts[m, 0]) ** 2 + (ends[m, 1] - starts[m, 1]) ** 2 + (ends[m, 2] - starts[m, 2]) ** 2
         n = pieces(angle[m], math.sqrt(length2), reach[k], bow)
         if feed and not is_lift(angle[m], axis[m], starts[m], ends[m]):
@@ -390,7 +398,7 @@ def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, tw
                 for part in range(n):
                     fill_piece(piece, starts[m], ends[m], axis[m], about[m], angle[m], part, n)
                     seen = _seen_tile(piece, cx, cy, cz, rad + band)
-                    _look(stock, bricks, piece, tools, k, seen, True, False, 0.0, slack, trial)
+                    _look(stock, bricks, piece, tools, k, seen, True, False, 0.0, 0.0, limits, trial)
                 if _any_depth(trial):
                     n = max(n, min(math.ceil(math.sqrt(length2) / RISE), MAX_LOOKS))
         for i in range(len(totals)):
@@ -399,13 +407,13 @@ def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, tw
             fill_piece(piece, starts[m], ends[m], axis[m], about[m], angle[m], part, n)
             # most of a long tool passes most tiles by: one look at the ball round the tile decides
             seen = _seen_tile(piece, cx, cy, cz, rad + band)
-            near = not _beside(seen, 0.0, cutter.length, cutter.radius + grow)
+            near = not _beside(seen, -rooms[m], cutter.length + rooms[m], cutter.radius + max(grow, rooms[m]))
             if near and feed:
                 _cut(stock, bricks, piece, cutter, steep[m], ends_radius[k], twists[m], sectors[parts[m]:parts[m + 1]],
                      parted[parts[m]:parts[m + 1]], totals)
             elif near:
-                _meet(stock, bricks, piece, rows[0], True, cutter, grow, TOUCHING, best)
-            _look(stock, bricks, piece, tools, k, seen, feed, free[m], grow, slack, best)
+                _meet(stock, bricks, piece, rows[0], True, cutter, grow, rooms[m], TOUCHING, best)
+            _look(stock, bricks, piece, tools, k, seen, feed, free[m], grow, rooms[m], limits, best)
         if totals[0] > 0.0 or totals[2] > 0.0:
             taken[m, 0] += max(round(totals[0] * VOLUME_UNITS), 1)
             taken[m, 1] += round(totals[1] * VOLUME_UNITS)

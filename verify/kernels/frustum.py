@@ -165,6 +165,57 @@ def contact(wx, wy, wz, dx, dy, dz, body: Frustum, clearance, slack, known, colu
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _apart(rho, h, body, column):
+    """Distance of a point, or of the column below it, to a standing frustum, mm; 0 inside.
+
+    The place of a column that is nearest is its top, the lower end of a frustum that narrows upwards, or the upper end
+    of one that widens, whichever is lowest.
+    """
+    z0, z1, r0, r1 = body
+    if column and h > z0:
+        h = min(h, z1) if r1 > r0 else z0
+    rise, wider = z1 - z0, r1 - r0
+    if z0 <= h <= z1 and rho <= r0 + wider * (h - z0) / max(rise, 1e-12):
+        return 0.0
+    s = min(max(((rho - r0) * wider + (h - z0) * rise) / max(wider * wider + rise * rise, 1e-24), 0.0), 1.0)
+    out = math.hypot(rho - r0 - s * wider, h - z0 - s * rise)
+    if h < z0 and rho <= r0:
+        out = min(out, z0 - h)
+    if h > z1 and rho <= r1:
+        out = min(out, h - z1)
+    return out
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def clear_of(wx, wy, wz, dx, dy, dz, body: Frustum, column):
+    """Least distance of a point, or of the column below it, to a frustum carried along a move, mm; 0 where they meet.
+
+    Both are convex, so the distance is convex in s: by golden sections.
+    """
+    if dx * dx + dy * dy + dz * dz < 1e-18:
+        return _apart(math.hypot(wx, wy), wz, body, column)
+    lo, hi = 0.0, 1.0
+    a, b = hi - GOLDEN * (hi - lo), lo + GOLDEN * (hi - lo)
+    at_a = _apart(math.hypot(wx - a * dx, wy - a * dy), wz - a * dz, body, column)
+    at_b = _apart(math.hypot(wx - b * dx, wy - b * dy), wz - b * dz, body, column)
+    least = min(at_a, at_b, _apart(math.hypot(wx, wy), wz, body, column),
+                _apart(math.hypot(wx - dx, wy - dy), wz - dz, body, column))
+    for _ in range(SECTIONS):
+        if least <= 0.0:
+            break
+        if at_a < at_b:
+            hi, b, at_b = b, a, at_a
+            a = hi - GOLDEN * (hi - lo)
+            at_a = _apart(math.hypot(wx - a * dx, wy - a * dy), wz - a * dz, body, column)
+        else:
+            lo, a, at_a = a, b, at_b
+            b = lo + GOLDEN * (hi - lo)
+            at_b = _apart(math.hypot(wx - b * dx, wy - b * dy), wz - b * dz, body, column)
+        least = min(least, at_a, at_b)
+    return least
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _of_ball(s, wx, wy, wz, dx, dy, dz, body, k, v, lesser):
     """The greatest of aside, or of the lesser of aside and down, of places within v of the point, at s.
 

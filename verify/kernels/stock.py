@@ -17,14 +17,16 @@ from numpy.typing import NDArray
 
 from geometry.kernels.cutter_sizes import CutterSizes
 from verify.kernels.engaged import LEAST_DEPTH, WINDOW, EngagedArrays, sector_bits
-from verify.kernels.frustum import Frustum, contact
+from verify.kernels.frustum import Frustum, clear_of, contact
 from verify.kernels.heights import INF, _cells, bottom, entered, lowest, lowest_within
-from verify.kernels.tables import F64, I64, Bool, ContactLimits, MoveArrays, ToolArrays
+from verify.kernels.profile import carried
+from verify.kernels.tables import F64, I64, Bool, ContactLimits, MoveArrays, RapidArrays, ToolArrays
 
 CUTTER, NECK, SHANK, HOLDER, PLUNGE, FIXTURE = 0, 1, 2, 3, 4, 8
 REFRESH = 64
 ARM = 0.05  # mm by which a line that stands over the flutes must reach into them
 UNITS = 1e9  # whole numbers of 1e-9 mm³ and 1e-9 mm: sums do not depend on the order of the blocks
+ROUNDING = 1e-3  # mm, of coordinates and chords: no nearer than a clearance
 
 
 class LineArrays(NamedTuple):
@@ -303,15 +305,17 @@ def _leave_stubs(lines, box, a, d, cutter, core, left, stub, best):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _meet_body(lines, box, a, d, body, grow, slack, best):
-    """Find the lines that one body, grown further by ``grow``, takes in by more than ``slack``."""
+def _meet_body(lines, box, a, d, body, grow, room, slack, best):
+    """Find the lines that one body, grown further by ``grow``, takes in by more than ``slack``, or is within ``room``
+    of."""
     height, origin, step, _bottom = lines
     z0, z1, r0, r1 = body[0], body[1], body[2] + grow, body[3] + grow
-    wide = max(r0, r1)
+    bare = Frustum(z0, z1, body[2] - body[4], body[3] - body[4])
+    wide = max(max(r0, r1), max(bare.r0, bare.r1) + room)
     i0, i1, j0, j1 = box
     a0, a1 = _cells(min(a[0], a[0] + d[0]) - wide, max(a[0], a[0] + d[0]) + wide, origin[0], step, i0, i1)
     b0, b1 = _cells(min(a[1], a[1] + d[1]) - wide, max(a[1], a[1] + d[1]) + wide, origin[1], step, j0, j1)
-    under = min(a[2], a[2] + d[2]) + z0
+    under = min(a[2], a[2] + d[2]) + z0 - room
     code = int(body[5])
     for i in range(a0, a1 + 1):
         x = origin[0] + (i + 0.5) * step
@@ -324,15 +328,22 @@ def _meet_body(lines, box, a, d, body, grow, slack, best):
                             slack, known_depth(best, code, body[4] + grow), True)
             if depth > 0.0:
                 _worse(best, code, depth, body[4] + grow, x, y, top)
+            if room > 0.0 and known_depth(best, code, room) < room:
+                gap = clear_of(x - a[0], y - a[1], top - a[2], d[0], d[1], d[2], bare, True)
+                if gap < room - ROUNDING:
+                    _worse(best, code, room - gap, room, x, y, top)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _rapid_cutter(lines, box, a, d, cutter, grow, best):
-    """Find the lines that the cutting part, grown radially, enters in a rapid; whether they stand over the flutes."""
+def _rapid_cutter(lines, box, a, d, cutter, grow, room, best):
+    """Find the lines that the cutting part, grown radially, enters in a rapid, or is within ``room`` of.
+
+    Returns whether they stand over the flutes.
+    """
     height, origin, step, _bottom = lines
     radius, corner, length, cone = cutter
     under, above = False, max(a[2], a[2] + d[2]) + length + ARM
-    wide = radius + grow
+    wide = radius + max(grow, room)
     i0, i1, j0, j1 = box
     a0, a1 = _cells(min(a[0], a[0] + d[0]) - wide, max(a[0], a[0] + d[0]) + wide, origin[0], step, i0, i1)
     b0, b1 = _cells(min(a[1], a[1] + d[1]) - wide, max(a[1], a[1] + d[1]) + wide, origin[1], step, j0, j1)
@@ -341,9 +352,16 @@ def _rapid_cutter(lines, box, a, d, cutter, grow, best):
         x = origin[0] + (i + 0.5) * step
         for j in range(b0, b1 + 1):
             top = height[i, j]
-            if top <= floor:
+            if top <= floor - room:
                 continue
             y = origin[1] + (j + 0.5) * step
+            if room > 0.0 and known_depth(best, CUTTER, room) < room:
+                # no line under the flutes is nearer than its top; beside the flutes the way aside counts
+                gap = carried(x - a[0], y - a[1], top - a[2], d[0], d[1], d[2], radius - corner, corner, length, cone)
+                if gap < room - ROUNDING:
+                    _worse(best, CUTTER, room - max(gap, 0.0), room, x, y, top)
+            if top <= floor:
+                continue
             low, _ = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, grow, cone)
             if top <= low + 1e-3:
                 continue
@@ -365,11 +383,10 @@ def _rapid_cutter(lines, box, a, d, cutter, grow, best):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def stock_tile(box, lines: LineArrays, moves: MoveArrays, free, descents: DescentArrays, tools: ToolArrays,
-               limits: ContactLimits, cut, under, engaged: EngagedArrays, totals: CutTotals, events):
+def stock_tile(box, lines: LineArrays, moves: MoveArrays, rapids: RapidArrays, descents: DescentArrays,
+               tools: ToolArrays, limits: ContactLimits, cut, under, engaged: EngagedArrays, totals: CutTotals, events):
     """Work all moves through the lines i0..i1-1, j0..j1-1 of a box (i0, i1, j0, j1), in place.
 
-    free  : (m,) bool, rapids that need no clearance
     cut   : (m,) uint8, set where stock went
     under : (m,) uint8, set where the flutes were under stock, of which lines of one height cannot tell
 
@@ -379,7 +396,7 @@ def stock_tile(box, lines: LineArrays, moves: MoveArrays, free, descents: Descen
     height, origin, step, _bottom = lines
     starts, ends, feeds, tool = moves
     cutters, ends_radius, _reach, bodies, body_first = tools
-    rapid_grow, slack = limits
+    free, rooms = rapids
     skins, parts, sectors = descents.skin, engaged.first, engaged.sectors
     stub = np.zeros((0, 0))
     if descents.core.max() > 0.0:
@@ -393,11 +410,11 @@ def stock_tile(box, lines: LineArrays, moves: MoveArrays, free, descents: Descen
     count, lowered = 0, 0
     for m in range(len(starts)):
         a = (starts[m, 0], starts[m, 1], starts[m, 2])
-        if min(a[2], ends[m, 2]) >= top:
+        if min(a[2], ends[m, 2]) - rooms[m] >= top:
             continue
         d = (ends[m, 0] - a[0], ends[m, 1] - a[1], ends[m, 2] - a[2])
         k = tool[m]
-        grow = 0.0 if feeds[m] or free[m] else rapid_grow
+        grow = 0.0 if feeds[m] or free[m] else limits.rapid
         wide = cutters[k, 0]
         for b in range(body_first[k], body_first[k + 1]):
             wide = max(wide, bodies[b, 2], bodies[b, 3])
@@ -420,13 +437,13 @@ def stock_tile(box, lines: LineArrays, moves: MoveArrays, free, descents: Descen
                 if lowered % REFRESH == 0 and not stubs:
                     top = _top(height, i0, i1, j0, j1)
         else:
-            if _rapid_cutter(lines, box, a, d, cutter, grow, best):
+            if _rapid_cutter(lines, box, a, d, cutter, grow, rooms[m], best):
                 under[m] = 1
         for b in range(body_first[k], body_first[k + 1]):
-            if min(a[2], ends[m, 2]) + bodies[b, 0] < top:
-                # a body no wider than the cutting part runs where the flutes have been, within what they may gouge
-                loose = slack if max(bodies[b, 2], bodies[b, 3]) <= cutter.radius + 1e-9 else 1e-3
+            if min(a[2], ends[m, 2]) + bodies[b, 0] - rooms[m] < top:
+                # a body no wider than the cutting part runs where the flutes have been
+                loose = limits.beside if max(bodies[b, 2], bodies[b, 3]) <= cutter.radius + 1e-9 else 1e-3
                 extra = grow - min(grow, bodies[b, 4]) if not free[m] else -bodies[b, 4]
-                _meet_body(lines, box, a, d, bodies[b], extra if not feeds[m] else 0.0, loose, best)
+                _meet_body(lines, box, a, d, bodies[b], extra if not feeds[m] else 0.0, rooms[m], loose, best)
         count = _note(events, count, m, best)
     return count

@@ -60,12 +60,26 @@ class ToolArrays(NamedTuple):
     first: I64
 
 
+class RapidArrays(NamedTuple):
+    """What each move asks for as a rapid.
+
+    free : (m,) bool, rapids that need no clearance
+    room : (m,) float64, mm, distance that the whole tool keeps in every direction, also from what is below it; 0 for
+           feed moves and free rapids. Aside, a rapid that is not free keeps ``ContactLimits.rapid``
+    """
+
+    free: Bool
+    room: F64
+
+
 class ContactLimits(NamedTuple):
     """What counts as a contact, mm.
 
-    rapid : float, clearance all round everything in a rapid
-    slack : float, overlap that the cutting part, and a body beside its own cut, may have
+    rapid  : float, clearance aside of everything in a rapid
+    slack  : float, overlap with the part that the cutting part may have in a rapid
+    beside : float, overlap that a body no wider than the cutting part may have beside its own cut
     """
 
     rapid: float
     slack: float
+    beside: float

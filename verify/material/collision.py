@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from verify.kernels.clash import PointArrays, clash_chunk
-from verify.kernels.tables import ContactLimits
+from verify.kernels.tables import RapidArrays
 from verify.material.point_tree import PointTree
-from verify.material.stock_pass import end_radii, event_table, free_rapids, gather, noted
+from verify.material.stock_pass import contact_limits, end_radii, event_table, gather, noted, rapid_arrays
 from verify.material.tiles import run_tiles
 from verify.model import ProofSetup
 from verify.moves import BOW, Moves, Progress, cutter_table
@@ -97,12 +97,12 @@ def _sheet(x: F64, y: F64, z: F64) -> F64:
 
 def run_clashes(points: F64, fixed: NDArray[np.bool_], moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *,
                 threads: int = 2, progress: Progress | None = None, bow: float = BOW,
-                free: NDArray[np.bool_] | None = None) -> tuple[F64, int]:
+                rapids: RapidArrays | None = None) -> tuple[F64, int]:
     """Contacts of bodies, and in rapids of the cutting part, with points.
 
     points : (n, 3) float64, mm, setup frame
     fixed  : (n,) bool, points of fixtures, which the cutting part must not touch either
-    free   : (m,) bool, rapids that need no clearance; found from the moves where None
+    rapids : of the moves; found from them where None
     bow    : mm, error allowed where the tool turns
 
     Returns the events, (e, 7) float64, mm, sorted by move, and the number of events lost because a table is full.
@@ -112,13 +112,13 @@ def run_clashes(points: F64, fixed: NDArray[np.bool_], moves: Moves, tools: Sequ
     tree, axes = PointTree.build(points), moves.axes or ToolAxes.upright(len(moves))
     cloud = PointArrays(np.ascontiguousarray(points[tree.order]), np.ascontiguousarray(fixed[tree.order]), tree.balls)
     sizes = Bodies.of(tools, setup).arrays(cutter_table(tools), end_radii(tools))
-    open_rapids = free_rapids(moves) if free is None else free
-    steps, turns, limits = moves.arrays, axes.arrays(bow), ContactLimits(setup.clearance_rapid, setup.gouge_tolerance)
+    known = rapid_arrays(moves, setup) if rapids is None else rapids
+    steps, turns, limits = moves.arrays, axes.arrays(bow), contact_limits(setup)
 
     def job(chunk: int) -> Callable[[], object]:
         def work() -> object:
             events = event_table()
-            n = clash_chunk(chunk, cloud, steps, turns, open_rapids, sizes, limits, events)
+            n = clash_chunk(chunk, cloud, steps, turns, known, sizes, limits, events)
             return noted(events), n
         return work
 

@@ -16,11 +16,12 @@ from geometry.tool_body import ToolBody
 from verify.blank.blank import stands_over_air
 from verify.checks.clear_height import top_of_all
 from verify.kernels.stock import FIXTURE, HOLDER, NECK, PLUNGE, SHANK
+from verify.kernels.tables import RapidArrays
 from verify.material.collision import fixture_points, run_clashes
 from verify.material.dogleg_rapids import spread
 from verify.material.stock_field import DistanceField, run_field, stock_field
 from verify.material.stock_lines import blank, run_bodies, run_stock
-from verify.material.stock_pass import StockPass, Ways, end_radii, free_rapids, parts
+from verify.material.stock_pass import StockPass, Ways, end_radii, parts, rapid_arrays
 from verify.model import ProofSetup
 from verify.moves import Moves
 from verify.progress import Report, StageProgress
@@ -136,9 +137,9 @@ def dogleg_limits(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], s
 def _with_points(met: F64, lost: int, points: F64, chosen: NDArray[np.bool_], fixed: bool, moves: Moves,
                  tools: Sequence[ToolBody], setup: ProofSetup, threads: int) -> tuple[F64, int]:
     """Events and losses, with the contacts of the chosen moves at points of fixtures or part added."""
-    rows = np.flatnonzero(chosen)
+    rows, (free, room) = np.flatnonzero(chosen), rapid_arrays(moves, setup)
     more, away = run_clashes(points, np.full(len(points), fixed), moves.only(chosen), tools, setup, threads=threads,
-                             free=free_rapids(moves)[chosen])
+                             rapids=RapidArrays(free[chosen], room[chosen]))
     more[:, 0] = rows[more[:, 0].astype(np.int64)]
     return np.concatenate([met, more]), lost + away
 

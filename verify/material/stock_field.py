@@ -23,16 +23,16 @@ from verify.kernels.engaged import EngagedArrays
 from verify.kernels.field import VOLUME_UNITS, FieldArrays, field_tile
 from verify.kernels.grid import cross_columns, net_faces, net_vertices
 from verify.kernels.stock import PLUNGE
-from verify.kernels.tables import ContactLimits
 from verify.material.stock_pass import (
     StockPass,
+    contact_limits,
     descents,
     end_radii,
     event_table,
-    free_rapids,
     gather,
     noted,
     parts,
+    rapid_arrays,
     tables_for,
     ways_of,
 )
@@ -190,8 +190,8 @@ def run_field(field: DistanceField, moves: Moves, tools: Sequence[ToolBody], set
     bodies = Bodies.none(tools) if bare else Bodies.of(tools, setup)
     axes = moves.axes or ToolAxes.upright(len(moves))
     sizes, (steep, _) = bodies.arrays(cutters, ends), descents(moves, tools, setup)
-    stock, limits = field.arrays, ContactLimits(setup.clearance_rapid, setup.gouge_tolerance)
-    steps, turns, free = moves.arrays, axes.arrays(bow), free_rapids(moves)
+    stock, limits = field.arrays, contact_limits(setup)
+    steps, turns, rapids = moves.arrays, axes.arrays(bow), rapid_arrays(moves, setup)
     x, y = sector_frames(moves.axes, len(moves))
     twists = np.arctan2((axes.about * y).sum(axis=1), (axes.about * x).sum(axis=1))
     first = parts(moves, tools)
@@ -202,7 +202,7 @@ def run_field(field: DistanceField, moves: Moves, tools: Sequence[ToolBody], set
     def job(tile: NDArray[np.int64]) -> Callable[[], object]:
         def work() -> object:
             events, taken, engaged, own = event_table(), spare.get(), blank_table.get(), free_parted.get()
-            n = field_tile(stock, tile, steps, turns, twists, free, steep, sizes, limits, taken, own,
+            n = field_tile(stock, tile, steps, turns, twists, rapids, steep, sizes, limits, taken, own,
                            EngagedArrays(first, engaged), events)
             free_parted.put(own)
             spare.put(taken)

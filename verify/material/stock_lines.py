@@ -8,9 +8,10 @@ of the part check necks, shanks and holders, so the spacing matters only for sto
 - A line is lowered only where the flutes reach its top when the cutter first touches it. Higher stock stays and meets
   the neck.
 - A body no wider than the cutting part follows it: its clearance never reaches beyond the cutting radius, and it may
-  overlap by the gouge tolerance.
-- In a rapid the whole assembly is grown radially by the rapid clearance, not in height. A straight lift needs no
-  clearance where it starts.
+  overlap by ``BESIDE``.
+- In a rapid the whole assembly is grown radially by the rapid clearance, and stays as far from everything else too,
+  such as a face below it. Straight down before a cut the distance to what is below is that of the approach. A straight
+  lift needs no clearance where it starts.
 - Plunge: feed moves steeper than the ramp angle remove depth from a line with the end-cutting region of the tool. The
   depths add up; sideways travel in the cut reduces them at the slope of the ramp. Which travel is in the cut is known
   after all moves, so blocks in which it may matter are run a second time. It is a plunge where more than
@@ -37,18 +38,19 @@ from verify.kernels.bodies import body_tile
 from verify.kernels.engaged import EngagedArrays
 from verify.kernels.heights import raise_offset
 from verify.kernels.stock import PLUNGE, CutTotals, DescentArrays, LineArrays, stock_tile
-from verify.kernels.tables import ContactLimits
 from verify.material.stock_pass import (
+    BESIDE,
     StockPass,
     Ways,
+    contact_limits,
     cores,
     descents,
     end_radii,
     event_table,
-    free_rapids,
     gather,
     noted,
     parts,
+    rapid_arrays,
     tables_for,
     ways_before,
     ways_of,
@@ -163,7 +165,7 @@ def _run(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     allowed = DescentArrays(*descents(moves, tools, setup, ways), ways_before(moves),
                             setup.plunge_skin * 2.0 * cutters[:, 0], *cores(tools, setup))
     cut, under = np.zeros(len(moves), np.uint8), np.zeros(len(moves), np.uint8)
-    limits, free = ContactLimits(setup.clearance_rapid, setup.gouge_tolerance), free_rapids(moves)
+    limits, rapids = contact_limits(setup), rapid_arrays(moves, setup)
     lines, steps = LineArrays(field.height, field.origin, field.step, field.bottom), moves.arrays
     nx, ny = field.height.shape
     first = parts(moves, tools)
@@ -175,7 +177,7 @@ def _run(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     def job(k: int, i: int, j: int) -> Callable[[], object]:
         def work() -> object:
             events, engaged, taken = event_table(), spare.get(), free_sums.get()
-            n = stock_tile((i, min(i + BLOCK, nx), j, min(j + BLOCK, ny)), lines, steps, free, allowed, sizes, limits,
+            n = stock_tile((i, min(i + BLOCK, nx), j, min(j + BLOCK, ny)), lines, steps, rapids, allowed, sizes, limits,
                            cut, under, EngagedArrays(first, engaged), CutTotals(taken, undecided[k:k + 1]), events)
             spare.put(engaged)
             free_sums.put(taken)
@@ -204,7 +206,7 @@ def run_bodies(points: F64, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     def job(tile: tuple[int, int, int, int]) -> Callable[[], object]:
         def work() -> object:
             events = event_table()
-            n = body_tile(tile, cells, pts, steps, radii, bodies.rows, bodies.first, setup.gouge_tolerance, events)
+            n = body_tile(tile, cells, pts, steps, radii, bodies.rows, bodies.first, BESIDE, events)
             return noted(events), n
         return work
 

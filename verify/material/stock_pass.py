@@ -17,6 +17,7 @@ from geometry.tool_body import ToolBody
 from verify.kernels.clash import ASIDE
 from verify.kernels.engaged import WINDOW
 from verify.kernels.stock import UNITS
+from verify.kernels.tables import ContactLimits, RapidArrays
 from verify.model import ProofSetup
 from verify.moves import Moves
 
@@ -25,6 +26,7 @@ ANOTHER_TOOL = 1e6  # mm
 TAP_CORE = 0.75  # radii: what is nearer to the axis of a tap, the hole must have taken; less than any ISO 68 core
 PRESSED = 0.01  # diameters: a hollow end takes a stub that high
 SAME = 1e-6  # mm, and rad: closer ends of moves and axes are the same
+BESIDE = 5e-3  # mm: chords of two passes over one wall, and the decimals of their programs, differ by no more
 Spare = queue.SimpleQueue[NDArray[np.int64]]
 
 
@@ -192,16 +194,7 @@ def free_rapids(moves: Moves) -> NDArray[np.bool_]:
     They are retracts along the tool axis, and returns along it no deeper than a feed move before, without a sideways
     move since: a peck. An unprogrammed move, as after a visit to a fixed place of the machine, counts as sideways.
     """
-    d = moves.end - moves.start
-    up = np.tile([0.0, 0.0, 1.0], (len(d), 1)) if moves.axes is None else moves.axes.axis
-    rise = np.einsum("ij,ij->i", d, up)
-    aside = np.linalg.norm(d - rise[:, None] * up, axis=1)
-    straight = aside <= ASIDE
-    if moves.axes is not None:
-        straight &= moves.axes.angle == 0.0
-    linked = np.zeros(len(d), np.bool_)  # to the move before
-    linked[1:] = (moves.tool[1:] == moves.tool[:-1]) & (np.abs(moves.start[1:] - moves.end[:-1]) <= SAME).all(axis=1)
-    linked[1:] &= np.einsum("ij,ij->i", up[1:], up[:-1]) >= 1.0 - SAME**2
+    rise, straight, linked = _along_axis(moves)
     out = np.asarray(~moves.feed & straight & (rise > 0))
     for m in np.flatnonzero(~moves.feed & straight & (rise < 0)).tolist():
         height, i = 0.0, m - 1  # of the end of move i over the start of move m
@@ -210,6 +203,37 @@ def free_rapids(moves: Moves) -> NDArray[np.bool_]:
             height -= rise[i]
             i -= 1
     return out
+
+
+def rapid_arrays(moves: Moves, setup: ProofSetup) -> RapidArrays:
+    """The distances that rapids keep: ``clearance_approach`` straight down before a cut, else ``clearance_rapid``."""
+    free, (rise, straight, linked) = free_rapids(moves), _along_axis(moves)
+    down = ~moves.feed & straight & (rise <= 0.0)
+    onto = np.zeros(len(free), np.bool_)  # a move straight down that a feed move follows, or another such move
+    for m in np.flatnonzero(down)[::-1].tolist():
+        onto[m] = m + 1 < len(free) and linked[m + 1] and (moves.feed[m + 1] or onto[m + 1])
+    room = np.where(onto, min(setup.clearance_approach, setup.clearance_rapid), setup.clearance_rapid)
+    return RapidArrays(free, np.where(moves.feed | free, 0.0, room))
+
+
+def contact_limits(setup: ProofSetup) -> ContactLimits:
+    """What counts as a contact."""
+    return ContactLimits(setup.clearance_rapid, setup.gouge_tolerance, BESIDE)
+
+
+def _along_axis(moves: Moves) -> tuple[F64, NDArray[np.bool_], NDArray[np.bool_]]:
+    """How far each move goes up the tool axis, mm, whether it goes straight along it, and whether it continues the
+    move before; each (m,)."""
+    d = moves.end - moves.start
+    up = np.tile([0.0, 0.0, 1.0], (len(d), 1)) if moves.axes is None else moves.axes.axis
+    rise = np.einsum("ij,ij->i", d, up)
+    straight = np.linalg.norm(d - rise[:, None] * up, axis=1) <= ASIDE
+    if moves.axes is not None:
+        straight &= moves.axes.angle == 0.0
+    linked = np.zeros(len(d), np.bool_)
+    linked[1:] = (moves.tool[1:] == moves.tool[:-1]) & (np.abs(moves.start[1:] - moves.end[:-1]) <= SAME).all(axis=1)
+    linked[1:] &= np.einsum("ij,ij->i", up[1:], up[:-1]) >= 1.0 - SAME**2
+    return rise, straight, linked
 
 
 def gather(results: list[object]) -> tuple[F64, int]:

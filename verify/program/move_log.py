@@ -11,7 +11,7 @@ from geometry.errors import ProgramError, VerificationError
 from geometry.mesh import F64
 from verify.program.axis_log import TurnLog
 from verify.program.move_kinds import FEED
-from verify.program.program import Pause, Remark, StopPoint
+from verify.program.program import Pause, Remark, StopPoint, Swap
 
 MAX_ERRORS = 20
 MAX_REMARKS = 20
@@ -29,7 +29,8 @@ class Log:
     cools   : whether a word says that the coolant is on or off
     path_stated : number of moves before the first word of a path mode (G61, G64), None without one
     functions : first line of each M word that counts as a function of the machine
-    speeds, unknown, stops, blend, leaves, changes, unbounded, pauses, places, dwells : as in ``Program``
+    speeds, unknown, stops, blend, leaves, changes, unbounded, pauses, places, dwells, swaps, unplaced,
+    by_joints : as in ``Program``
     rows : latest moves as (start x, y, z, end x, y, z, kind, feed, tool, line), mm and mm/min; call ``flush`` at 65 536
     """
 
@@ -54,6 +55,9 @@ class Log:
         self.changes = 0
         self.places: list[tuple[int, int, float]] = []
         self.dwells: list[tuple[int, int, float]] = []
+        self.swaps: list[Swap] = []
+        self.unplaced: list[int] = []
+        self.by_joints: set[int] = set()
         self.unbounded = False
         self.cools = False
         self.path_stated: int | None = None

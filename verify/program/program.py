@@ -82,6 +82,24 @@ class TravelPlane:
     normal: tuple[float, float, float]
 
 
+@dataclass(frozen=True)
+class Swap:
+    """A tool change where the spindle stood: the new tool hangs from the same place.
+
+    old, new : T numbers, 0 for an empty spindle
+    longer   : mm, length of the new tool less that of the old one
+    height   : mm, Z of the tip of the old tool, setup frame
+    moves    : number of moves before it
+    """
+
+    line: int
+    old: int
+    new: int
+    longer: float
+    height: float
+    moves: int
+
+
 @dataclass(frozen=True, eq=False)
 class Poses:
     """Tool axes and rotary angles of moves.
@@ -121,6 +139,8 @@ class Program:
     open    : what it leaves to the control
     cools   : whether a word says that the coolant is on or off
     cut_off : line that ends the program although lines of it follow, 0 where none do
+    swaps   : tool changes where the spindle stood; unplaced : lines of those at a place that nothing states
+    by_joints : T numbers whose tip was computed from the joints of a tilted head, by their gauge length
     leaves  : mm, largest deviation from the path that G64 allows: ``blend`` and the tolerance Q of dropped points
     lines   : number of lines read
     remarks : words and blocks that should not be run
@@ -165,6 +185,9 @@ class Program:
     open: tuple[Assumed, ...] = ()
     cools: bool = True
     dwells: tuple[tuple[int, int, float], ...] = ()
+    swaps: tuple[Swap, ...] = ()
+    unplaced: tuple[int, ...] = ()
+    by_joints: frozenset[int] = frozenset()
 
     def __len__(self) -> int:
         return len(self.start)

@@ -56,7 +56,8 @@ class SurfaceCuts:
     mover     : (n,) int32, index, the move that left it, -1 where none did
     gouges, allowance, excluded : findings
     gouge_max : mm, depth of the deepest gouge
-    guard, edge : (g, 3) and (e, 3) float64, mm, points that watch for gouges on faces and along edges, setup frame
+    guard, edge : (g, 3) and (e, 3) float64, mm, points that watch for gouges on faces and along edges, setup frame,
+                each as deep under its face as it was cut, within the gouge tolerance
     close     : ClosePoints, c of them; close_residual : (c,) float64, mm of stock on their normals
     reach     : mm, height above the part up to which stock was followed
     assumed   : what is taken for granted between the points
@@ -158,6 +159,9 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
     table = _at_ends(_deepened(table, even, tree, shot, lambda f: tell(0.85 + 0.15 * f)), tree, shot)
     gouged = np.flatnonzero((table.residual < -setup.gouge_tolerance - RAY_ERROR) & (table.mover >= 0))
     tips = tip_gouges(part.mesh, moves, tools, source, setup.gouge_tolerance + RAY_ERROR)
+    watch = np.arange(len(s), first)
+    sunk = np.clip(table.residual[watch], -setup.gouge_tolerance, 0.0)
+    left = table.points[watch] + sunk[:, None] * table.normals[watch]
     row = np.arange(len(table))  # the stock on an edge belongs to two faces, so an edge has no allowance
     return SurfaceCuts(
         table.residual[:len(s)], table.mover[:len(s)],
@@ -165,8 +169,8 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
                          table.mover[gouged], source, setup.gouge_tolerance), *tips],
         _in_allowance(table, (row < on_edge) | ((row >= first) & (row < even)), setup, source),
         _excluded(table, slice(len(s), on_edge), part.mesh, shot, source),
-        max([float(-table.residual.min(initial=0.0)), 0.0, *(f.depth for f in tips)]), guard.points, edge, close,
-        table.residual[first:even], shot.reach, [*wide_samples(part.mesh), *wide])
+        max([float(-table.residual.min(initial=0.0)), 0.0, *(f.depth for f in tips)]), left[:len(guard)],
+        left[len(guard):], close, table.residual[first:even], shot.reach, [*wide_samples(part.mesh), *wide])
 
 
 def _followed(tree: TriangleTree, shot: _Shooting) -> _Table:

@@ -11,12 +11,13 @@ FRUSTUM_SLICES = 6
 
 @dataclass(frozen=True)
 class Clearances:
-    """Radial clearances around the assembly, mm."""
+    """Radial clearances around the assembly, mm; ``approach`` is to what is below it, in a rapid down before a cut."""
 
     neck: float = 0.05
     shank: float = 0.2
     holder: float = 1.0
     rapid: float = 1.0
+    approach: float = 0.2
 
 
 @dataclass(frozen=True)

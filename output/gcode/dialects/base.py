@@ -207,6 +207,10 @@ class Dialect:
         """
         return self.rise()
 
+    def before_change(self) -> list[str]:
+        """Before a tool is changed for another one, where the control does not go to a place for it by itself."""
+        return []
+
     def stop(self) -> list[str]:
         """Spindle and coolant off, and the tool to where it can be changed."""
         return ["M5", "M9"]

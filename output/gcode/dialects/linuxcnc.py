@@ -50,8 +50,12 @@ class LinuxCnc(Dialect):
         return ["G91.1"]
 
     def rise(self) -> list[str]:
-        """The control rises by itself for a tool change, but not for the tool that it holds."""
+        """To the top of the travel."""
         return ["G53 G0 Z0."]
+
+    def before_change(self) -> list[str]:
+        """The control changes the tool where the spindle stands unless its configuration names a place."""
+        return self.rise()
 
     def tcp_on(self, number: int, zero: str) -> list[str]:
         """A switch of the kinematics."""

@@ -91,7 +91,7 @@ def test_a_tool_is_changed_above_the_ball_with_the_axes_at_zero():
     home = home_of(plan.clamping)
     before = clamped_steps(plan)[1].after[-1]
     assert np.allclose(before.tips[-1], home) and np.allclose(before.turns[-1], 0.0)
-    assert lines[change[1] - 4:change[1] - 1] == ["", "M5", "M9"] and lines[change[1] - 5] == "M429"
+    assert lines[change[1] - 5:change[1] - 1] == ["", "M5", "M9", "G53 G0 Z0."] and lines[change[1] - 6] == "M429"
     after = [line for line in lines[change[1]:change[1] + 8] if line.startswith(("G", "M"))]
     assert after[:1] == ["G43 H1"] and after.index("M428") > [k for k, x in enumerate(after) if x.startswith("G0 Z")][0]
 

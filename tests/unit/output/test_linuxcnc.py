@@ -70,7 +70,8 @@ def test_header_says_what_the_machinist_checks():
 
 def test_header_says_how_deep_the_tip_goes():
     text = write_linuxcnc(plan())
-    depths = [float(z) for z in re.findall(r"Z(-?[\d.]+)", re.sub(r"\(.*\)", "", text))]
+    words = re.sub(r"\(.*\)|G53.*", "", text)
+    depths = [float(z) for z in re.findall(r"Z(-?[\d.]+)", words)]
     assert f"(Lowest Z of the tip {min(depths):g})" in text and "nothing may stand there" not in text
     high = replace(plan().stock, lower=np.array([0.0, 0.0, min(depths) + 2.5]))
     assert f"(Lowest Z of the tip {min(depths):g}, 2.5 below the stock box: nothing may stand there)" in \
@@ -143,14 +144,15 @@ def test_order_of_words_at_a_tool_change():
         assert body[i + 3] == "G0 Z25."
         assert re.fullmatch(r"X\S+ Y\S+", body[i + 4])
         if n:
-            assert body[i - 2:i] == ["M5", "M9"]
+            assert body[i - 3:i] == ["M5", "M9", "G53 G0 Z0."]
     assert body[-4:] == ["M5", "M9", "M30", "%"]
 
 
 def test_safe_before_every_tool_change_and_at_the_end():
     low = step(1, FLAT, "planar_floor", trajectories=(line(TrajectoryKind.CUT, (0, 0, 1), (5, 0, 1), feed=100),))
     text = write_linuxcnc(plan(low, step(2, BALL, "waterline")))
-    at = moves(text[: text.index("T1 M6")])
+    assert "M9\nG53 G0 Z0.\n" in text[: text.index("T1 M6")]
+    at = moves(text[: text.index("G53")])
     assert at[-1][0] == 0 and at[-1][2][2] == CLEAR
     assert moves(write_linuxcnc(plan(low)))[-1] == (0, 100.0, (5.0, 0.0, CLEAR))
 
