@@ -208,6 +208,11 @@ def _bound(shape, node, x, y, best):
     return min(by_top, by_plane)
 
 
+@for_shape(revolved.tip_over, Bull)
+def _tip_over(shape, tree, x, y):
+    return walk(tree, shape, x, y, NOTHING, False)[0]
+
+
 @njit(**KERNEL)
 def drop_tip(tree: TreeArrays, x, y, radius, corner_radius):
     """Lowest tip height over (x, y) at which the body does not enter the mesh, mm; -inf where nothing is below."""

@@ -235,6 +235,11 @@ def _lowest(tree, x, y, stack):
     return best, slot, px, py, pz
 
 
+@for_shape(revolved.tip_over, Stack)
+def _tip_over(stack, tree, x, y):
+    return _lowest(tree, x, y, stack)[0]
+
+
 @njit(**KERNEL)
 def contact_range(tree, xy, stack, lo, hi, out, triangle, contact):
     """Tip of a stack of bodies over the points lo .. hi - 1 of xy (n, 2), with what holds it up."""

@@ -66,6 +66,11 @@ def touches_widely(shape):
     raise NotImplementedError
 
 
+def tip_over(shape, tree, x, y):
+    """Lowest tip height of the body over (x, y) at which it stays out of the mesh, mm; -inf where nothing is below."""
+    raise NotImplementedError
+
+
 def edge_bound(shape, z0, ez, length, u0, lo, hi, q):
     """Upper bound of the lift of an edge; infinity where the place itself costs as little."""
     raise NotImplementedError

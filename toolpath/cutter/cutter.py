@@ -9,6 +9,8 @@ import math
 from dataclasses import dataclass
 
 from geometry.errors import SetupError
+from geometry.kernels.drop import Bull, bull_of
+from geometry.kernels.outline import Stack
 from geometry.mesh_queries.revolved_outline import Outline, OutlineArc, OutlineLine
 from geometry.tool_body import ToolBody
 
@@ -148,3 +150,8 @@ class Cutter:
     def radius(self) -> float:
         """Half the diameter, mm."""
         return 0.5 * self.diameter
+
+    @property
+    def shape(self) -> Bull | Stack:
+        """The cutter as compiled loops take it, a shape of ``geometry.kernels.revolved.tip_over``."""
+        return bull_of.py_func(self.radius, self.corner_radius) if self.outline is None else self.outline.stack

@@ -14,15 +14,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from geometry.kernels.drop import Bull
 from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from toolpath.cutter.cutter import Cutter
 from toolpath.drop_cutter import drop_cutter
-from toolpath.root_finding import roots
+from toolpath.kernels import envelope as kernels
 
-OUTWARDS = 12  # steps along a normal in search of the envelope
+DOT = Bull(0.0, 0.0, 0.0)
+"""A cutter without width: its tip is the height of a mesh."""
 
 
 class Envelope:
@@ -61,32 +62,30 @@ class Envelope:
         Returns
         -------
         (n,) float64, mm
-            Negative where the cutter has been below the point; inf where it does not come. Exact to 1e-9 mm.
+            Negative where the cutter has been below the point; inf where it does not come. Exact to 1e-9 mm, by the
+        Illinois rule [Dowell1971].
         """
-        left = np.full(len(points), np.inf)
-        up = self.heights(points[:, :2]) - points[:, 2]
-        todo = np.flatnonzero(np.isfinite(up))
-        points, normals, here = points[todo], normals[todo], up[todo]
+        out = np.empty(len(points))
+        kernels.along(self.tree.arrays, self.cutter.shape, np.ascontiguousarray(points), np.ascontiguousarray(normals),
+                      out)
+        return out
 
-        def above(t: F64, k: NDArray[np.int64]) -> F64:
-            """Envelope over the points k moved out by t; it falls as t grows, until they are beside the cutter."""
-            at = points[k] + t[:, None] * normals[k]
-            return np.asarray(self.heights(at[:, :2]) - at[:, 2])
+    def crests(self, other: Envelope, ground: TriangleTree, points: F64, normals: F64, across: F64, most: float) -> F64:
+        """Height of the crest between this envelope and another over the surface beside each point.
 
-        # an envelope parallel to the surface lies n_z times as far along the normal as it does upright
-        far, at_far = 1.02 * here * normals[:, 2], np.zeros(len(todo))
-        near, beside = np.zeros(len(todo)), np.full(len(todo), np.inf)
-        found, k = here == 0.0, np.flatnonzero(here != 0.0)
-        for _ in range(OUTWARDS):
-            if not len(k):
-                break
-            value = above(far[k], k)
-            past = np.where(here[k] > 0.0, value <= 0.0, value >= 0.0)
-            at_far[k[past]], found[k[past]] = value[past], True
-            k, value = k[~past], value[~past]
-            lost = value == np.inf
-            beside[k[lost]], near[k[~lost]] = far[k[lost]], far[k[~lost]]
-            far[k] = np.where(np.isfinite(beside[k]), 0.5 * (near[k] + beside[k]), 1.5 * far[k])
-        k = np.flatnonzero(found)
-        left[todo[k]] = roots(lambda t, which: above(t, k[which]), np.zeros(len(k)), far[k], here[k], at_far[k], 1e-10)
-        return left
+        ground  : TriangleTree of the finished surface, mm, access frame
+        points  : (n, 3) float64, mm, access frame
+        normals : (n, 3) float64, dimensionless, unit, n_z > 0, access frame
+        across  : (n, 2) float64, dimensionless, unit, in plan, from this path to the other
+        most    : mm, no crest farther than this from its point counts
+
+        Returns (n,) float64, mm along the normal; -inf where no crest is near.
+
+        Notes
+        -----
+        Across the paths one envelope rises and the other falls; they are equal in one place.
+        """
+        out = np.empty(len(points))
+        kernels.crests(self.tree.arrays, other.tree.arrays, self.cutter.shape, ground.arrays, DOT,
+                       *map(np.ascontiguousarray, (points, normals, across)), most, out)
+        return out

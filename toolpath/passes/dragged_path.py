@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
+from toolpath.kernels.drag import TipLimit, dragged
 from toolpath.lines import thinned, true_runs
 from toolpath.scallop_budget import TIPS_SHARE
+from zones.reach.tip_field import TipField
 
 SMALLEST = 0.004  # mm: a tip path that still rises steeper than STEEPEST over this is broken
 STEEPEST = 4.0
@@ -27,10 +29,10 @@ Limit = Callable[[F64], F64]
 _QUARTERS = np.array([0.25, 0.5, 0.75])
 
 
-def follow(limit: Limit, way: F64, step: float, tolerance: float) -> tuple[F64, NDArray[np.bool_]]:
+def follow(limit: Limit | TipLimit, way: F64, step: float, tolerance: float) -> tuple[F64, NDArray[np.bool_]]:
     """Tip path along a way.
 
-    limit     : Limit
+    limit     : Limit, or TipLimit for a compiled loop
     way       : (m, 2) float64, mm, access frame, polyline in plan
     step      : mm, longest piece
     tolerance : mm, largest distance in height between the limit and the path
@@ -43,7 +45,28 @@ def follow(limit: Limit, way: F64, step: float, tolerance: float) -> tuple[F64, 
     corners = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
     more = max(1, int(np.ceil(corners[-1] / step)))
     at = np.unique(np.concatenate([corners, np.linspace(0.0, corners[-1], more + 1)]))
+    if isinstance(limit, TipLimit):
+        at, z = dragged(limit, np.ascontiguousarray(way), corners, at, tolerance, SMALLEST, STEEPEST)
+    else:
+        at, z = _cut(limit, way, corners, at, tolerance)
+    with np.errstate(invalid="ignore"):
+        broken = ~(np.abs(np.diff(z)) <= STEEPEST * np.diff(at))
+    return np.column_stack([_places(way, corners, at), z]), broken
 
+
+def limit_of(field: TipField) -> TipLimit:
+    """The tip limit of a field, as ``TipField.tips``, for compiled loops."""
+    return TipLimit(field.tree.arrays, field.grown_radius, field.grown_corner, field.allowance, field.noncut,
+                    field.coarse.frame)
+
+
+def _cut(limit: Limit, way: F64, corners: F64, at: F64, tolerance: float) -> tuple[F64, F64]:
+    """``dragged`` for a limit of any kind: all pieces of a round at once.
+
+    way : (m, 2) float64, mm; corners : (m,) and at : (k,) float64, mm along it
+
+    Returns places along the way and the limit there, (n,) float64, mm.
+    """
     def tips(s: F64) -> F64:
         return limit(_places(way, corners, s))
 
@@ -66,12 +89,10 @@ def follow(limit: Limit, way: F64, step: float, tolerance: float) -> tuple[F64, 
         at = np.insert(at, np.repeat(where + 1, 3), inner[cut].ravel())
         z = np.insert(z, np.repeat(where + 1, 3), high[cut].ravel())
         todo = ((where + 3 * np.arange(len(where)))[:, None] + np.arange(4)).ravel()
-    with np.errstate(invalid="ignore"):
-        broken = ~(np.abs(np.diff(z)) <= STEEPEST * np.diff(at))
-    return np.column_stack([_places(way, corners, at), z]), broken
+    return at, z
 
 
-def pieces(limit: Limit, way: F64, step: float, tolerance: float) -> list[F64]:
+def pieces(limit: Limit | TipLimit, way: F64, step: float, tolerance: float) -> list[F64]:
     """``follow`` in unbroken pieces, each (n, 3) float64, mm, access frame, thinned, within the tolerance in all.
 
     way : (m, 2) float64, mm, access frame, polyline in plan

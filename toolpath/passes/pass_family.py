@@ -21,11 +21,10 @@ from numpy.typing import NDArray
 from geometry.kernels.outline import ARC
 from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
-from geometry.mesh_queries.drop import drop_tips
 from toolpath.cutter.cutter import Cutter
 from toolpath.cutter.swept_envelope import Envelope
+from toolpath.kernels.drag import TipLimit
 from toolpath.passes.dragged_path import KINK, Limit, pieces
-from toolpath.root_finding import roots
 from toolpath.scallop_budget import TIPS_SHARE
 
 I64 = NDArray[np.int64]
@@ -33,7 +32,6 @@ I64 = NDArray[np.int64]
 FLOOR = 0.02  # mm: passes are never closer
 BEGIN = 0.992  # of the closed form on a plane: wide enough, and kept at the first trial
 CLIMB = 2.0  # mm a pass may be above the tips it serves for each mm they are beside it
-CREST = 1e-6  # mm: two envelopes this near each other have met
 
 
 @dataclass(frozen=True)
@@ -44,12 +42,24 @@ class Dragged:
     limit     : Limit, lowest tip over a place, of the whole assembly
     ground    : TriangleTree of the finished surface
     allowance : mm, material to be left on it
+    arrays    : TipLimit, the same limit for compiled loops; None where it has no such form
     """
 
     cutter: Cutter
     limit: Limit
     ground: TriangleTree
     allowance: float = 0.0
+    arrays: TipLimit | None = None
+
+    def pieces(self, way: F64, step: float, tolerance: float) -> list[F64]:
+        """The tip path along a way as unbroken pieces, as ``toolpath.passes.dragged_path.pieces``.
+
+        way             : (m, 2) float64, mm, access frame, polyline in plan
+        step, tolerance : mm
+
+        Returns list of (n, 3) float64, mm, access frame.
+        """
+        return pieces(self.limit if self.arrays is None else self.arrays, way, step, tolerance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +204,9 @@ class Family(ABC):
         points, normals = points[last], normals[last]
         worst = np.minimum.reduce([e.along(points, normals) for e in passes])
         if len(passes) == 2:
-            worst = np.maximum(worst, self._crest(points, normals, self.across[here][last], *passes))
+            # the search for a crest goes no farther from its sample than the samples lie apart
+            worst = np.maximum(worst, passes[0].crests(passes[1], self.dragged.ground, points, normals,
+                                                       self.across[here][last], 1.5 * self.spacing))
         return worst - self.dragged.allowance, strips[last]
 
     def _over(self, envelope: Envelope, here: slice | I64) -> F64:
@@ -206,44 +218,6 @@ class Family(ABC):
         new = which[np.isnan(seen[which])]
         seen[new] = envelope.heights(self.points[new, :2])
         return np.asarray(seen[which])
-
-    def _crest(self, points: F64, normals: F64, across: F64, a: Envelope, b: Envelope) -> F64:
-        """Height of the crest between two passes over the surface beside each point, (n,) mm; -inf where none is near.
-
-        Across the passes one envelope rises and the other falls; they are equal in one place. The search for it goes no
-        farther from the sample than the spacing of samples.
-        """
-        most = np.full(len(points), 1.5 * self.spacing)
-
-        def places(w: F64, k: I64) -> F64:
-            return np.asarray(points[k, :2] + w[:, None] * across[k])
-
-        def apart(w: F64, k: I64) -> F64:
-            with np.errstate(invalid="ignore"):
-                apart = np.asarray(a.heights(places(w, k)) - b.heights(places(w, k)))
-            return np.where(np.isnan(apart), np.copysign(np.inf, w), apart)  # beside both
-
-        every = np.arange(len(points))
-        f_lo, f_hi = apart(-most, every), apart(most, every)
-        k = np.flatnonzero((f_lo < 0.0) & (f_hi > 0.0))
-        out = np.full(len(points), -np.inf)
-        w = roots(lambda x, which: apart(x, k[which]), -most[k], most[k], f_lo[k], f_hi[k], CREST)
-        xy = places(w, k)
-        ground = drop_tips(self.dragged.ground, xy, 0.0, 0.0)
-        # at the rim of a flat end an envelope jumps, and the crest is on one side of the jump
-        low = np.full(len(k), -np.inf)
-        for aside in (-2.0 * CREST, 2.0 * CREST):
-            beside = places(w + aside, k)
-            height = np.minimum(a.heights(beside), b.heights(beside))
-            low = np.where(np.isfinite(height), np.maximum(low, height), low)
-        # ground that is not the sample's own surface any more is a matter of the samples there
-        nz = normals[k, 2]
-        slope = np.sqrt(np.maximum(1.0 - nz**2, 0.0)) / np.maximum(nz, 1e-9)
-        own = np.abs(ground - points[k, 2]) <= (slope + 0.3) * np.abs(w) + 1e-3
-        with np.errstate(invalid="ignore"):
-            over = (low - ground) * nz
-        out[k] = np.where(own & np.isfinite(over), over, -np.inf)
-        return out
 
     def envelope(self, p: Pass) -> Envelope:
         """The swept envelope of a pass."""
@@ -289,7 +263,7 @@ class Swath(Family):
         join = max(self.dragged.cutter.radius, 3.0 * self.spacing)
         for i, j in _runs(s, join + 2.0 * over):
             way = t * self.side + np.array([[s[i] - over], [s[j - 1] + over]]) * self.feed
-            for piece in pieces(self.dragged.limit, way, self.step, self.promise.chord):
+            for piece in self.dragged.pieces(way, self.step, self.promise.chord):
                 along = piece[:, :2] @ self.feed
                 k = np.arange(i, j)[(s[i:j] >= along[0] - self.spacing) & (s[i:j] <= along[-1] + self.spacing)]
                 k = k[np.interp(s[k], along, piece[:, 2]) <= highest[k]]

@@ -16,7 +16,6 @@ from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
 from toolpath.kernels.contour import SEGMENTS, linear_crossings, trace
-from toolpath.passes.dragged_path import pieces
 from toolpath.passes.pass_family import Dragged, Family, FinishTarget, Pass, Promise, strip_width
 from zones.lattice import Lattice
 
@@ -52,7 +51,7 @@ class Rings(Family):
 
         only : (n,) bool; only tells whether the pass counts as whole
         """
-        lines = [p for way in self.ways(t) for p in pieces(self.dragged.limit, way, self.step, self.promise.chord)]
+        lines = [p for way in self.ways(t) for p in self.dragged.pieces(way, self.step, self.promise.chord)]
         return Pass(t, tuple(lines), only is None)
 
     def ways(self, t: float) -> list[F64]:
@@ -83,7 +82,7 @@ def spiralled(rings: Rings, places: list[float], climb: bool = True) -> list[F64
 
     def close() -> None:
         if chain:
-            out.extend(pieces(rings.dragged.limit, _joined(chain), rings.step, rings.promise.chord))
+            out.extend(rings.dragged.pieces(_joined(chain), rings.step, rings.promise.chord))
         chain.clear()
 
     for t in places:
@@ -92,7 +91,7 @@ def spiralled(rings: Rings, places: list[float], climb: bool = True) -> list[F64
             chain.append(ways[0])
             continue
         close()
-        out.extend(p for way in ways for p in pieces(rings.dragged.limit, way, rings.step, rings.promise.chord))
+        out.extend(p for way in ways for p in rings.dragged.pieces(way, rings.step, rings.promise.chord))
     close()
     return out
 

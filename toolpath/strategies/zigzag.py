@@ -13,6 +13,7 @@ from geometry.tool_body import ToolBody
 from toolpath.cutter.cutter import Cutter
 from toolpath.lines import Line, dense, pieces_where
 from toolpath.passes.contours import serving
+from toolpath.passes.dragged_path import limit_of
 from toolpath.passes.feed_direction import best_direction
 from toolpath.passes.pass_family import Dragged, FinishTarget, Pass, Promise, Swath
 from toolpath.passes.side_step import lay_out
@@ -91,7 +92,7 @@ def laid(field: TipField, target: FinishTarget, promise: Promise, pattern: Patte
     pattern : Pattern
     climb   : as in ``PassLayout``
     """
-    dragged = Dragged(Cutter.of(field.tool), field.tips, field.tree, field.allowance)
+    dragged = Dragged(Cutter.of(field.tool), field.tips, field.tree, field.allowance, limit_of(field))
     swath = Swath(dragged, target, promise, best_direction(dragged, target, promise))
     made = []
     if pattern is not Pattern.SPIRAL:
