@@ -1,4 +1,4 @@
-"""All mechanisms by name, and those that the proof does not promise yet."""
+"""All mechanisms by name."""
 
 from __future__ import annotations
 
@@ -14,10 +14,3 @@ Mechanism = Callable[[np.random.Generator], Case]
 HARMFUL: dict[str, Mechanism] = {**harm_surface.MECHANISMS, **harm_bodies.MECHANISMS, **harm_reading.MECHANISMS,
                                  **harm_planted.MECHANISMS}
 GOOD: dict[str, Mechanism] = {**good_programs.MECHANISMS}
-
-NOT_YET = {
-    "rapid over face": "the rapid clearance does not hold upward",
-    "empty spindle": "a spindle without a tool has no nose",
-    "longer tool at top": "where a tool is changed is not known",
-}
-"""Mechanisms of which some cases are still called proved, or refused where they are good, with the reason."""
