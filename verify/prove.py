@@ -156,7 +156,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
         unread = None if asked.whole is None else unread_work(asked.whole, framed[0], measured, cutting, tools)
         work, left = work_done(asked, measured, cutting, run.cut, source, unread)
         findings += [*cuts.allowance, *left, *deep_findings(scored.samples, cuts.residual, cuts.mover, cutting, source)]
-    notes = [*springs, *(note for p in framed for note in p.notes())]
+    notes = [*cuts.notes, *springs, *(note for p in framed for note in p.notes())]
     dips = [Assumed(AssumedKind.BETWEEN_SAMPLES, round(met.dip, 3), "the fixtures are so large that a ball may enter "
                     f"one by {met.dip:.3f} mm unseen", "give smaller boxes where tools go")] * (met.dip > DIP + 1e-9)
     taken = [*setup.assumed, *program_assumptions(framed, tools, setup, stated), *cuts.assumed, *dips,

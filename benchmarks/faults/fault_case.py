@@ -142,7 +142,7 @@ class Script:
 
     def begin(self) -> None:
         """The head of the program."""
-        self.lines += ["%", "G21 G90 G17 G94 G40 G49 G54"]
+        self.lines += ["%", "G21 G90 G17 G94 G40 G49 G54 G61"]
 
     def change(self, number: int, x: float, y: float, feed: float) -> None:
         """Load a tool and bring it to the safe height over (x, y), mm; feed in mm/min."""

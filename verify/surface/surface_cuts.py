@@ -61,6 +61,7 @@ class SurfaceCuts:
     close     : ClosePoints, c of them; close_residual : (c,) float64, mm of stock on their normals
     reach     : mm, height above the part up to which stock was followed
     assumed   : what is taken for granted between the points
+    notes     : for the report
     """
 
     residual: F64
@@ -75,6 +76,7 @@ class SurfaceCuts:
     close_residual: F64
     reach: float
     assumed: list[Assumed]
+    notes: list[str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,12 +167,23 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
     row = np.arange(len(table))  # the stock on an edge belongs to two faces, so an edge has no allowance
     return SurfaceCuts(
         table.residual[:len(s)], table.mover[:len(s)],
-        [*gouge_findings(table.points[gouged], table.face[gouged], -table.residual[gouged], table.area[gouged],
-                         table.mover[gouged], source, setup.gouge_tolerance), *tips],
+        [*tips, *gouge_findings(table.points[gouged], table.face[gouged], -table.residual[gouged], table.area[gouged],
+                                table.mover[gouged], source, setup.gouge_tolerance)],
         _in_allowance(table, (row < on_edge) | ((row >= first) & (row < even)), setup, source),
         _excluded(table, slice(len(s), on_edge), part.mesh, shot, source),
         max([float(-table.residual.min(initial=0.0)), 0.0, *(f.depth for f in tips)]), left[:len(guard)],
-        left[len(guard):], close, table.residual[first:even], shot.reach, [*wide_samples(part.mesh), *wide])
+        left[len(guard):], close, table.residual[first:even], shot.reach, [*wide_samples(part.mesh), *wide],
+        _thread_notes(np.unique(moves.tool[table.mover[gouged]]).tolist(), tools))
+
+
+def _thread_notes(cutting: Sequence[int], tools: Sequence[ToolBody]) -> list[str]:
+    """Notes on tools for threads that cut into the part.
+
+    cutting : places in ``tools`` of those that do
+    """
+    return [f"{tools[k].id} is a {tools[k].kind.replace('_', ' ')} and cuts into the part: where the part shows the "
+            "hole before the thread, give the diameter of that hole as diameter_mm"
+            for k in cutting if tools[k].kind in ("tap", "thread_mill")]
 
 
 def _followed(tree: TriangleTree, shot: _Shooting) -> _Table:
@@ -226,7 +239,7 @@ def _deepened(table: _Table, even: int, tree: TriangleTree, shot: _Shooting, tel
 
 
 def _at_ends(table: _Table, tree: TriangleTree, shot: _Shooting) -> _Table:
-    """The gouges of a table as deep as the ends of the tools go, and those of fine tools that no ray meets."""
+    """The rays of a table, and the ends of tools that gouge deeper than the rays of their move say."""
     tolerance = shot.setup.gouge_tolerance + RAY_ERROR
     gouged = np.flatnonzero((table.residual < -tolerance) & (table.mover >= 0))
     gouged = gouged[np.lexsort((gouged, table.residual[gouged], table.mover[gouged]))]
@@ -235,10 +248,10 @@ def _at_ends(table: _Table, tree: TriangleTree, shot: _Shooting) -> _Table:
     fine = fine_moves(tree.mesh, shot.moves, shot.tools, shot.setup.gouge_tolerance)
     rows = np.union1d(mover, fine[small[shot.moves.tool[fine]]]).astype(np.int64)
     depth, place, triangle = end_depths(tree, shot.moves, rows, shot.tools, tolerance)
-    deepest = gouged[first]
-    known = depth[np.searchsorted(rows, mover)]
-    table.residual[deepest] = np.minimum(table.residual[deepest], -known)
-    new = np.flatnonzero((depth > 0.0) & ~np.isin(rows, mover))
+    known = np.full(len(rows), tolerance)  # of the move, by its rays
+    known[np.searchsorted(rows, mover)] = -table.residual[gouged[first]]
+    pointed = np.array([t.cone_height > 0.0 and t.tip_diameter <= 0.0 for t in shot.tools])  # see ``tip_gouges``
+    new = np.flatnonzero((depth > known + RAY_ERROR) & ~pointed[shot.moves.tool[rows]])
     return table + _Table(place[new], tree.mesh.normals[triangle[new]], tree.mesh.face_ids[triangle[new]],
                           np.zeros(len(new)), -depth[new], rows[new].astype(np.int32))
 
