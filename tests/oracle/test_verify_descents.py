@@ -64,11 +64,13 @@ def test_a_shallow_layer_pays_as_deep_as_it_is():
 def test_what_ways_earn():
     p = np.array([[0.0, 0, 0], [10, 0, 0], [20, 0, 0], [30, 0, 0], [40, 0, 0]])
     moves = Moves(p[:-1], p[1:], np.ones(4, bool), np.zeros(4, np.int32))
-    slope = math.tan(SETUP.ramp_angle)
-    # a slot 1 deep, air, a nick of 1 mm³ 1 deep, a layer of 0.1 mm
-    ways = Ways(np.array([40.0, 0.0, 1.0, 4.0]), np.array([1.0, 0.0, 1.0, 0.1]))
-    earned = descents(moves, [TOOL], SETUP, ways)[1]
-    np.testing.assert_allclose(np.diff(np.r_[0.0, earned]), [10 * slope, 0.0, 0.5 * slope, 0.1], rtol=1e-12)
+    first, slope = parts(moves, [TOOL]), math.tan(SETUP.ramp_angle)
+    assert np.diff(first).tolist() == [10, 10, 10, 10]
+    # a slot 1 deep, air, a nick 1 deep at the end, a layer of 0.1 mm
+    volume = np.concatenate([np.full(10, 4.0), np.zeros(19), [1.0], np.full(10, 0.4)])
+    depth = np.concatenate([np.ones(10), np.zeros(19), [1.0], np.full(10, 0.1)])
+    earned = descents(moves, [TOOL], SETUP, Ways(volume, depth).in_cut(first))[1]
+    np.testing.assert_allclose(np.diff(np.r_[0.0, earned]), [10 * slope, 0.0, slope, 0.1], rtol=1e-12)
 
 
 @pytest.mark.parametrize("deep", [0.2, 2.0])

@@ -107,8 +107,8 @@ def loads(cuts: CutSequence, tools: Sequence[ToolBody],
     Notes
     -----
     Depth and width of a cut are measured on the stock over ``WINDOW`` of the radius: the depth a is the highest stock
-    over the tip that went, the width V / (L a). Force, deflection and stress follow from them [Kienzle1952]
-    [Timoshenko1955]. Moves steeper than 45 degrees have no such force.
+    over the tip that went, the width V / (L a), known to one spacing of the stock. Force, deflection and stress follow
+    from them [Kienzle1952] [Timoshenko1955]. Moves steeper than 45 degrees have no such force.
     """
     findings: list[Finding] = []
     cautions: list[ProgramCaution] = []
@@ -184,13 +184,16 @@ class _Judge:
         last, depth, section = last[turns], depth[turns], section[turns]
         if said.kc is None or said.mc is None or not len(last):
             return [], cautions
-        force = cutting_forces(said.kc, said.mc, per_tooth[turns], depth, section / depth, tool, said.flutes)
-        bend = force * compliance(tool)
+        width = section / depth
+        bend = cutting_forces(said.kc, said.mc, per_tooth[turns], depth, width, tool, said.flutes) * compliance(tool)
+        # the stock shows a width to one spacing: a finding holds for the least
+        sure = np.maximum(width - cuts.spacing, 1e-9)
+        force = cutting_forces(said.kc, said.mc, per_tooth[turns], depth, sure, tool, said.flutes)
         stress, strong = np.array([bending_stress(tool, *pair) for pair in zip(force.tolist(), depth.tolist(),
                                                                                strict=True)]).T
 
         def cut(i: int) -> str:
-            return (f"T{tool.number}: its cut of {depth[i]:.2f} mm depth and {section[i] / depth[i]:.2f} mm width at "
+            return (f"T{tool.number}: its cut of {depth[i]:.2f} mm depth and {width[i]:.2f} mm width at "
                     f"F{cuts.feed[last[i]]:.6g}")
         findings, _ = self._over(last, stress / strong, 1.0, math.inf, "load", lambda share, i:
                                  f"{cut(i)} bends it with {share * strong[i]:.0f} N/mm²",

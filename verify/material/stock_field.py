@@ -221,7 +221,7 @@ def run_field(field: DistanceField, moves: Moves, tools: Sequence[ToolBody], set
     partly = (aside <= 0.25 * end) & (stands < WHOLE * over) & (stands > MIN_NODES * field.step**2)
     over = np.where(partly, stands, over)[:, None]
     plunges = _plunges(moves, axes, taken[:, [1, 2]] / VOLUME_UNITS / over, end,
-                       descents(moves, tools, setup, ways.of_moves(first))[1],
+                       descents(moves, tools, setup, ways.in_cut(first))[1],
                        setup.plunge_skin * 2.0 * cutters[:, 0], round_off(tools))
     return StockPass(np.concatenate([events, plunges]), lost, taken[:, 0] > 0, engaged, ways)
 

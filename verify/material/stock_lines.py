@@ -41,7 +41,7 @@ from verify.kernels.stock import PLUNGE, CutTotals, DescentArrays, LineArrays, s
 from verify.material.stock_pass import (
     BESIDE,
     StockPass,
-    Ways,
+    WaysInCut,
     contact_limits,
     cores,
     descents,
@@ -141,7 +141,7 @@ def run_stock(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup:
     last = int(np.flatnonzero(descents(moves, tools, setup)[0] & run.cut)[-1])
     rows = np.flatnonzero(moves.feed[:last + 1])
     chosen = np.isin(np.arange(len(moves)), rows)
-    ways = run.ways.of_moves(parts(moves, tools)).only(chosen)
+    ways = run.ways.in_cut(parts(moves, tools)).only(chosen)
     second, _ = _run(StockLines(field.origin, field.step, start, field.bottom), moves.only(chosen), tools, setup,
                      ways, again, threads, StageProgress(progress).span(0.8, 1.0))
     plunges = second.events[second.events[:, 1] == PLUNGE]
@@ -150,12 +150,12 @@ def run_stock(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup:
     return replace(run, events=events[np.argsort(events[:, 0], kind="stable")], lost=run.lost + second.lost)
 
 
-def _run(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, ways: Ways | None,
+def _run(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, ways: WaysInCut | None,
          chosen: Sequence[tuple[int, int]] | None, threads: int,
          progress: Progress | None) -> tuple[StockPass, list[tuple[int, int]]]:
     """One pass over the blocks that begin at ``chosen``; None: over all of them, with necks, shanks and holders.
 
-    ways : what each move takes, as far as it is known
+    ways : of the moves, as far as they are known
 
     Returns the pass, and where the blocks begin in which a descent may be a plunge once the ways are known.
     """

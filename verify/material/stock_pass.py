@@ -31,10 +31,10 @@ Spare = queue.SimpleQueue[NDArray[np.int64]]
 
 
 def descents(moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
-             ways: Ways | None = None) -> tuple[NDArray[np.bool_], F64]:
+             ways: WaysInCut | None = None) -> tuple[NDArray[np.bool_], F64]:
     """Feed moves that descend steeper than their tool may, and the depth that ramps could have removed so far.
 
-    ways : what each move takes; None: unknown, and then every way counts as if it were in the cut
+    ways : of the moves; None: unknown, and then every way counts as if it were in the cut
 
     Down is along the tool axis, for a turning tool along its axis half way. Moves of tools that cut straight down do
     not count.
@@ -47,8 +47,8 @@ def descents(moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
 
     Notes
     -----
-    The travel in the cut is V / (a D / 2), at most all of it: V is the volume that the move takes, a its depth of cut,
-    D the diameter. So a cut half as wide as the tool counts in full, and a nick at the end of a way in air by its size.
+    A part of a move (``parts``) is in the cut where it takes something off. So a nick at the end of a way in air counts
+    with half a radius at most.
     """
     if not len(moves):
         return np.zeros(0, np.bool_), np.zeros(0)
@@ -63,9 +63,7 @@ def descents(moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
     steep = moves.feed & (-rise > aside * slope + 1e-9) & ~np.array([t.cuts_down for t in tools])[moves.tool]
     pays = aside * slope
     if ways is not None:
-        half = np.array([t.radius for t in tools])[moves.tool] * ways.depth
-        in_cut = np.divide(ways.volume, half, out=np.zeros(len(moves)), where=half > 0.0)
-        pays = np.minimum(np.minimum(aside, in_cut) * slope, ways.depth)
+        pays = np.minimum(aside * ways.share * slope, ways.depth)
     earned = np.cumsum(np.where(moves.feed & ~steep, pays, 0.0))
     changed = np.concatenate([[False], moves.tool[1:] != moves.tool[:-1]])
     return np.asarray(steep), np.asarray(earned + ANOTHER_TOOL * np.cumsum(changed))
@@ -122,10 +120,6 @@ class Ways:
     volume: F64
     depth: F64
 
-    def only(self, chosen: NDArray[np.bool_]) -> Ways:
-        """The moves where ``chosen`` (m,) bool is true."""
-        return Ways(self.volume[chosen], self.depth[chosen])
-
     def of_moves(self, first: NDArray[np.int64]) -> Ways:
         """The same by move.
 
@@ -134,6 +128,29 @@ class Ways:
         if len(first) < 2:
             return Ways(np.zeros(0), np.zeros(0))
         return Ways(np.add.reduceat(self.volume, first[:-1]), np.maximum.reduceat(self.depth, first[:-1]))
+
+    def in_cut(self, first: NDArray[np.int64]) -> WaysInCut:
+        """What of each move is in the cut; ``first`` : as in ``of_moves``."""
+        if len(first) < 2:
+            return WaysInCut(np.zeros(0), np.zeros(0))
+        takes = np.add.reduceat((self.volume > 0.0).astype(np.float64), first[:-1])
+        return WaysInCut(takes / np.diff(first), self.of_moves(first).depth)
+
+
+@dataclass(frozen=True, eq=False)
+class WaysInCut:
+    """The way of each of m moves in the cut.
+
+    share : (m,) float64, dimensionless, share of its length in which it takes something off the stock
+    depth : (m,) float64, mm, as in ``Ways``
+    """
+
+    share: F64
+    depth: F64
+
+    def only(self, chosen: NDArray[np.bool_]) -> WaysInCut:
+        """The moves where ``chosen`` (m,) bool is true."""
+        return WaysInCut(self.share[chosen], self.depth[chosen])
 
 
 def ways_of(tables: Sequence[NDArray[np.int64]]) -> Ways:
