@@ -83,6 +83,7 @@ NOT_IN_CI = {
     "golden": ("rewrites the expected files; the everyday tests compare them",
                {"tests/golden_file.py": ("ZONEMILL_GOLDEN",)}),
     "bench": ("takes hours; each script is asked for its help", {}),
+    "bench-jobs": ("plans whole jobs, for minutes each; the script is asked for its help", {}),
     "lock": ("wants uv and a package index; the locks are compared with pyproject.toml",
              {"tests/unit/house/test_dependencies.py": ("requirements-runtime.lock",)}),
     "third-party": ("rewrites THIRD_PARTY.md; a test compares it with what the script writes",

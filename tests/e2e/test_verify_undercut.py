@@ -29,7 +29,7 @@ def scored(faces: tuple[int, ...]) -> ScoredSamples:
 
 def program(*way: str) -> list[str]:
     """The open side is milled away, then the slot cutter does what is said, from X30 Y-30 at its depth."""
-    out = ["%", "G21 G90 G17 G94 G40 G49 G54", "T1 M6", "S8000 M3", "G0 G43 H1 Z20", "X5 Y-25"]
+    out = ["%", "G21 G90 G17 G94 G40 G49 G54 G61", "T1 M6", "S8000 M3", "G0 G43 H1 Z20", "X5 Y-25"]
     for z in (0.0, -2.0, -4.0, -6.0):
         for x in (5.0, 12.0, 19.0, 25.0):
             out += [f"G0 X{x} Y-25", f"Z{z}", "G1 Y25 F400", "G0 Z20"]

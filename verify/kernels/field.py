@@ -55,6 +55,20 @@ class FieldArrays(NamedTuple):
     band: float
 
 
+class FieldSums(NamedTuple):
+    """What the moves take, added to.
+
+    taken  : (m, 4) int64; 1e-9 mm³: what each move takes, and what the end of a steep one does; whole numbers, so that
+             sums do not depend on the order of tiles; 1 where stock was touched and no share of a cell went; third what
+             the end does times the square of the share of its radius it is from the middle; fourth 1e-9 mm² of stock
+             right under the end
+    parted : (p, 2) int64, as ``verify.kernels.stock.CutTotals.taken``
+    """
+
+    taken: NDArray[np.int64]
+    parted: NDArray[np.int64]
+
+
 class TileArrays(NamedTuple):
     """A tile of nodes and its bricks of 4 nodes a side.
 
@@ -347,17 +361,13 @@ def _any_depth(best):
 
 @njit(**KERNEL)
 def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, twists, rapids: RapidArrays, steep,
-               tools: ToolArrays, limits: ContactLimits, taken, parted, engaged: EngagedArrays, events):
+               tools: ToolArrays, limits: ContactLimits, sums: FieldSums, engaged: EngagedArrays, events):
     """Work all moves in order through the nodes of one tile, in place.
 
     tile   : (6,) int64, index, first and stop node in x, y, z
     twists : (m,) float64, rad, of the X that a tool sees a move in, row w, in the frame of the sectors
     steep  : (m,) bool, feed moves that go down along the tool steeper than a ramp
-    taken  : (m, 4) int64, added to; 1e-9 mm³: what each move takes, and what the end of a steep one does; whole
-             numbers, so that sums do not depend on the order of tiles; 1 where stock was touched and no share of a cell
-             went; third what the end does times the square of the share of its radius it is from the middle; fourth
-             1e-9 mm² of stock right under the end
-    parted : (p, 2) int64, as ``verify.kernels.stock.CutTotals.taken``
+
     Returns the number of events found, which may exceed the table.
     """
     field, origin, h, band = stock
@@ -410,15 +420,15 @@ def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, tw
             near = not _beside(seen, -rooms[m], cutter.length + rooms[m], cutter.radius + max(grow, rooms[m]))
             if near and feed:
                 _cut(stock, bricks, piece, cutter, steep[m], ends_radius[k], twists[m], sectors[parts[m]:parts[m + 1]],
-                     parted[parts[m]:parts[m + 1]], totals)
+                     sums.parted[parts[m]:parts[m + 1]], totals)
             elif near:
                 _meet(stock, bricks, piece, rows[0], True, cutter, grow, rooms[m], TOUCHING, best)
             _look(stock, bricks, piece, tools, k, seen, feed, free[m], grow, rooms[m], limits, best)
         if totals[0] > 0.0 or totals[2] > 0.0:
-            taken[m, 0] += max(round(totals[0] * VOLUME_UNITS), 1)
-            taken[m, 1] += round(totals[1] * VOLUME_UNITS)
-            taken[m, 2] += round(totals[3] * VOLUME_UNITS)
-            taken[m, 3] += round(totals[4] * VOLUME_UNITS)
+            sums.taken[m, 0] += max(round(totals[0] * VOLUME_UNITS), 1)
+            sums.taken[m, 1] += round(totals[1] * VOLUME_UNITS)
+            sums.taken[m, 2] += round(totals[3] * VOLUME_UNITS)
+            sums.taken[m, 3] += round(totals[4] * VOLUME_UNITS)
             cuts += 1
             if cuts % 64 == 0:
                 changing = _solid(tops, band, solid)

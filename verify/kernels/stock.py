@@ -83,6 +83,13 @@ class LineHistory(NamedTuple):
     stub: F64
 
 
+class CutEnd(NamedTuple):
+    """The end of a tool that cuts straight down: radius in mm, and depth in mm that it may dig."""
+
+    radius: float
+    skin: float
+
+
 class CutTotals(NamedTuple):
     """What a pass adds up, changed in place.
 
@@ -154,10 +161,10 @@ def _worse(best, code, depth, clearance, x, y, z):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _lower(lines, box, a, d, cutter, end_radius, skin, descents, m, history, engaged, totals, best):
+def _lower(lines, box, a, d, cutter, end, descents, m, history, engaged, totals, best):
     """Lower the lines under feed move m.
 
-    end_radius : mm, of the end of the tool that cuts straight down; skin : mm that it may dig
+    end        : CutEnd
     totals     : CutTotals, of the parts of this move
     engaged    : (parts,) int64, sectors of the cutter that met stock, added to, by even parts of the move
 
@@ -220,17 +227,17 @@ def _lower(lines, box, a, d, cutter, end_radius, skin, descents, m, history, eng
             if not steep:
                 continue
             # what the flank took before the end came over the line was not dug
-            end, _ = lowest_within(x, y, a[0], a[1], a[2], d[0], d[1], d[2], end_radius, flat, corner, cone)
-            over = low + gone - max(end, bottom)
+            under_end, _ = lowest_within(x, y, a[0], a[1], a[2], d[0], d[1], d[2], end.radius, flat, corner, cone)
+            over = low + gone - max(under_end, bottom)
             gone = min(gone, over)
             if gone > 0.0:
                 paid = earned - since[i - i0, j - j0]
                 since[i - i0, j - j0] = earned
                 dug[i - i0, j - j0] = max(dug[i - i0, j - j0] - paid, 0.0) + gone
-                if dug[i - i0, j - j0] > skin:
+                if dug[i - i0, j - j0] > end.skin:
                     _worse(best, PLUNGE, dug[i - i0, j - j0], 0.0, x, y, low)
                 whole[i - i0, j - j0] += gone
-                if whole[i - i0, j - j0] > skin:
+                if whole[i - i0, j - j0] > end.skin:
                     totals.open[0] = 1
     return cut, under
 
@@ -424,7 +431,7 @@ def stock_tile(box, lines: LineArrays, moves: MoveArrays, rapids: RapidArrays, d
             continue
         cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3])
         if feeds[m]:
-            went, below = _lower(lines, box, a, d, cutter, ends_radius[k], skins[k], descents, m, history,
+            went, below = _lower(lines, box, a, d, cutter, CutEnd(ends_radius[k], skins[k]), descents, m, history,
                                  sectors[parts[m]:parts[m + 1]],
                                  CutTotals(totals.taken[parts[m]:parts[m + 1]], totals.open), best)
             if stubs:

@@ -20,7 +20,7 @@ from geometry.mesh_queries.nearest import nearest
 from geometry.tool_body import ToolBody
 from verify.blank.blank import blank_cylinder, blank_mesh, stock_bounds
 from verify.kernels.engaged import EngagedArrays
-from verify.kernels.field import VOLUME_UNITS, FieldArrays, field_tile
+from verify.kernels.field import VOLUME_UNITS, FieldArrays, FieldSums, field_tile
 from verify.kernels.grid import cross_columns, net_faces, net_vertices
 from verify.kernels.stock import PLUNGE
 from verify.material.stock_pass import (
@@ -202,8 +202,8 @@ def run_field(field: DistanceField, moves: Moves, tools: Sequence[ToolBody], set
     def job(tile: NDArray[np.int64]) -> Callable[[], object]:
         def work() -> object:
             events, taken, engaged, own = event_table(), spare.get(), blank_table.get(), free_parted.get()
-            n = field_tile(stock, tile, steps, turns, twists, rapids, steep, sizes, limits, taken, own,
-                           EngagedArrays(first, engaged), events)
+            n = field_tile(stock, tile, steps, turns, twists, rapids, steep, sizes, limits,
+                           FieldSums(taken, own), EngagedArrays(first, engaged), events)
             free_parted.put(own)
             spare.put(taken)
             blank_table.put(engaged)

@@ -130,7 +130,10 @@ class Ways:
         return Ways(np.add.reduceat(self.volume, first[:-1]), np.maximum.reduceat(self.depth, first[:-1]))
 
     def in_cut(self, first: NDArray[np.int64]) -> WaysInCut:
-        """What of each move is in the cut; ``first`` : as in ``of_moves``."""
+        """What of each move is in the cut.
+
+        first : (n + 1,) int64, index, first part of each move, as ``parts``
+        """
         if len(first) < 2:
             return WaysInCut(np.zeros(0), np.zeros(0))
         takes = np.add.reduceat((self.volume > 0.0).astype(np.float64), first[:-1])

@@ -28,7 +28,7 @@ from verify.tool_axes import square_to
 
 CORNER = math.cos(math.radians(45.0))  # of the angle by which a path turns at a corner
 STEP = 0.1  # mm between places along the ways
-MOST_RINGS, MOST_BALLS = 50_000, 400_000  # places along the ways of a tool; more get a wider step
+MAX_RINGS, MAX_BALLS = 50_000, 400_000  # places along the ways of a tool; more get a wider step
 ENDS_AROUND = 8  # places of each ring of ``end_depths``
 TILTS = (0.0, 0.25 * math.pi, 0.5 * math.pi)  # of rings on a corner, from its lowest place to its side
 AROUND = 16  # places round the rim of an end
@@ -125,7 +125,7 @@ def _ways(moves: Moves, k: int, tool: ToolBody, bounds: F64) -> tuple[INT, F64, 
     rows = np.flatnonzero(moves.feed & (moves.tool == k) & near)
     length = np.linalg.norm(moves.end[rows] - moves.start[rows], axis=1)
     past = np.cumsum(length)
-    most = MOST_BALLS if tool.corner_radius >= tool.radius - 1e-12 else MOST_RINGS
+    most = MAX_BALLS if tool.corner_radius >= tool.radius - 1e-12 else MAX_RINGS
     if not len(rows) or past[-1] <= 0.0:
         return np.zeros(0, np.int64), np.zeros(0), STEP
     step = max(STEP, float(past[-1]) / most)
