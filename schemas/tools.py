@@ -6,7 +6,7 @@ import math
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, field_serializer, model_validator
 
 from schemas.base import Count, Number, WireModel
 
@@ -202,6 +202,11 @@ class Tool(WireModel):
         self._gauge_given = self.gauge_length_mm is not None
         if self.gauge_length_mm is None:
             self.gauge_length_mm = self.stickout_mm + sum(s.length_mm for s in self.holder)
+
+    @field_serializer("gauge_length_mm")
+    def _stated_gauge(self, value: float | None) -> float | None:
+        """The gauge length as it was stated; None where it was computed, so that a setup reads back as it was given."""
+        return value if self._gauge_given else None
 
     @property
     def core_mm(self) -> float:

@@ -245,3 +245,14 @@ def test_speeds_and_feeds_come_from_the_material_within_the_limits():
     assert feed_per_tooth(points, 4.5) == pytest.approx(0.029)
     assert find_material("EN AW-6082").name == "AlMgSi1 6082"
     assert {m.source for m in MATERIALS.values()} == {"shop practice, deliberately low"}
+
+
+def test_a_setup_reads_back_with_what_it_states_only():
+    """The child of a job gets the canonical JSON: a computed gauge length must not come back as a stated one."""
+    for gauge, stated in ((None, False), (80.0, True)):
+        setup = Setup.model_validate({"tools": [{"id": "T1", "kind": "flat", "diameter_mm": 6, "flute_length_mm": 12,
+                                                 "stickout_mm": 30, "gauge_length_mm": gauge}]})
+        again = Setup.model_validate_json(canonical_json(setup))
+        assert again.tools[0].gauge_given is stated
+        assert again.tools[0].gauge_length_mm == (80.0 if stated else 30.0)
+        assert canonical_json(again) == canonical_json(setup)
