@@ -147,8 +147,8 @@ class Clearance(WireModel):
                                                              "is below it.")] = 1.0
     approach: Annotated[Number, Field(
         ge=0, le=100, description="Of the whole tool to what is below it, in a rapid straight down before a cut, mm. "
-                                  "Where it is larger than rapid, rapid holds. A rapid straight up needs no "
-                                  "clearance.")] = 0.2
+                                  "0: the tool may touch, and not enter. Where it is larger than rapid, rapid holds. "
+                                  "A rapid straight up needs no clearance.")] = 0.0
 
 
 class Quality(WireModel):

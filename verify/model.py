@@ -111,7 +111,7 @@ class ProofSetup:
     clearance_shank: float = 0.2
     clearance_holder: float = 1.0
     clearance_rapid: float = 1.0
-    clearance_approach: float = 0.2
+    clearance_approach: float = 0.0
     scallop_height: float = 0.01
     gouge_tolerance: float = 0.01
     stock_allowance: float = 0.0

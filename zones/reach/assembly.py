@@ -17,7 +17,7 @@ class Clearances:
     shank: float = 0.2
     holder: float = 1.0
     rapid: float = 1.0
-    approach: float = 0.2
+    approach: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ def test_only_tools_are_needed_and_defaults_are_those_of_the_design():
     found = Setup.model_validate(setup())
     assert found.placement.z_axis == [0, 0, 1] and found.access[0].work_offset == "G54"
     assert found.clearance_mm.model_dump() == {"neck": 0.05, "shank": 0.2, "holder": 1.0, "rapid": 1.0,
-                                                "approach": 0.2}
+                                                "approach": 0.0}
     assert found.quality.model_dump() == {"scallop_height_mm": 0.01, "chordal_tolerance_mm": 0.002,
                                           "gouge_tolerance_mm": 0.01, "stock_allowance_mm": 0, "coverage_min": 0}
     assert (found.stock.kind, found.stock.margin_mm, found.stock.uncertainty_mm) == ("part_offset", 1, 0.5)
