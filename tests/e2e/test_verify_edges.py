@@ -154,5 +154,5 @@ def test_fixtures_too_large_to_look_at_closely_are_told(turn):
     lines = ["G1 X0 Y0 Z-5 F900", "X800 Y200", "X800 Y-200"]
     for box, told in ((wide, True), (small, False)):
         hits, proof = found(lines, setup=replace(BOX, fixtures=(box,)), turn=turn)
-        assert any("mm unseen" in n for n in proof.notes) == told
+        assert any("mm unseen" in a.effect for a in proof.assumed) == told
         assert any(f.kind == "collision" for f in hits)
