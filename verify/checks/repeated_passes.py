@@ -1,7 +1,7 @@
 """Parts of a program that run a second time and remove nothing.
 
-A pass over ground that it has finished before is a spring pass, and a note. What is no finishing pass, as a layer that
-is pasted twice, and a whole program that is pasted twice, are findings.
+A pass over ground that it has finished before is a spring pass, and a note: it stays at one level. What is no finishing
+pass, as a layer that is pasted twice, a zone of several levels, and a whole program that is pasted twice are findings.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from verify.moves import Moves
 MIN_LINES = 4
 WINDOW = 8
 ROUND = 1e-6  # mm, rad: closer moves are the same
+LEVEL = 1e-3  # mm: heights closer than that are one level
 FINISHED = 0.5  # share of the length of a pass that has to leave places within the budget
 MAX_NOTES = 8
 
@@ -43,7 +44,7 @@ def repeats(moves: Moves, cut: NDArray[np.bool_], source: Source,
             words = (f"T{source.tool[a]}: lines {source.line[a]} to {source.line[b]} repeat lines "
                      f"{source.line[a - shift]} to {source.line[b - shift]} and remove no stock")
             fine = length[a:b + 1][both].sum() >= FINISHED * length[a:b + 1].sum()
-            if fine and (spring or not whole):
+            if fine and _one_level(moves, a, b) and (spring or not whole):
                 notes.append(f"{source.names[source.program[a]]}, {words}: a pass over finished ground")
             elif spring and shift == b - a + 1:
                 continue
@@ -73,6 +74,15 @@ def _whole(moves: Moves, group: list[tuple[int, int, int]]) -> bool:
     before = int(moves.feed[:first - shift].sum())
     between = int(moves.feed[last - shift + 1:first].sum())
     return before < WINDOW and between < WINDOW
+
+
+def _one_level(moves: Moves, a: int, b: int) -> bool:
+    """Whether moves a..b cut at one level along the tool axis, but for ways down and up."""
+    up = np.array([0.0, 0.0, 1.0]) if moves.axes is None else moves.axes.axis[a]
+    start, end = moves.start[a:b + 1] @ up, moves.end[a:b + 1] @ up
+    way = np.linalg.norm(moves.end[a:b + 1] - moves.start[a:b + 1], axis=1)
+    flat = np.abs(end - start) < LEVEL
+    return bool(way[flat].sum() >= way[~flat].sum() and np.ptp(end[flat]) < LEVEL)
 
 
 def _ring(moves: Moves, a: int, b: int) -> bool:

@@ -63,3 +63,11 @@ def test_a_program_of_one_ring_may_have_its_spring_pass():
 def test_what_still_cuts_is_no_repeat():
     places = [*ring(), *LIFT, *ring()]
     assert judged(places, range(len(places)), range(10)) == ([], [])
+
+
+def test_a_zone_of_several_levels_that_runs_again_is_a_finding():
+    zone = [*ring(0)[1:], *ring(-2), *ring(-4)]
+    places = [(0, 0, 0, 1), *zone, (0, 0, 5, 0), (60, 0, 0, 1), *[(60, k, 0, 1) for k in range(1, 10)], (0, 0, 5, 0),
+              (0, 0, 0, 1), *zone]
+    findings, notes = judged(places, range(len(zone) + 12), range(len(zone) + 12))
+    assert len(findings) == 1 and notes == []
