@@ -18,6 +18,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.tool_body import ToolBody
 from verify.assumptions import Assumed, AssumedKind, in_order
+from verify.checks.body_assumptions import body_assumptions
 from verify.checks.changed_tools import as_collisions
 from verify.checks.empty_spindle import with_nose
 from verify.checks.program_assumptions import program_assumptions, rapids_decided
@@ -25,7 +26,6 @@ from verify.checks.program_sequence import FramedProgram, Given, check_numbers, 
 from verify.checks.repeated_passes import repeats
 from verify.checks.sideways_cuts import sideways_findings
 from verify.checks.table_clearance import table_findings
-from verify.checks.taken_for_granted import granted
 from verify.findings import (
     Source,
     contact_findings,
@@ -160,7 +160,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     dips = [Assumed(AssumedKind.BETWEEN_SAMPLES, round(met.dip, 3), "the fixtures are so large that a ball may enter "
                     f"one by {met.dip:.3f} mm unseen", "give smaller boxes where tools go")] * (met.dip > DIP + 1e-9)
     taken = [*setup.assumed, *program_assumptions(framed, tools, setup, stated), *cuts.assumed, *dips,
-             *granted(framed, part, moves, source, tools, setup, threads)]
+             *body_assumptions(framed, part, moves, source, tools, setup, threads)]
     stages.tell(1.0)
     proof = _proof(findings, cuts, run, framed, known, took, moves, source, setup, scored, zone_ids,
                    engagements(angle, stretches, tools), met.spacing, tuple(notes), support)

@@ -80,20 +80,13 @@ class SurfaceCuts:
 
 
 @dataclass(frozen=True, eq=False)
-class _Table:
-    """Rays so far: places of the surface with their faces, and what was left on their normals."""
-
-    points: F64
-    normals: F64
-    face: I32
-    area: F64
-    residual: F64
-    mover: I32
+class _Table(CutPlaces):
+    """Rays so far, and what was left on their normals."""
 
     def __len__(self) -> int:
         return len(self.points)
 
-    def only(self, rows: NDArray[np.int64]) -> _Table:
+    def only(self, rows: NDArray[np.int64] | slice) -> _Table:
         return _Table(*(getattr(self, f)[rows] for f in ("points", "normals", "face", "area", "residual", "mover")))
 
     def __add__(self, more: _Table) -> _Table:
@@ -266,8 +259,7 @@ def _excluded(table: _Table, guard: slice, mesh: TriangleMesh, shot: _Shooting, 
     """Findings of faces that are left alone and brought to size, on the even points of the whole part."""
     if not shot.setup.left_alone:
         return []
-    places = CutPlaces(*(getattr(table, f)[guard] for f in ("points", "normals", "face", "area", "residual", "mover")))
-    return excluded_cuts(places, mesh, shot.moves, shot.tools, shot.setup, source, guard_spacing(mesh))
+    return excluded_cuts(table.only(guard), mesh, shot.moves, shot.tools, shot.setup, source, guard_spacing(mesh))
 
 
 def _in_allowance(table: _Table, counts: NDArray[np.bool_], setup: ProofSetup, source: Source) -> list[Finding]:

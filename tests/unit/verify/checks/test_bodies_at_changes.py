@@ -7,9 +7,9 @@ from geometry.sampling import sample_surface
 from geometry.tool_body import HolderFrustum, ToolBody
 from tests.pocket_case import block
 from verify.assumptions import AssumedKind
+from verify.checks.body_assumptions import length_assumptions
 from verify.checks.empty_spindle import SMALLEST_NOSE
 from verify.checks.program_sequence import FramedProgram
-from verify.checks.taken_for_granted import length_assumptions
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
 from verify.model import NcProgram, ProofSetup, ScoredSamples, StockKind

@@ -21,8 +21,8 @@ BELOW = 0.01  # mm: tips less far below the part are not named
 NOSE_FIELD = "state machine.nose_diameter_mm"
 
 
-def granted(read: Sequence[FramedProgram], part: Part, moves: Moves, source: Source, tools: Sequence[ToolBody],
-            setup: ProofSetup, threads: int) -> list[Assumed]:
+def body_assumptions(read: Sequence[FramedProgram], part: Part, moves: Moves, source: Source,
+                     tools: Sequence[ToolBody], setup: ProofSetup, threads: int) -> list[Assumed]:
     """The assumptions of a proof that depend on its programs.
 
     part, moves : in the frame of the proof, mm; ``tools`` are those that ``moves`` refers to
@@ -106,4 +106,4 @@ def _changes(read: Sequence[FramedProgram]) -> Iterator[Assumed]:
                       "state machine.change_position, or send Z home before the tool change")
 
 
-__all__ = ["granted", "length_assumptions"]
+__all__ = ["body_assumptions", "length_assumptions"]
