@@ -154,21 +154,31 @@ def smooth(points: F64, closed: bool) -> tuple[SplineCurve, float, int]:
     points : (n, 2) float64, mm, in plan of the access frame
     closed : a ring
     Returns the SplineCurve of order 5, with free ends, the standard deviation of its residuals along each axis, mm, and
-    the number of fitted points. Raises GeometryError for a polyline without length.
+    the number of fitted points. A ring that does not cross itself turns once, so a spline of a ring with another whole
+    turn is taken only where every spline has one: noise at a tight end can bend a spline into a loop.
+    Raises GeometryError for a polyline without length.
     """
     samples = next(m for least, m in SAMPLES if len(points) >= least)
     even = resample(points, samples, closed)
     floor = FLOOR * size_of(even, closed)
-    best: tuple[float, SplineCurve, float] | None = None
+    u, once = np.linspace(0.0, 1.0, STEPS + 1), 2 * np.pi * np.sign(_area(even))
+    best: tuple[tuple[bool, float], SplineCurve, float] | None = None
     for count in COUNTS:
         if count > samples // 2:
             break
         curve, left = fit_even(even, count, closed)
-        cost = 2 * samples * np.log(left**2 + floor**2) + 2 * count * np.log(2 * samples)
+        theta = _directions(curve, u)[1] if closed else np.zeros(1)
+        looped = closed and abs(float(theta[-1] - theta[0]) - once) > np.pi
+        cost = looped, float(2 * samples * np.log(left**2 + floor**2) + 2 * count * np.log(2 * samples))
         if best is None or cost < best[0]:
-            best = (float(cost), curve, left * float(np.sqrt(0.5 * samples / (samples - count))))
+            best = (cost, curve, left * float(np.sqrt(0.5 * samples / (samples - count))))
     assert best is not None
     return *best[1:], samples
+
+
+def _area(ring: F64) -> float:
+    x, y = (ring - ring[0]).T
+    return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
 
 def _directions(spline: SplineCurve, u: F64) -> tuple[F64, F64]:
