@@ -22,6 +22,7 @@ from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
 from toolpath.planning.job_plan import Plan
 from toolpath.planning.zone_finishing import Finish, motions_of, step_of, turned
+from toolpath.planning.zone_layout import ZoneLayout
 from toolpath.stock.cut_history import Depths, Walked
 from toolpath.stock.stock_map import StockMap
 from toolpath.strategies import depth_layers
@@ -51,7 +52,7 @@ class Plain(Finish):
 def plan_job(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields: Mapping[str, TipField],
              cut_data: dict[str, CutData], stock: StockMap, settings: PlanSettings,
              progress: Callable[[float], None] | None = None, first_step: int = 1,
-             trimmed: Mapping[str, Sequence[Faces]] | None = None) -> Plan:
+             trimmed: Mapping[str, Sequence[Faces]] | None = None, **_: object) -> Plan:
     """Plan all zones, tool by tool; arguments as of ``toolpath.planning.job_plan.plan_job``, without ``trimmed``."""
     settings = replace(settings, turning=None, pattern=Pattern.ZIGZAG)
     steps: list[Workingstep] = []
@@ -62,8 +63,8 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields: 
         field, cut, walked, depths = fields[tid], cut_data[tid], Walked(), Depths(stock.lattice)
         if settings.roughing:
             steps.extend(_levels(mine, field, cut, stock, settings, depths, f"S{len(steps) + first_step:02d}"))
-        own = [Plain(zone, check_of[zone.id], field, cut, stock, settings, (), walked, depths) for zone in mine
-               if settings.finishing]
+        own = [Plain(ZoneLayout(zone, check_of[zone.id], field, cut, settings), stock, settings, walked, depths)
+               for zone in mine if settings.finishing]
         for finish in own:
             steps.extend(finish.walk(f"S{len(steps) + first_step:02d}"))
         begun.extend(own)

@@ -27,6 +27,7 @@ from numpy.typing import NDArray  # noqa: E402
 import service.pipeline as chain  # noqa: E402
 import toolpath.planning.job_plan as planner  # noqa: E402
 import toolpath.planning.zone_finishing as finish  # noqa: E402
+import toolpath.planning.zone_layout as zone_layout  # noqa: E402
 from examples.family.recipes import make_part  # noqa: E402
 from geometry.mesh import F64  # noqa: E402
 from geometry.sampling import sample_surface  # noqa: E402
@@ -102,11 +103,11 @@ class Compared(finish.Finish):
 
     def walk(self, step_id: str) -> list[Workingstep]:
         if self.faces and len(self.checks.points) and self.field.tool.corner_radius > 0:
-            worth, finish.WORTH_A_TRY = finish.WORTH_A_TRY, np.inf
+            worth, zone_layout.WORTH_A_TRY = zone_layout.WORTH_A_TRY, np.inf
             try:
-                other, refused = self._along_borders()
+                other, refused = self.layout.along_borders
             finally:
-                finish.WORTH_A_TRY = worth
+                zone_layout.WORTH_A_TRY = worth
             for reason in refused:
                 print(f"{self.zone.id:5} {'-':14} {reason['reason']}", flush=True)
             self._told(self.strategy, step_id)
@@ -130,7 +131,7 @@ class Compared(finish.Finish):
         try:
             settings = replace(self.settings, pattern=Pattern.ZIGZAG)
             shallow = replace(self.zone, form=AreaForm.SHALLOW)
-            made = finish._strategy(shallow, self.checks, self.field, self.cut, settings)
+            made = zone_layout.ZoneLayout(shallow, self.layout.checks, self.field, self.cut, settings).usual
             self._told(replace(made, name="plane-parallel"), step_id)
         except TimeoutError:
             print(f"{self.zone.id:5} {'plane-parallel':14} not done in {PARALLEL_S} s", flush=True)

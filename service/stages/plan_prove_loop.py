@@ -29,6 +29,7 @@ from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_checkpoint import CheckpointKeeper
 from toolpath.planning.job_plan import Plan
+from toolpath.planning.zone_layout import ZoneLayout, layouts_of
 from toolpath.stock.stock_map import StockMap
 from verify.model import NcProgram, Proof, ProofSetup, ScoredSamples
 from verify.prove import prove
@@ -144,7 +145,7 @@ class _Span:
 
 
 class _Accesses:
-    """Plans single accesses of a job and keeps what the blank looks like along each for the next plan.
+    """Plans single accesses of a job. Keeps the blank along each and the layouts of its zones for the next plan.
 
     checks  : what the passes of each zone are measured at, in the order of the zones
     trimmed : exact faces by zone, in the frame of its access
@@ -154,6 +155,7 @@ class _Accesses:
                  planner: Planner) -> None:
         self.ready, self.checks, self.trimmed, self.planner = ready, checks, trimmed, planner
         self.blanks: dict[str, StockMap] = {}
+        self.layouts: dict[str, dict[str, ZoneLayout]] = {}
 
     def planned(self, view: View, before: Sequence[AccessPlan], feedback: ProofFeedback,
                 report: Callable[[float], None], keeper: CheckpointKeeper) -> AccessPlan:
@@ -176,10 +178,12 @@ class _Accesses:
             lowest = float(corners[0, 2]) - math.sqrt(3.0) * ready.blank.beyond  # of a box
             stock.left_by([(a.left, a.view.rotation @ view.rotation.T) for a in before if a.left is not None], lowest)
         mine = [k for k, z in enumerate(ready.zones) if z.access == view.id]
-        zones = [ready.zones[k] for k in mine]
-        plan = self.planner(zones, [self.checks[k] for k in mine], view.fields, ready.inputs.cut_table, stock, settings,
-                            lambda share: report(0.98 * share), first_step=step_count + 1, trimmed=self.trimmed,
-                            keeper=keeper)
+        zones, checks, cut_data = [ready.zones[k] for k in mine], [self.checks[k] for k in mine], ready.inputs.cut_table
+        if view.id not in self.layouts:
+            self.layouts[view.id] = layouts_of(zones, checks, view.fields, cut_data, settings, self.trimmed)
+        plan = self.planner(zones, checks, view.fields, cut_data, stock, settings, lambda share: report(0.98 * share),
+                            first_step=step_count + 1, trimmed=self.trimmed, keeper=keeper,
+                            layouts=self.layouts[view.id])
         stock.settle(last=True)
         used = worn(t for a in before for t in a.plan.steps)
         steps = with_fresh_cutters(plan.steps, ready.inputs.tool_lives, settings.clearance, used)

@@ -34,7 +34,9 @@ from toolpath.plan_checkpoint import (
 )
 from toolpath.plan_settings import CutData, PlanSettings
 from toolpath.planning.depth_bands import largest_corner
+from toolpath.planning.layouts_ahead import computed_ahead
 from toolpath.planning.zone_finishing import Finish, ZonePlan, motions_of, step_of, turned
+from toolpath.planning.zone_layout import ZoneLayout, layouts_of
 from toolpath.roughing.engagement_limited_clearing import Clearing
 from toolpath.stock.cut_history import Depths, Walked
 from toolpath.stock.engagement import SKIN_SHARE, UNBOUNDED
@@ -64,7 +66,8 @@ class Plan:
 def plan_job(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields: Mapping[str, TipField],
              cut_data: dict[str, CutData], stock: StockMap, settings: PlanSettings,
              progress: Progress | None = None, first_step: int = 1,
-             trimmed: Mapping[str, Sequence[Faces]] | None = None, keeper: CheckpointKeeper = NOTHING) -> Plan:
+             trimmed: Mapping[str, Sequence[Faces]] | None = None, keeper: CheckpointKeeper = NOTHING,
+             layouts: Mapping[str, ZoneLayout] | None = None) -> Plan:
     """Plan all zones.
 
     zones    : in machining order
@@ -77,6 +80,8 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields: 
     trimmed  : exact faces by zone id, in the frame of the zones; other zones get no iso-parametric passes
     keeper   : called after each act; where it keeps an unfinished plan of the same inputs, that is continued with the
                same result as without the interruption
+    layouts  : ZoneLayout by zone id, of an earlier plan of the same zones, checks, fields, cut data, tolerances and
+               faces; None: laid out here
 
     Returns
     -------
@@ -84,23 +89,26 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields: 
     """
     order = list(dict.fromkeys(z.tool.id for z in zones))
     check_of = {z.id: c for z, c in zip(zones, checks, strict=True)}
+    if layouts is None:
+        layouts = layouts_of(zones, checks, fields, cut_data, settings, trimmed or {})
     under = largest_corner(zones)  # below each plane: stouter tools take off what the tips of later ones need away
 
     def begin(snapshot: PlanSnapshot | None = None) -> _Work:
         jobs = [_ToolJob([z for z in zones if z.tool.id == tid], check_of, fields[tid], cut_data[tid], stock, settings,
-                         trimmed or {}, under) for tid in order]
+                         layouts, under) for tid in order]
         return _Work(jobs, stock, settings, snapshot)
 
     work = keeper.taken(begin) or begin()
     begun, all_zones, done = work.acts, len(zones) * (len(settings.planes) + 1), 0
-    for k, (finished, act) in enumerate(work.to_do()):
-        if k >= begun:
-            work.steps.extend(act(len(work.steps) + first_step))
-            work.acts = k + 1
-            keeper.done(work.snapshot)
-        done += finished
-        if progress is not None and finished:
-            progress(AGAIN_SHARE * done / all_zones)
+    with computed_ahead([layouts[z.id] for z in zones] if settings.finishing and not begun else []):
+        for k, (finished, act) in enumerate(work.to_do()):
+            if k >= begun:
+                work.steps.extend(act(len(work.steps) + first_step))
+                work.acts = k + 1
+                keeper.done(work.snapshot)
+            done += finished
+            if progress is not None and finished:
+                progress(AGAIN_SHARE * done / all_zones)
     if progress is not None:
         progress(1.0)
     return Plan(tuple(work.steps), tuple(f.plan() for job in work.jobs for f in job.begun))
@@ -162,9 +170,9 @@ class _ToolJob:
     """Work of one tool: its layers and the finish of its zones, band by band from the top."""
 
     def __init__(self, zones: Sequence[ZoneArea], checks: Mapping[str, FinishTarget], field: TipField, cut: CutData,
-                 stock: StockMap, settings: PlanSettings, trimmed: Mapping[str, Sequence[Faces]], under: float) -> None:
+                 stock: StockMap, settings: PlanSettings, layouts: Mapping[str, ZoneLayout], under: float) -> None:
         self.zones, self.checks, self.field, self.cut, self.stock = zones, checks, field, cut, stock
-        self.settings, self.trimmed, self.under = settings, trimmed, under
+        self.settings, self.layouts, self.under = settings, layouts, under
         self.walked, self.depths = Walked(), Depths(stock.lattice)
         self.layers: _Layers | None = None
         self.layered: list[Workingstep] = []
@@ -237,8 +245,7 @@ class _ToolJob:
         return _Layers(self.zones, self.field, self.cut, self.stock, self.settings, self.depths, self.under, snapshot)
 
     def _finish(self, zone: ZoneArea, snapshot: FinishSnapshot | None = None) -> Finish:
-        return Finish(zone, self.checks[zone.id], self.field, self.cut, self.stock, self.settings,
-                      self.trimmed.get(zone.id, ()), self.walked, self.depths, snapshot)
+        return Finish(self.layouts[zone.id], self.stock, self.settings, self.walked, self.depths, snapshot)
 
 
 class _Layers:

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import partial
 from operator import attrgetter
 
 import numpy as np
@@ -28,15 +28,12 @@ from toolpath.lines import Line, thinned, true_runs
 from toolpath.linking.linker import Linker
 from toolpath.linking.ramp_entry import RAMP_SHARE
 from toolpath.linking.rapid_travel import Motions
-from toolpath.passes.contours import serving
-from toolpath.passes.isoparametric_passes import Flank, side_step
-from toolpath.passes.pass_family import FinishTarget, Promise
 from toolpath.passes.pass_order import nearest_order
-from toolpath.passes.reach_border import beyond
-from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_checkpoint import FinishSnapshot
-from toolpath.plan_settings import CutData, Pattern, PlanSettings
+from toolpath.plan_settings import CutData, PlanSettings
 from toolpath.planning.candidates import compared
+from toolpath.planning.layouts_ahead import side_by_side
+from toolpath.planning.zone_layout import Rounds, Strategy, ZoneLayout
 from toolpath.poses import Blocked
 from toolpath.stock.cut_history import Depths, Walked, still_to_walk
 from toolpath.stock.engagement import UNBOUNDED
@@ -47,25 +44,18 @@ from toolpath.strategies import (
     curvature_matched,
     flank,
     inclined_axis,
-    isoparametric,
     planar_floor,
     touch_points,
-    waterline,
     zigzag,
 )
-from toolpath.tool_deflection import left_by_layers
 from toolpath.workingsteps import Trajectory, TrajectoryKind, Workingstep
 from zones.machinable_area import AreaForm
-from zones.reach.tip_field import TipField
 from zones.zoning.zones import ZoneArea
 
-LINK_S = 1.2  # s for going up, over and down again: mean of the links of the demo part
 REFINEMENTS = 4
 LEANING = frozenset((flank.NAME, curvature_matched.NAME, inclined_axis.NAME))  # strategies of a tool that leans
 MIN_AGAIN = 4  # moves that a line repeats before they are left out
 AS_IT_IS = 1e-9  # mm, tolerance of a line that is thinned out already
-BORDER_SHARE = 0.1  # of the distance between passes on a plane: precision of the border of an area
-WORTH_A_TRY = 1.5  # of the way of the usual passes: longer iso-parametric ones are not tried
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,32 +82,23 @@ class ZonePlan:
 class Finish:
     """The finish of one zone, repeated where stock was in the way and is gone later.
 
-    zone, checks, field, cut, stock, settings : as in ``plan_job``
-    faces          : of the zone, exact and trimmed
-    walked, depths : where its tool has been, shared by its zones
-    snapshot       : state of an interrupted plan, to continue from
+    layout          : ZoneLayout, the passes that the zone may get
+    stock, settings : as in ``plan_job``
+    walked, depths  : where its tool has been, shared by its zones
+    snapshot        : state of an interrupted plan, to continue from
     """
 
-    def __init__(self, zone: ZoneArea, checks: FinishTarget, field: TipField, cut: CutData, stock: StockMap,
-                 settings: PlanSettings, faces: Sequence[Faces] = (), walked: Walked | None = None,
+    def __init__(self, layout: ZoneLayout, stock: StockMap, settings: PlanSettings, walked: Walked | None = None,
                  depths: Depths | None = None, snapshot: FinishSnapshot | None = None) -> None:
-        anew = partial(Finish, zone, checks, field, cut, stock, settings, faces, walked, depths)
-        self.full = cut = cut.finish or cut
-        self.zone, self.field, self.cut, self.stock, self.settings = zone, field, cut, stock, settings
-        self.given = len(checks.points)
-        if len(checks.points) and zone.form is not AreaForm.STEEP and not _has_floor(zone, field.tool):
-            r = field.tool.corner_radius or field.tool.radius
-            checks = checks.joined(beyond(field, checks, settings.lift, BORDER_SHARE * math.sqrt(
-                8.0 * settings.scallop_height * r), zone.faces))
-        self.checks = checks
+        self.layout, self.zone, self.field, self.faces = layout, layout.zone, layout.field, layout.faces
+        self.stock, self.settings, self.full, self.given = stock, settings, layout.full, layout.given
+        self.checks = checks = layout.checks
         self.residual = ResidualMap(checks.points + settings.stock_allowance * checks.normals, checks.normals,
                                     margin=1.5 * settings.scallop_height, covers=checks.covers)
-        self.strategy = (_once(_strategy(zone, checks, field, cut, settings), len(checks.points))
-                         if snapshot is None else
-                         _Strategy(snapshot.strategy, snapshot.side_step, _laid_later(anew, snapshot.strategy),
-                                   snapshot.ordered, snapshot.rejected))
-        self.cut = self._eased(cut, self.strategy)
-        self.faces = faces
+        self.strategy = layout.usual if snapshot is None else Strategy(
+            snapshot.strategy, snapshot.side_step, _laid_later(layout, snapshot.strategy), snapshot.ordered,
+            snapshot.rejected)
+        self.cut = layout.eased(self.strategy)
         self.layers: Workingstep | None = None  # the last measured ones
         self.step: str | None = None
         self.settled = False  # the strategy is chosen, and holds for the bands below
@@ -178,13 +159,13 @@ class Finish:
         if self.settled:
             return self._rounds(step_id, every)
         self.settled = True
-        other, refused = self._along_borders()
+        other, refused = self.layout.along_borders
         leans = self.settings.turning is not None and bool(self.faces) and len(every) > 0 and bool(every.all())
         if other is None and not leans:
             self.strategy = replace(self.strategy, rejected=(*self.strategy.rejected, *refused))
             return self._rounds(step_id, every)
         tries = [self._copied(s) for s in (self.strategy, other) if s is not None]
-        made = [t._rounds(step_id, every) for t in tries]
+        made = side_by_side([partial(t._rounds, step_id, every) for t in tries])
         seconds = [sum(step.seconds for step in steps) for steps in made]
         leaning, untilted = self._leaning(min(seconds)) if leans else ([], ())
         refused += untilted
@@ -266,61 +247,10 @@ class Finish:
         self.step, self.passes, self.begun_with = step_id, self.passes + len(runs), name
         return [*steps, *rest]
 
-    def _along_borders(self) -> tuple[_Strategy | None, tuple[dict[str, object], ...]]:
-        """Passes along the borders of the faces, None where none is worth a try, and the reasons."""
-        settings, usual, steep = self.settings, self.strategy, self.zone.form is AreaForm.STEEP
-        requested = not steep and settings.pattern is not Pattern.AUTO
-        suited = isoparametric.suits(self.field.tool) and self.zone.form is not AreaForm.LEVEL and not requested
-        faces = [face for face in self.faces if not face.flat]
-        if not (suited and faces and len(self.checks.points)):
-            return None, ()
-        every, scallop = np.arange(len(self.checks.points)), settings.budget.laid
-        link = LINK_S * self.cut.feed / 60.0  # between passes that end elsewhere than the next begins
-        way = sum(line.length + (0.0 if line.closed or not steep else link)
-                  for lines in usual.rounds(0, every) for line in lines)
-        level = float(side_step(np.zeros(1), self.field.tool.corner_radius, scallop)[0])
-        level = max(level, usual.side_step) if steep else level
-        least = self.given * self.checks.spacing**2 / level
-        if least > WORTH_A_TRY * way:
-            return None, (_not_taken("longer even on a plane, with links, mm", least, way),)
-        chord = settings.budget.chord
-        found = isoparametric.course(faces, self.checks, self.field, scallop, chord,
-                                     self._flank() if steep else None)
-        refused = _refused(found.refused)
-        if not found.groups:
-            return None, refused
-        there = found.way + (link * sum(len(group) for group in found.groups) if steep else 0.0)
-        if there > WORTH_A_TRY * way:
-            return None, (*refused, _not_taken("longer, with links, mm", there, way))
-        made, failed = isoparametric.laid(found, self.field, scallop, chord, settings.lift)
-        refused = (*refused, *_refused(failed))
-
-        def rounds(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
-            if k or not len(failing):
-                return usual.rounds(k, failing)
-            if len(failing) == len(every):
-                return made
-            tips, over = self.checks.tips[failing], 0.3 * self.field.tool.radius
-            return [serving(lines, tips, 1.5 * found.side_step, self.checks.spacing, over, over) for lines in made]
-
-        return _Strategy(isoparametric.NAME, found.side_step, rounds, not steep, usual.rejected), refused
-
-    def _flank(self) -> Flank:
-        tool, above = self.field.tool, self.field.tool.flute_length - self.field.tool.corner_radius
-        return Flank(tool.radius + self.field.allowance, min(self.cut.step_down, above))
-
-    def _eased(self, cut: CutData, strategy: _Strategy) -> CutData:
-        """Feeds at which the passes of a strategy do not deflect the tool too far, given the stock that layers
-        leave."""
-        left = left_by_layers(cut.step_down, self.field.lattice.step)
-        if self.zone.form is AreaForm.STEEP:
-            return cut.under(strategy.side_step, left)
-        return cut.under(left, strategy.side_step)
-
-    def _copied(self, strategy: _Strategy) -> Finish:
+    def _copied(self, strategy: Strategy) -> Finish:
         """This finish with another strategy, cut on its own."""
         out = copy.copy(self)
-        out.cut = self._eased(self.full, strategy)
+        out.cut = self.layout.eased(strategy)
         out.residual, out.stock = self.residual.copied(), self.stock.copied()
         out.met, out.strategy = self.met.copy(), strategy
         out.walked, out.depths = self.walked.copied(), self.depths.copied()
@@ -433,102 +363,12 @@ class Finish:
         return still_to_walk(line, fresh)
 
 
-def _refused(reasons: Sequence[str]) -> tuple[dict[str, object], ...]:
-    return tuple({"strategy": isoparametric.NAME, "reason": reason} for reason in reasons)
-
-
-def _not_taken(reason: str, value: float, limit: float) -> dict[str, object]:
-    return {"strategy": isoparametric.NAME, "reason": reason, "value": round(value, 1), "limit": round(limit, 1)}
-
-
-def _has_floor(zone: ZoneArea, tool: ToolBody) -> bool:
-    """Whether a zone is finished by a flat end that stands on it."""
-    return zone.form is AreaForm.LEVEL and tool.radius > tool.corner_radius
-
-
 TiltedPasses = tuple[str, Sequence[tuple[Trajectory, ...]]]
 """Name of a strategy and the trajectories of each of its passes."""
 
-Rounds = Callable[[int, NDArray[np.int64]], list[list[Line]]]
-"""Lines of round k for the samples that still need some (index into the zone's checks)."""
-
-
-@dataclass(frozen=True)
-class _Strategy:
-    """Name, distance between passes in mm, rounds, whether lines come in their order of machining, and rejected
-    strategies."""
-
-    name: str
-    side_step: float
-    rounds: Rounds
-    ordered: bool
-    rejected: tuple[dict[str, object], ...] = ()
-
-
-def _strategy(zone: ZoneArea, checks: FinishTarget, field: TipField, cut: CutData,
-              settings: PlanSettings) -> _Strategy:
-    """The strategy of a zone."""
-    tool, chord, normals = field.tool, settings.budget.chord, checks.normals
-    cusp = settings.budget.cusp
-    if zone.form is AreaForm.STEEP:
-        step = waterline.level_step(tool, normals, cusp, cut.step_down)
-
-        def waterlines(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
-            tips = checks.tips[failing]
-            if k == 0:
-                levels, window = waterline.heights(float(tips[:, 2].max()), float(tips[:, 2].min()), step), step
-            else:
-                window = step / 2.0 ** k
-                levels = waterline.lowest_of_groups(tips[:, 2], window)
-            return waterline.waterlines(field, tips, levels, 1.001 * window, chord)
-
-        return _Strategy("waterline", step, waterlines, False)
-    if _has_floor(zone, tool):
-
-        def planes(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
-            return planar_floor.planes(field, checks.tips[failing], chord, k) if k <= planar_floor.MAX_FINER else []
-
-        return _Strategy("planar_floor", 1.6 * (tool.radius - tool.corner_radius), planes, False)
-    promise = Promise(settings.budget.laid, settings.chordal_tolerance, 0.3 * tool.radius,
-                      LINK_S * cut.feed / 60.0)
-    layout = zigzag.laid(field, checks, promise, settings.pattern, settings.cut_direction.climbs)
-
-    def dragged(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
-        if k:
-            return [layout.between(k, failing)]
-        return [list(layout.lines) if len(failing) == len(checks.points) else layout.near(failing)]
-
-    return _Strategy(str(layout.pattern), layout.side_step, dragged, True, tuple(
-        {"strategy": str(other), "reason": "longer, with links", "value": round(way, 1),
-         "limit": round(layout.way, 1)} for other, way in layout.rejected))
-
-
-def _once(strategy: _Strategy, count: int) -> _Strategy:
-    """The strategy with its first round for all samples kept: it is needed for its way, and again to be cut."""
-    kept: list[list[list[Line]]] = []
-
-    def rounds(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
-        if k or len(failing) < count:
-            return strategy.rounds(k, failing)
-        if not kept:
-            kept.append(strategy.rounds(k, failing))
-        return kept[0]
-
-    return replace(strategy, rounds=rounds)
-
-
-def _laid_later(anew: Callable[[], Finish], name: str) -> Rounds:
+def _laid_later(layout: ZoneLayout, name: str) -> Rounds:
     """The rounds of a strategy from a checkpoint, laid out again when the first is needed, which may be never."""
-    @cache
-    def laid() -> Rounds:
-        fresh = anew()
-        if fresh.strategy.name == name:
-            return fresh.strategy.rounds
-        other, _ = fresh._along_borders()
-        assert other is not None and other.name == name, "the layout depends on the inputs of a plan alone"
-        return other.rounds
-
-    return lambda k, failing: laid()(k, failing)
+    return lambda k, failing: layout.named(name).rounds(k, failing)
 
 
 def turned(line: Line, settings: PlanSettings) -> Line:

@@ -194,10 +194,12 @@ class TipField:
 
         None where no node is blocked. The last result is cached, since each layer uses it three times.
         """
-        if self._off[0] != z:
+        off = self._off  # read and written as a whole: several threads ask a field
+        if off[0] != z:
             free = self.height <= z + LEVEL_TOLERANCE
-            self._off = z, None if free.all() else distance_transform_edt(free) * self.lattice.step
-        return self._off[1]
+            off = z, None if free.all() else distance_transform_edt(free) * self.lattice.step
+            self._off = off
+        return off[1]
 
     def tips(self, xy: F64) -> F64:
         """Tip limit of the whole assembly, (n,) float64, mm; exact for the cutting part.

@@ -16,6 +16,7 @@ from toolpath.passes.pass_family import FinishTarget
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
 from toolpath.planning.job_plan import AGAIN_SHARE, plan_job
 from toolpath.planning.zone_finishing import Finish
+from toolpath.planning.zone_layout import ZoneLayout
 from toolpath.stock.cut_history import OVERLAP, Depths, Walked
 from toolpath.stock.stock_map import StockMap
 from toolpath.strategies.depth_layers import EVEN
@@ -70,7 +71,7 @@ def test_a_later_round_walks_only_what_no_earlier_one_has():
     check = FinishTarget(c.samples.points[zone.samples], c.samples.normals[zone.samples], zone.tips, 0.2)
     cut = CutData(10_000, 800, 200, 3000, 0.75)
     stock = StockMap(c.stock_before.lattice, c.stock_before.top.copy())
-    finish = Finish(zone, check, c.fields[zone.tool.id], cut, stock, c.settings)
+    finish = Finish(ZoneLayout(zone, check, c.fields[zone.tool.id], cut, c.settings), stock, c.settings)
     line = max((q for lines in finish.strategy.rounds(0, np.arange(len(zone.tips))) for q in lines),
                key=lambda q: len(q.points))
     points = line.points[:-1] if line.closed else line.points
@@ -100,7 +101,7 @@ def test_what_layers_have_finished_gets_no_pass_and_says_so():
 
     def fresh():
         stock = StockMap(c.stock_before.lattice, c.stock_before.top.copy())
-        return Finish(zone, check, c.fields[zone.tool.id], cut, stock, c.settings)
+        return Finish(ZoneLayout(zone, check, c.fields[zone.tool.id], cut, c.settings), stock, c.settings)
 
     first = fresh()
     (step,) = first.walk("S05")
@@ -111,7 +112,7 @@ def test_what_layers_have_finished_gets_no_pass_and_says_so():
     half.measure(part)
     assert half.walk("S06") and half.plan().strategy == "waterline" and half.plan().step == "S06"
     whole.measure(replace(part, trajectories=step.trajectories))
-    whole._along_borders = None  # not even asked
+    whole.layout = None  # not even asked
     assert whole.walk("S06") == []
     made = whole.plan()
     assert (made.step, made.strategy, made.passes, len(made.left)) == ("S02", "depth_layers", 0, 0)
@@ -127,7 +128,8 @@ def test_zones_of_a_tool_do_not_walk_the_same_line_twice():
     walked, depths = Walked(), Depths(stock.lattice)
     made, left = [], []
     for count in (1, 2):
-        finish = Finish(zone, check, c.fields[zone.tool.id], cut, stock, c.settings, (), walked, depths)
+        layout = ZoneLayout(zone, check, c.fields[zone.tool.id], cut, c.settings)
+        finish = Finish(layout, stock, c.settings, walked, depths)
         lines = [q for group in finish.strategy.rounds(0, np.arange(len(zone.tips))) for q in group][:count]
 
         def rounds(k, _failing, lines=lines):

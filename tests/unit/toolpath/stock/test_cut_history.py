@@ -11,7 +11,8 @@ from tests.hand_parts import SHORT_TOOLS, blocks, plan_part
 from toolpath.counterexamples import NONE
 from toolpath.lines import Line, true_runs
 from toolpath.planning import zone_finishing
-from toolpath.planning.zone_finishing import Finish, _Strategy
+from toolpath.planning.zone_finishing import Finish
+from toolpath.planning.zone_layout import Strategy
 from toolpath.stock.cut_history import OVERLAP, Depths, Walked, still_to_walk
 from toolpath.stock.residual_map import ResidualMap
 from toolpath.workingsteps import CutDirection, TrajectoryKind
@@ -101,7 +102,7 @@ def test_lines_that_are_the_same_once_thinned_out_are_walked_once():
     class Stub(Finish):
         def __init__(self):
             self.field, self.walked = SimpleNamespace(tool=SHORT_TOOLS["flat"]), Walked()
-            self.strategy = _Strategy("spiral", 1.0, None, True)
+            self.strategy = Strategy("spiral", 1.0, None, True)
             self.settings = SimpleNamespace(chordal_tolerance=0.01, ramp_angle=0.05, cut_direction=CutDirection.CLIMB)
             self.residual = SimpleNamespace(cut=lambda points, tool: None)
 

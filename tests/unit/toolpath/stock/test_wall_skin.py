@@ -14,6 +14,7 @@ from toolpath.kernels.skins import near
 from toolpath.passes.pass_family import FinishTarget
 from toolpath.plan_settings import CutData, PlanSettings, RotaryAxes
 from toolpath.planning.zone_finishing import Finish
+from toolpath.planning.zone_layout import ZoneLayout
 from toolpath.stock.residual_map import ResidualMap
 from toolpath.stock.stock_map import StockMap
 from toolpath.stock.wall_skin import Skins, behind
@@ -164,8 +165,9 @@ def test_a_zone_knows_its_skins_as_it_measured_them():
     c = plan_part(low_walls(), [ball(2.5), ball(1.5, "T2")])
     zone = next(z for z in c.zones if z.form is AreaForm.STEEP)
     check = FinishTarget(c.samples.points[zone.samples], c.samples.normals[zone.samples], zone.tips, 0.2)
-    finish = Finish(zone, check, c.fields[zone.tool.id], CutData(10_000, 800, 200, 3000, 0.75), c.stock_before,
-                    replace(c.settings, turning=FREE))
+    settings = replace(c.settings, turning=FREE)
+    layout = ZoneLayout(zone, check, c.fields[zone.tool.id], CutData(10_000, 800, 200, 3000, 0.75), settings)
+    finish = Finish(layout, c.stock_before, settings)
     finish.residual.residual[:7] = 0.001
     skins = finish._surroundings().skins
     assert np.array_equal(skins.residual.residual, finish.residual.residual)

@@ -14,7 +14,8 @@ from toolpath.passes.isoparametric_passes import Flank
 from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.trimmed_faces import TrimmedFace
 from toolpath.plan_settings import Pattern
-from toolpath.planning.zone_finishing import Finish, _Strategy
+from toolpath.planning.zone_finishing import Finish
+from toolpath.planning.zone_layout import Strategy
 from toolpath.scallop_budget import ScallopBudget
 from toolpath.stock.cut_history import Depths, Walked
 from toolpath.strategies import isoparametric
@@ -165,11 +166,9 @@ def test_of_two_strategies_the_one_that_leaves_less_stays_and_of_equals_the_fast
                                             budget=ScallopBudget(0.02, 0.002))
             self.zone, self.stock = SimpleNamespace(id="Z1"), SimpleNamespace(become=lambda _: None)
             self.residual = SimpleNamespace(residual=np.ones(4))
-            self.strategy, self.depths = _Strategy("waterline", 1.0, None, False), Depths(Lattice(0.0, 0.0, 0.5, 12, 6))
+            self.strategy, self.depths = Strategy("waterline", 1.0, None, False), Depths(Lattice(0.0, 0.0, 0.5, 12, 6))
             self.settled = False
-
-        def _along_borders(self):
-            return _Strategy("isoparametric", 1.0, None, False), ()
+            self.layout = SimpleNamespace(along_borders=(Strategy("isoparametric", 1.0, None, False), ()))
 
         def _copied(self, strategy):
             k = int(strategy.name == "isoparametric")
