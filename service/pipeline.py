@@ -17,9 +17,11 @@ from service.checkpoint_store import Kept
 from service.delivery.job_delivery import cautions_before_planning, deliver_job, deviation_map, warned
 from service.delivery.machined_mesh import MESH_NAME, MeshWish, machined_part
 from service.delivery.result_files import Files, clear_results, deliver
+from service.delivery.stepnc_files import StepncUnderWay
 from service.from_wire import check_plannable
 from service.pictures.proof_picture import MAP_NAME
 from service.report import report as reporting
+from service.stages.access_plan import WrittenProgram
 from service.stages.access_settings import proof_setup
 from service.stages.cautions import sentences
 from service.stages.job_part import read_job_part
@@ -64,8 +66,9 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     clear_results(out)
     ready = prepare(part_path, setup, progress, blank_path=blank_path)
     cautions = cautions_before_planning(ready)
-    job = _proved_plan(part_path, warned(ready, sentences(cautions)), kept or Kept(), planner, progress)
-    report = deliver_job(job, cautions, out, mesh, progress)
+    with StepncUnderWay(out) as stepnc:
+        job = _proved_plan(part_path, warned(ready, sentences(cautions)), kept or Kept(), planner, progress, stepnc)
+        report = deliver_job(job, cautions, out, mesh, progress, stepnc)
     progress("done", 1.0)
     return report
 
@@ -84,13 +87,20 @@ def prove_plan(part_path: Path, setup: Setup, progress: Progress) -> Proof:
     return job.proof
 
 
-def _proved_plan(part_path: Path, ready: Prepared, kept: Kept, planner: Planner, progress: Progress) -> ProvedPlan:
-    """The last plan of a prepared job, with its proof."""
+def _proved_plan(part_path: Path, ready: Prepared, kept: Kept, planner: Planner, progress: Progress,
+                 stepnc: StepncUnderWay | None = None) -> ProvedPlan:
+    """The last plan of a prepared job, with its proof, during which ``stepnc`` begins with the programs."""
     ready, trimmed, scored = _trimmed_and_scored(part_path, ready)
     frame = proof_frame(ready)
     samples = frame.into(scored.samples, ready.views[0])
     resumed = Resumed(kept, ready, scored.checks(ready), samples)
-    return plan_and_prove(resumed, scored, trimmed, frame, proof_setup(ready, frame), planner, progress)
+    conditions = proof_setup(ready, frame)
+
+    def begin(written: Sequence[WrittenProgram]) -> None:
+        if stepnc is not None:
+            stepnc.begin(written, frame.part, ready.inputs.bodies, conditions)
+
+    return plan_and_prove(resumed, scored, trimmed, frame, conditions, planner, progress, begin)
 
 
 def _trimmed_and_scored(part_path: Path, ready: Prepared) -> tuple[Prepared, Mapping[str, Sequence[Faces]], Score]:

@@ -11,8 +11,9 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from datetime import UTC, datetime
 
-from geometry.errors import OutputError
+from geometry.errors import InternalError, OutputError
 from geometry.mesh import F64
+from output.gcode.proof_header import AWAITED, LINES
 from output.program_grid import I64, PER_MM
 
 Write = Callable[[str], object]
@@ -20,6 +21,25 @@ _LINES_A_PIECE = 4096
 _REFS_A_LINE = 12
 _TEXT_LIMIT = 256  # characters of a string in FILE_DESCRIPTION and FILE_NAME, ISO 10303-21 section 8.2
 _RUNS = re.compile(r"['\\]|[^ -~\U00010000-\U0010ffff]+|[\U00010000-\U0010ffff]")
+
+
+def with_proof(head: str, figures: Sequence[str]) -> str:
+    """The first lines of a file with the figures of a proof in place of the reserved lines of its description.
+
+    head    : with the whole FILE_DESCRIPTION, written from a plan whose ``figures`` are
+              ``output.gcode.proof_header.AWAITED``
+    figures : as many lines
+
+    Raises
+    ------
+    InternalError
+        no_room: the reserved lines are missing, or their number is another.
+    """
+    reserved = ",".join(quoted(line) for line in AWAITED)
+    if len(figures) != LINES or head.count(reserved) != 1:
+        raise InternalError("the figures of the proof do not fit into the header of STEP-NC", code="no_room",
+                            measured=[len(figures), head.count(reserved)], limit=[LINES, 1])
+    return head.replace(reserved, ",".join(quoted(line[:_TEXT_LIMIT]) for line in figures))
 
 
 class Part21Writer:

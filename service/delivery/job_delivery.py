@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from geometry.sampling import SurfaceSamples
 from service.delivery.machined_mesh import MESH_NAME, MeshWish, machined_part
 from service.delivery.result_files import Files, deliver, json_bytes
-from service.delivery.stepnc_files import stepnc_under_way
+from service.delivery.stepnc_files import StepncUnderWay
 from service.pictures.proof_picture import MAP_NAME, draw_proof
 from service.report import report as reporting
 from service.setup_sheet.setup_sheet import sheet_files
@@ -59,11 +59,12 @@ def warned(ready: Prepared, texts: Iterable[str]) -> Prepared:
 
 
 def deliver_job(job: ProvedPlan, cautions: Sequence[JobCaution], out: Path, mesh: MeshWish | None,
-                progress: Progress) -> dict[str, Any]:
+                progress: Progress, stepnc: StepncUnderWay) -> dict[str, Any]:
     """Write the files of a job into ``out``; returns its report.
 
     cautions : of the job before it was planned; those of the plan are added
     mesh     : also write the machined part as a mesh; None: no mesh
+    stepnc   : with the STEP-NC that was begun during the proof
 
     Raises
     ------
@@ -74,24 +75,23 @@ def deliver_job(job: ProvedPlan, cautions: Sequence[JobCaution], out: Path, mesh
     report, ready, proved = reported.report, reported.ready, reported.report["state"] == "proved"
     first_access = ready.views[0].id
     tools, programs = ready.inputs.bodies, job.programs
-    with stepnc_under_way(reported.written if proved else [], job.frame.part, tools, job.conditions, out) as stepnc:
-        progress("report", PROVED)
-        files: Files = {}
-        if proved:
-            files.update(_program_files(reported.written))
-        files["zones.json"] = ("zones", "", None, json_bytes(reporting.zones_document(report)))
-        page = plan_view(ready, job.frame, job.scored, job.zone, reported.uncut, reported.remainder, job.proof,
-                         programs, job.conditions, report)
-        if page:
-            files[PREVIEW_NAME] = ("preview", "", None, _preview(ready, page[VIEW_NAME][3], report, out / PREVIEW_NAME))
-        files[MAP_NAME] = ("deviation", "", None, deviation_map(ready, job.frame, job.samples, job.proof,
-                                                                job.conditions, report, out / MAP_NAME))
-        if mesh is not None and programs:
-            figures, data = machined_part(mesh, programs, job.frame.part, tools, job.conditions, _mesh_share(progress))
-            report["machined"] = {"file": MESH_NAME, "access": first_access, **figures}
-            files[MESH_NAME] = ("machined", "", None, data)
-        if proved:
-            files.update(stepnc())
+    progress("report", PROVED)
+    files: Files = {}
+    if proved:
+        files.update(_program_files(reported.written))
+    files["zones.json"] = ("zones", "", None, json_bytes(reporting.zones_document(report)))
+    page = plan_view(ready, job.frame, job.scored, job.zone, reported.uncut, reported.remainder, job.proof,
+                     programs, job.conditions, report)
+    if page:
+        files[PREVIEW_NAME] = ("preview", "", None, _preview(ready, page[VIEW_NAME][3], report, out / PREVIEW_NAME))
+    files[MAP_NAME] = ("deviation", "", None, deviation_map(ready, job.frame, job.samples, job.proof,
+                                                            job.conditions, report, out / MAP_NAME))
+    if mesh is not None and programs:
+        figures, data = machined_part(mesh, programs, job.frame.part, tools, job.conditions, _mesh_share(progress))
+        report["machined"] = {"file": MESH_NAME, "access": first_access, **figures}
+        files[MESH_NAME] = ("machined", "", None, data)
+    if proved:
+        files.update(stepnc.files(job.written, reported.written, job.frame.part, tools, job.conditions))
     files.update(sheet_files(ready, reported.written, report, files))
     files.update(page)
     deliver(out, report, files)

@@ -1,7 +1,6 @@
 """STEP-NC of a proved job: written, read back and compared with the program before it is delivered.
 
-That takes a few times as long as the rest of a report. For long programs another process does it meanwhile
-(``stepnc_under_way``).
+That takes about as long as a proof. For long programs another process does it during the proof (``StepncUnderWay``).
 """
 
 from __future__ import annotations
@@ -9,12 +8,12 @@ from __future__ import annotations
 import json
 import os
 import pickle
+import shutil
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager, suppress
-from functools import partial
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import suppress
 from pathlib import Path
 
 from geometry.child_process import run_limited
@@ -23,6 +22,7 @@ from geometry.part import Part
 from geometry.tool_body import ToolBody
 from output.stepnc.ap238 import stream_stepnc_aim
 from output.stepnc.iso14649 import stream_stepnc_arm
+from output.stepnc.part21 import with_proof
 from output.workplan import Workplan
 from service.delivery.result_files import Files
 from service.stages.access_plan import WrittenProgram
@@ -38,42 +38,90 @@ LONG = 1_000_000  # characters of programs; from there on another process saves 
 TIME_LIMIT, MEMORY_LIMIT = 7200.0, 8e9  # s, bytes
 
 
-@contextmanager
-def stepnc_under_way(programs: Sequence[WrittenProgram], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
-                     out: Path) -> Iterator[Callable[[], Files]]:
-    """Run ``stepnc_files`` in another process meanwhile; yields a function that waits for the files and returns them.
+class StepncUnderWay:
+    """STEP-NC of long programs, written by another process while they are proved.
 
-    This process writes short programs itself, once the function is called. It also does so where the other process
-    exceeds its memory or time. Files that are never taken are deleted.
+    A context: what is still running at its end is stopped, and files that were not taken are deleted. The other process
+    writes the header without the figures of the proof, which are filled in when the files are taken. Short programs
+    are written by this process when their files are asked for. So are those that the other process cannot write for
+    want of memory or time.
+
+    out : folder of the files, each beside its final place
     """
-    job = (programs, part, tools, setup, out)
-    if sum(len(p.text) for p in programs) < LONG or (os.cpu_count() or 1) < 2:
-        yield partial(stepnc_files, *job)
-        return
-    stop, taken = threading.Event(), False
 
-    def wait() -> Files:
-        nonlocal taken
+    def __init__(self, out: Path) -> None:
+        self.out = out
+        self._pool = ThreadPoolExecutor(1)
+        self._stop = threading.Event()
+        self._begun: Future[bytes] | None = None
+        self._texts: list[str] = []
+        self._places: list[Path] = []
+
+    def __enter__(self) -> StepncUnderWay:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._drop()
+        self._pool.shutdown()
+
+    def begin(self, programs: Sequence[WrittenProgram], part: Part, tools: Sequence[ToolBody],
+              setup: ProofSetup) -> None:
+        """Begin with programs before their proof; what was begun before is dropped.
+
+        part, tools, setup : of the proof, as ``verify.prove.prove`` takes them
+        """
+        self._drop()
+        if sum(len(p.text) for p in programs) < LONG or (os.cpu_count() or 1) < 2:
+            return
+        self._stop, self._texts = threading.Event(), [p.text for p in programs]
+        self._places = [_beside(self.out, p.file_name("job", ending)) for p in programs for _, ending, _ in FORMS]
+        command = [sys.executable, "-m", "service.delivery.stepnc_process"]
+        self._begun = self._pool.submit(run_limited, command, pickle.dumps((programs, part, tools, setup, self.out)),
+                                        time_limit=TIME_LIMIT, memory_limit=MEMORY_LIMIT, name="stepnc",
+                                        stop=self._stop)
+
+    def files(self, proved: Sequence[WrittenProgram], delivered: Sequence[WrittenProgram], part: Part,
+              tools: Sequence[ToolBody], setup: ProofSetup) -> Files:
+        """Both forms of STEP-NC of programs without a finding, as files beside their final place.
+
+        proved    : the programs as the proof took them; begun or not
+        delivered : the same with the figures of the proof
+
+        Raises
+        ------
+        InternalError, OutputError
+            As ``stepnc_files``.
+        """
+        if self._begun is None or [p.text for p in proved] != self._texts:
+            self._drop()
+            return stepnc_files(delivered, part, tools, setup, self.out)
         try:
-            files = _named(begun)
+            files = _named(self._begun)
         except ResourceError:
-            files = stepnc_files(*job)
-        taken = True
+            self._drop()
+            return stepnc_files(delivered, part, tools, setup, self.out)
+        for program in delivered:
+            for _, ending, _ in FORMS:
+                _fill(_beside(self.out, program.file_name("job", ending)), program.work.figures)
+        self._begun, self._places = None, []
         return files
 
-    try:
-        with ThreadPoolExecutor(1) as pool:
-            command = [sys.executable, "-m", "service.delivery.stepnc_process"]
-            begun = pool.submit(run_limited, command, pickle.dumps(job), time_limit=TIME_LIMIT,
-                                memory_limit=MEMORY_LIMIT, name="stepnc", stop=stop)
-            try:
-                yield wait
-            finally:
-                stop.set()
-    finally:
-        if not taken:
-            for place in (_beside(out, p.file_name("job", ending)) for p in programs for _, ending, _ in FORMS):
-                place.unlink(missing_ok=True)
+    def _drop(self) -> None:
+        self._stop.set()
+        if self._begun is not None:
+            wait([self._begun])
+        for place in self._places:
+            place.unlink(missing_ok=True)
+        self._begun, self._places, self._texts = None, [], []
+
+
+def _fill(path: Path, figures: Sequence[str]) -> None:
+    """Put the figures of the proof into the reserved lines of a file's header; the rest stays as it is."""
+    whole = _beside(path.parent, path.name)
+    with open(path, encoding="ascii", newline="\n") as old, open(whole, "w", encoding="ascii", newline="\n") as new:
+        new.write(with_proof(old.readline() + old.readline() + old.readline(), figures))
+        shutil.copyfileobj(old, new)
+    os.replace(whole, path)
 
 
 def _named(begun: Future[bytes]) -> Files:
@@ -134,4 +182,4 @@ def _silent(_share: float) -> None:
     """Drop the progress."""
 
 
-__all__ = ["FORMS", "stepnc_files", "stepnc_under_way"]
+__all__ = ["FORMS", "StepncUnderWay", "stepnc_files"]

@@ -77,13 +77,15 @@ class ProvedPlan:
 
 
 def plan_and_prove(resumed: Resumed, scored: Score, trimmed: Mapping[str, Sequence[Faces]], frame: ProofFrame,
-                   conditions: ProofSetup, planner: Planner, progress: Progress) -> ProvedPlan:
+                   conditions: ProofSetup, planner: Planner, progress: Progress,
+                   beside: Callable[[Sequence[WrittenProgram]], None] | None = None) -> ProvedPlan:
     """Plan and prove a job until nothing is found, or until another plan would not help.
 
     resumed    : the job as prepared, with what an earlier attempt at it kept
     trimmed    : exact faces by zone, in the frame of its access
     conditions : what the proof holds the programs to, in ``frame``
     planner    : what makes workingsteps of the zones of an access, with the arguments of ``plan_job``
+    beside     : called with the programs of each plan before their proof, which runs while it works
 
     Raises
     ------
@@ -107,6 +109,8 @@ def plan_and_prove(resumed: Resumed, scored: Score, trimmed: Mapping[str, Sequen
         zone, given_up = scored.without(plan, ready.zones)
         written = programs_of(ready, access_plans, trimmed)
         programs = [p.given() for p in written]
+        if beside is not None:
+            beside(written)
         proof = resumed.proof(programs, zone, partial(
             prove, programs, frame.part, ready.inputs.bodies, conditions, ScoredSamples(samples, zone),
             [z.id for z in ready.zones], span.proving))

@@ -42,8 +42,10 @@ _TOKEN = re.compile(
     rf"{_BLANKS}(?:(?P<ref>\#[0-9]{{1,18}}+(?![0-9]))|(?P<real>{_NUMBER})|(?P<whole>[-+]?[0-9]{{1,18}}+(?![0-9]))"
     rf"|'(?P<text>(?:[^']++|'')*+)'|\.(?P<word>{_WORD})\.|(?P<name>!?{_WORD})|(?P<sign>[(),$*])"
     r"|\"(?P<bits>[0-9A-F]++)\")", _FLAGS)
-_FLAT = rf"(?:'[^'\\,()\n\r]*+'|\#[0-9]{{1,18}}+|{_NUMBER}|[$*])"
-_SIMPLE = re.compile(rf"({_WORD})\(({_FLAT}(?:,{_FLAT})*+)\);", _FLAGS)
+_FLAT = rf"(?:'[^'\\,()\n\r]*+'|\#[0-9]{{1,18}}+|{_NUMBER}|[$*]|\.{_WORD}\.)"
+_FLAT_LIST = rf"\((?:{_FLAT}(?:,{_FLAT})*+)?+\)"
+_SIMPLE = re.compile(rf"({_WORD})\(((?:{_FLAT}|{_FLAT_LIST})(?:,(?:{_FLAT}|{_FLAT_LIST}))*+)\);", _FLAGS)
+_PLAIN = re.compile(r"\(([^()]*+)\)|([^,()]++)", _FLAGS)  # a list, or a value outside of one
 _NAME = re.compile(r"[A-Z][A-Z0-9_]*+")
 _BRACKETS = re.compile(rf"'[^']*+'|/\*.*?\*/|(?<![A-Z0-9_])({_NAME.pattern})|([()])", _FLAGS)
 _OPENING = re.compile(rf"{_BLANKS}\(?+{_BLANKS}({_WORD})", _FLAGS)
@@ -270,10 +272,13 @@ class Part21File:
                 if number in self._spans:
                     raise self._broken(found.start(1), f"#{number} appears twice")
                 self._spans[number] = found.start(1), found.start(5)
-                for name in _entity_names(body):
+                names = _entity_names(body)
+                for name in names:
                     if len(name) > LONGEST:
                         raise self.error(number, _too_long(name))
                     self._named.setdefault(name, []).append(number)
+                if names:  # known without the values, of which there may be many
+                    self._names[number] = tuple(names)
             at = found.end()
         pack()
         self._points = np.concatenate([c[1] for c in chunks])
@@ -298,8 +303,8 @@ class Part21File:
     def _parse(self, number: int) -> list[Record]:
         span = self._spans[number]
         simple = _SIMPLE.match(self._text, span[1])
-        if simple is not None:  # most are: no brackets, no blanks, strings without directives
-            return [(simple.group(1), [_plain(word) for word in simple.group(2).split(",")])]
+        if simple is not None:  # most are: no blanks, no lists in lists, strings without directives
+            return [(simple.group(1), _plain_values(simple.group(2)))]
         found = _STATEMENT.match(self._text, span[1])
         if found is None:
             raise self.error(number, "is incomplete")
@@ -337,6 +342,14 @@ def _entity_names(body: str) -> list[str]:
     return out
 
 
+def _plain_values(text: str) -> list[Value]:
+    """The values of a simple statement."""
+    if "(" not in text:
+        return [_plain(word) for word in text.split(",")]
+    return [[_plain(word) for word in inner.split(",") if word] if word == "" else _plain(word)
+            for inner, word in _PLAIN.findall(text)]
+
+
 def _plain(word: str) -> Value:
     """The value of a word of a simple statement."""
     first = word[0]
@@ -346,6 +359,8 @@ def _plain(word: str) -> Value:
         return word[1:-1]
     if first == "$":
         return None
+    if first == ".":
+        return EnumItem(word[1:-1])
     return DERIVED if first == "*" else float(word)
 
 
