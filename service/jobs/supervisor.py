@@ -29,7 +29,8 @@ JOB_MODULE = "service.jobs.job_process"
 # Address space includes mapped but unused memory (libraries, thread arenas), so its limit is larger.
 ADDRESS_ROOM = 8_000_000_000
 _SECRET = re.compile("^ZONEMILL_|PASSW|SECRET|TOKEN|CREDENTIAL|PRIVATE|_KEY$|_URL$", re.IGNORECASE)
-THREAD_VARIABLES = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+THREAD_VARIABLES = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS")
+ONE_THREAD = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # matrices of three columns win nothing by more
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,8 @@ def _environment(threads: int) -> dict[str, str]:
     """Environment of a child, without settings and secrets of the service, since the child reads untrusted files."""
     kept = {k: v for k, v in os.environ.items() if not _SECRET.search(k)}
     path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
-    return {**kept, "PYTHONPATH": path, **dict.fromkeys(THREAD_VARIABLES, str(threads))}
+    return {**kept, "PYTHONPATH": path, **dict.fromkeys(THREAD_VARIABLES, str(threads)),
+            **dict.fromkeys(ONE_THREAD, "1")}
 
 
 def _watch(child: subprocess.Popen[bytes], lines: _Lines, limits: ProcessLimits,
