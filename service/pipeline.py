@@ -11,6 +11,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+import numba
+
 from geometry.errors import CamError
 from schemas.setup import Setup
 from service.checkpoint_store import Kept
@@ -105,7 +107,8 @@ def _proved_plan(part_path: Path, ready: Prepared, kept: Kept, planner: Planner,
 
 def _trimmed_and_scored(part_path: Path, ready: Prepared) -> tuple[Prepared, Mapping[str, Sequence[Faces]], Score]:
     """The exact faces by zone, which another process reads meanwhile, and the samples of the proof."""
-    with ThreadPoolExecutor(1) as pool:
+    # one thread of numba there: no two threads may enter its threading layer at once
+    with ThreadPoolExecutor(1, initializer=numba.set_num_threads, initargs=(1,)) as pool:
         faces = pool.submit(trimmed_faces, part_path, ready) if ready.inputs.operations.finishing else None
         scored = score(ready)
     try:

@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from geometry.kernels.bvh import TreeArrays
@@ -39,8 +39,6 @@ MAX_PER_CHORD = 2 ** HALVINGS
 
 class TipLimits(NamedTuple):
     """What keeps the tip of one tool up, beside the obstacles themselves; access frame.
-
-    The fields are flat: numba takes no tuple in a tuple into a parallel loop.
 
     noncut       : (ny, nx) float64, mm, tip limit of shank and holder
     x0, y0, step : float, mm, ``LatticeFrame`` of ``noncut``
@@ -138,20 +136,26 @@ def _bisect(tree, limits, fx, fy, bx, by, z, rounds):
     return fx, fy
 
 
-@njit(cache=True, nogil=True, no_cfunc_wrapper=True, parallel=True)
-def place_crossings(tree: TreeArrays, limits: TipLimits, ids, blocked, frame: LatticeFrame, z, rounds, out):
-    """Exact place (n, 2) of every crossing, on its free side."""
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _place(tree, limits, edge, blocked, frame, z, rounds):
+    """Exact place of the crossing on one edge, on its free side."""
     nx = blocked.shape[1]
     x0, y0, step = frame
-    for k in prange(len(ids)):
-        node = ids[k] // 2
-        i, j = node // nx, node % nx
-        i2, j2 = (i + 1, j) if ids[k] % 2 else (i, j + 1)
-        ax, ay = x0 + step * j, y0 + step * i
-        bx, by = x0 + step * j2, y0 + step * i2
-        if blocked[i, j]:
-            ax, ay, bx, by = bx, by, ax, ay
-        out[k, 0], out[k, 1] = _bisect(tree, limits, ax, ay, bx, by, z, rounds)
+    node = edge // 2
+    i, j = node // nx, node % nx
+    i2, j2 = (i + 1, j) if edge % 2 else (i, j + 1)
+    ax, ay = x0 + step * j, y0 + step * i
+    bx, by = x0 + step * j2, y0 + step * i2
+    if blocked[i, j]:
+        ax, ay, bx, by = bx, by, ax, ay
+    return _bisect(tree, limits, ax, ay, bx, by, z, rounds)
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def place_crossings(tree: TreeArrays, limits: TipLimits, ids, blocked, frame: LatticeFrame, z, rounds, out):
+    """Exact place (n, 2) of every crossing, on its free side."""
+    for k in range(len(ids)):
+        out[k, 0], out[k, 1] = _place(tree, limits, ids[k], blocked, frame, z, rounds)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
@@ -190,41 +194,47 @@ def _true_place(tree, limits, px, py, qx, qy, z, tol, reach):
     return mx, my, False
 
 
-@njit(cache=True, nogil=True, no_cfunc_wrapper=True, parallel=True)
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _refine_chord(tree, limits, points, follows, z, tol, reach, out, count, k):
+    """``refine`` for the chord from point k."""
+    out[k, 0, 0], out[k, 0, 1] = points[k, 0], points[k, 1]
+    count[k] = 1
+    if follows[k] < 0:
+        return
+    ends = np.empty((HALVINGS + 1, 4))
+    depth = np.empty(HALVINGS + 1, np.int64)
+    ends[0, 0], ends[0, 1] = points[k, 0], points[k, 1]
+    ends[0, 2], ends[0, 3] = points[follows[k], 0], points[follows[k], 1]
+    depth[0] = 0
+    top, m = 0, 0
+    while top >= 0:
+        px, py, qx, qy = ends[top, 0], ends[top, 1], ends[top, 2], ends[top, 3]
+        level = depth[top]
+        mx, my, moved = px, py, False
+        if level < HALVINGS:
+            mx, my, moved = _true_place(tree, limits, px, py, qx, qy, z, tol, reach)
+        if moved:
+            ends[top, 0], ends[top, 1] = mx, my
+            depth[top] = level + 1
+            top += 1
+            ends[top, 0], ends[top, 1], ends[top, 2], ends[top, 3] = px, py, mx, my
+            depth[top] = level + 1
+            continue
+        top -= 1
+        out[k, m, 0], out[k, m, 1] = px, py
+        m += 1
+    count[k] = m
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def refine(tree: TreeArrays, limits: TipLimits, points, follows, z, tol, reach, out, count):
     """Points put in on every chord that leaves the true boundary by more than tol.
 
     points  : (n, 2); follows : (n,) the point each is joined to, -1 for none
     out     : (n, MAX_PER_CHORD, 2), count : (n,): the point itself and those put in behind it, in order
     """
-    for k in prange(len(points)):
-        out[k, 0, 0], out[k, 0, 1] = points[k, 0], points[k, 1]
-        count[k] = 1
-        if follows[k] < 0:
-            continue
-        ends = np.empty((HALVINGS + 1, 4))
-        depth = np.empty(HALVINGS + 1, np.int64)
-        ends[0, 0], ends[0, 1] = points[k, 0], points[k, 1]
-        ends[0, 2], ends[0, 3] = points[follows[k], 0], points[follows[k], 1]
-        depth[0] = 0
-        top, m = 0, 0
-        while top >= 0:
-            px, py, qx, qy = ends[top, 0], ends[top, 1], ends[top, 2], ends[top, 3]
-            level = depth[top]
-            mx, my, moved = px, py, False
-            if level < HALVINGS:
-                mx, my, moved = _true_place(tree, limits, px, py, qx, qy, z, tol, reach)
-            if moved:
-                ends[top, 0], ends[top, 1] = mx, my
-                depth[top] = level + 1
-                top += 1
-                ends[top, 0], ends[top, 1], ends[top, 2], ends[top, 3] = px, py, mx, my
-                depth[top] = level + 1
-                continue
-            top -= 1
-            out[k, m, 0], out[k, m, 1] = px, py
-            m += 1
-        count[k] = m
+    for k in range(len(points)):
+        _refine_chord(tree, limits, points, follows, z, tol, reach, out, count, k)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)

@@ -100,9 +100,10 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields: 
 
     work = keeper.taken(begin) or begin()
     begun, all_zones, done = work.acts, len(zones) * (len(settings.planes) + 1), 0
-    with computed_ahead([layouts[z.id] for z in zones] if settings.finishing and not begun else []):
+    with computed_ahead([layouts[z.id] for z in zones] if settings.finishing and not begun else []) as settle:
         for k, (finished, act) in enumerate(work.to_do()):
             if k >= begun:
+                settle()
                 work.steps.extend(act(len(work.steps) + first_step))
                 work.acts = k + 1
                 keeper.done(work.snapshot)

@@ -19,24 +19,30 @@ T = TypeVar("T")
 
 
 @contextmanager
-def computed_ahead(layouts: Sequence[ZoneLayout]) -> Iterator[None]:
+def computed_ahead(layouts: Sequence[ZoneLayout]) -> Iterator[Callable[[], None]]:
     """Compute layouts in their order while the body runs: the usual strategies first, then passes along borders.
 
     There is a thread less for it than numba may use, none where that is one: a layout is then computed when it is
     asked for. What is not begun when the body ends is left. A failure is met by whoever asks for the layout.
+
+    Yields a function for the body to call now and then: once all layouts are computed, it gives the body the threads
+    of numba back. Until then the body has one, since two threads must not enter numba's threading layer at once.
     """
     threads = numba.get_num_threads()
     if threads == 1 or not layouts:
-        yield
+        yield lambda: None
         return
     pool = ThreadPoolExecutor(threads - 1, "layout", initializer=numba.set_num_threads, initargs=(1,))
     try:
-        for layout in layouts:
-            pool.submit(layout.compute_usual)
-        for layout in layouts:
-            pool.submit(layout.compute_along_borders)
+        begun = [pool.submit(layout.compute_usual) for layout in layouts]
+        begun += [pool.submit(layout.compute_along_borders) for layout in layouts]
         numba.set_num_threads(1)
-        yield
+
+        def settle() -> None:
+            if all(one.done() for one in begun):
+                numba.set_num_threads(threads)
+
+        yield settle
     finally:
         numba.set_num_threads(threads)
         pool.shutdown(cancel_futures=True)

@@ -1,6 +1,10 @@
 """Layouts computed by other threads: the same plan, nothing computed twice, failures where they are asked for."""
 
+import os
+import subprocess
+import sys
 import threading
+from pathlib import Path
 
 import numba
 import numpy as np
@@ -10,6 +14,8 @@ from tests.hand_parts import ball, low_walls, plan_part
 from toolpath.planning import layouts_ahead
 from toolpath.planning.layouts_ahead import computed_ahead, side_by_side
 from toolpath.planning.zone_layout import Once
+
+ROOT = Path(__file__).resolve().parents[4]
 
 
 class Counted:
@@ -93,3 +99,13 @@ def test_a_plan_has_the_same_bytes_with_one_thread_and_with_several(two_threads,
     several = ways()
     monkeypatch.setattr(layouts_ahead.numba, "get_num_threads", lambda: 1)
     assert several and ways() == several
+
+
+@pytest.mark.slow
+def test_threads_of_a_plan_keep_out_of_the_threading_layer_of_numba():
+    """The layer that numba has everywhere ends a process that two threads enter at once."""
+    code = ("import numba; from tests.hand_parts import ball, low_walls, plan_part; numba.set_num_threads(2);"
+            "plan_part(low_walls(), [ball(2.5), ball(1.5, 'T2')])")
+    env = {**os.environ, "NUMBA_THREADING_LAYER": "workqueue", "NUMBA_NUM_THREADS": "2"}
+    done = subprocess.run([sys.executable, "-c", code], env=env, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
