@@ -22,7 +22,8 @@ from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
-from geometry.mesh_queries.drop import blocked_many, drop_grid, drop_tips
+from geometry.mesh_queries.drop import blocked_many, drop_tips
+from geometry.mesh_queries.flat_grid import drop_over_flats
 from geometry.tool_body import ToolBody
 from zones.kernels.lattice import noncut_blocked, noncut_lookup
 from zones.lattice import Lattice
@@ -54,7 +55,7 @@ class DiscHeights:
         kept = self._kept.get(radius)
         if kept is not None and (part := lattice.within(kept[0])) is not None:
             return kept[1][part]
-        height = drop_grid(self.tree, lattice.x0, lattice.y0, lattice.step, lattice.nx, lattice.ny, radius, 0.0)
+        height = drop_over_flats(self.tree, lattice.x0, lattice.y0, lattice.step, lattice.nx, lattice.ny, radius, 0.0)
         if kept is None or kept[1].size < height.size:
             self._kept[radius] = lattice, height
         return height
@@ -144,8 +145,8 @@ class TipField:
         """(ny, nx) float64, mm: tip limit of the cutting part alone at the lattice nodes."""
         if self._cut is None:
             lat = self.lattice
-            self._cut = drop_grid(self.tree, lat.x0, lat.y0, lat.step, lat.nx, lat.ny, self.grown_radius,
-                                  self.grown_corner) + self.allowance
+            self._cut = drop_over_flats(self.tree, lat.x0, lat.y0, lat.step, lat.nx, lat.ny, self.grown_radius,
+                                        self.grown_corner) + self.allowance
         return self._cut
 
     @property
