@@ -14,10 +14,11 @@ from __future__ import annotations
 
 import copy
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, maximum_filter
+from scipy.ndimage import distance_transform_edt, label, maximum_filter
 from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
@@ -171,6 +172,15 @@ class TipField:
         """
         lat, half = self.lattice, int(math.ceil(reach / self.lattice.step))
         i, j = lat.cells(xy)
+        found = [self._rim(i[mine], j[mine], z, half) for mine in _apart(i, j, 2 * half + 1)]
+        rows, cols = (np.concatenate([f[k] for f in found]) for k in (0, 1))
+        order = np.lexsort((cols, rows))
+        return lat.nodes(rows[order], cols[order], z)[:, :2]
+
+    def _rim(self, i: NDArray[np.int64], j: NDArray[np.int64], z: float,
+             half: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Rows and columns of ``rim`` for places at the nodes (i, j); near is within ``half`` nodes."""
+        lat = self.lattice
         i0, i1 = max(int(i.min()) - half, 0), min(int(i.max()) + half + 1, lat.ny)
         j0, j1 = max(int(j.min()) - half, 0), min(int(j.max()) + half + 1, lat.nx)
         near = np.zeros((i1 - i0, j1 - j0), np.bool_)
@@ -188,7 +198,7 @@ class TipField:
                      (beside[:, 1:], blocked[:, :-1]), (beside[:, :-1], blocked[:, 1:])):
             a |= b
         rows, cols = np.nonzero(near & free & beside)
-        return lat.nodes(rows + i0, cols + j0, z)[:, :2]
+        return rows + i0, cols + j0
 
     def off_blocked(self, z: float) -> F64 | None:
         """(ny, nx) float64, mm: distance of each node from the nearest one that is blocked at tip height z, mm.
@@ -269,6 +279,17 @@ def _aimed(field: TipField, points: F64, tip_z: F64, flat: float) -> F64:
         far = np.linalg.norm(way, axis=2, keepdims=True)
         out[mine, :way.shape[1], :2] += way * np.minimum(1.0, (flat - INSIDE) / np.maximum(far, 1e-12))
     return out
+
+
+def _apart(i: NDArray[np.int64], j: NDArray[np.int64], cells: int) -> Iterator[NDArray[np.int64]]:
+    """Index of nodes (i, j), each (n,), in groups that are more than ``cells`` rows or columns apart."""
+    rows, cols = i // (cells + 1), j // (cells + 1)
+    rows, cols = rows - rows.min(), cols - cols.min()
+    taken = np.zeros((int(rows.max()) + 1, int(cols.max()) + 1), np.bool_)
+    taken[rows, cols] = True
+    group = label(taken, np.ones((3, 3)))[0][rows, cols]
+    order = np.argsort(group, kind="stable")
+    yield from np.split(order, np.flatnonzero(np.diff(group[order])) + 1)
 
 
 def _take(field: TipField, trial: F64, todo: NDArray[np.int64], cutter: NDArray[np.bool_], whole: NDArray[np.bool_],

@@ -11,6 +11,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.tool_body import HolderFrustum
 from tests.hand_parts import ball, box_mesh, field_of, terraces, tool, walls
 from zones.lattice import Lattice, lattice_step
+from zones.reach import tip_field
 from zones.reach.assembly import Clearances, discs_of
 from zones.reach.tip_field import DiscHeights, contact_tips, touchable
 
@@ -91,6 +92,24 @@ def test_a_floor_beside_a_wall_is_touched_by_the_rim_of_a_flat_end():
     assert not field.blocked_by_cutter(tips + [0, 0, 1e-5]).any()
     by_ball = touchable(field_of(mesh, ball(4.0)), p, np.tile([0.0, 0, 1], (2, 1)), 0.002)[0]
     assert by_ball.tolist() == [False, True]
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_the_rim_near_places_far_apart_is_that_of_one_search(known, monkeypatch):
+    """Groups of places get a window of the lattice each; none of its nodes is lost, doubled or out of order."""
+    rng = np.random.default_rng(4)
+    for reach in (0.11, 0.5, 1.7):
+        field = field_of(walls(), tool(4.0, 0.0))
+        if known:
+            assert field.cut_height.size
+        xy = rng.uniform([4.0, 0.0], [12.0, 12.0], (40, 2))
+        found = field.rim(xy, 3.0, reach)
+        groups = list(tip_field._apart(*field.lattice.cells(xy), 2 * math.ceil(reach / field.lattice.step) + 1))
+        assert sorted(np.concatenate(groups).tolist()) == list(range(40))
+        with monkeypatch.context() as one:
+            one.setattr(tip_field, "_apart", lambda i, _j, _cells: [np.arange(len(i))])
+            assert np.array_equal(found, field.rim(xy, 3.0, reach)) and len(found)
+        assert (len(groups) > 1) == (reach < 1.0)
 
 
 def test_a_channel_that_fits_like_a_gauge_is_for_a_thinner_tool():
