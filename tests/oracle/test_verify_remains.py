@@ -1,6 +1,7 @@
 """Distance of the surface that is gone to what is left: closed forms, and a dense cloud of what is left."""
 
 import math
+import time
 
 import numpy as np
 import pytest
@@ -65,6 +66,27 @@ def test_a_finished_face_is_not_gone_and_no_search_is_lost_on_it():
     left = Remains(TriangleTree(mesh), path((16, -10, 0), (16, 40, 0), (25, 40, 0), (25, -10, 0)), [FLAT])
     x, z = np.meshgrid(np.linspace(20, 21, 9), np.linspace(0.1, 4, 9))
     assert not left.gone(np.column_stack([x.ravel(), np.full(81, 15.0), z.ravel()]), 0.01).any()
+
+
+def test_a_wrong_side_that_runs_flush_with_the_face_costs_no_search():
+    # from within the rib, the side of the flat stands in the face and its end in the underside of the rib
+    mesh = terraces([0, 8.5], [0, 30], [[4.0]], 0.0)
+    left = Remains(TriangleTree(mesh), path((4, -10, 0), (4, 40, 0)), [FLAT])
+    x, y, z = (g.ravel() for g in np.meshgrid([0.0], np.linspace(1, 29, 20), np.linspace(0.0, 4.0, 9)))
+    places = np.column_stack([x, y, z])
+    assert left.gone(places[:1], 0.01).all()  # the compiled search is there
+    began = time.process_time()
+    assert left.gone(places, 0.01).all()
+    assert agrees(left.depths(places, np.full(len(places), 9.0)).max(), 8.0)
+    assert time.process_time() - began < 3.0  # minutes, where cubes are parted all over the face
+
+
+def test_a_skin_that_stands_before_the_face_is_left():
+    mesh = terraces([0, 8.5], [0, 30], [[4.0]], 0.0)
+    left = Remains(TriangleTree(mesh), path((4.001, -10, 0), (4.001, 40, 0)), [FLAT])
+    place = np.array([[0.0, 15.0, 2.0]])
+    assert left.distances(place, np.full(1, 8.0))[0] <= CLOSE
+    assert not left.gone(place, 0.01).any()
 
 
 def test_where_nothing_is_left_the_bound_is_told():

@@ -48,12 +48,12 @@ class Remains:
         self.axes = axes.arrays(BOW)
         self.feeds = np.flatnonzero(moves.feed)
 
-    def distances(self, points: F64, within: F64, enough: float = 0.0, progress: Progress | None = None) -> F64:
+    def distances(self, points: F64, within: F64, enough: float | F64 = 0.0, progress: Progress | None = None) -> F64:
         """Distance of places to what is left of the part.
 
         points : (n, 3) float64, mm, setup frame
         within : (n,) float64, mm: inf is returned where nothing is left as near as that
-        enough : mm; what is nearer need not be measured any better
+        enough : () or (n,) float64, mm; what is nearer need not be measured any better
 
         Returns (n,) float64, mm, too large by 1e-4 mm or 1 % at most. Films thinner than 1e-4 mm or 3 % of
         their distance count as gone.
@@ -63,6 +63,7 @@ class Remains:
         a, b = self.moves.start[self.feeds], self.moves.end[self.feeds]
         middle, half = 0.5 * (a + b), 0.5 * np.linalg.norm(b - a, axis=1) + self.reach[self.moves.tool[self.feeds]]
         arrays, normals = self.moves.arrays, self.tree.mesh.normals
+        limit = np.broadcast_to(np.asarray(enough, dtype=np.float64), len(points))
 
         def job(rows: NDArray[np.int64]) -> Callable[[], object]:
             def work() -> None:
@@ -71,7 +72,7 @@ class Remains:
                 chosen = self.feeds[((middle > low - far[:, None]) & (middle < high + far[:, None])).all(axis=1)]
                 found = np.empty(len(rows))
                 distances_left(np.ascontiguousarray(points[rows]), within[rows], self.tree.arrays, normals, arrays,
-                               self.axes, self.cutters, self.reach, chosen, enough, found)
+                               self.axes, self.cutters, self.reach, chosen, limit[rows], found)
                 out[rows] = found
             return work
 
@@ -97,12 +98,16 @@ class Remains:
         _, group = np.unique(np.floor(points / CELL).astype(np.int64), axis=0, return_inverse=True)
         group, bound = group.reshape(-1), bound.copy()
         known, most = np.zeros(len(points), np.bool_), np.zeros(group.max(initial=-1) + 1)
-        while (rows := np.flatnonzero(~known & (bound > most[group] * (1.0 + 2.0 * SHARE) + CLOSE))).size:
+        enough = CLOSE * np.ones(len(most))
+        while (rows := np.flatnonzero(~known & (bound > enough[group]))).size:
             rows = rows[np.lexsort((rows, -bound[rows], group[rows]))]
             rows = rows[np.unique(group[rows], return_index=True)[1]]
-            found = np.minimum(self.distances(points[rows], bound[rows] * (1.0 + SHARE) + CLOSE), bound[rows])
+            found = np.minimum(self.distances(points[rows], bound[rows] * (1.0 + SHARE) + CLOSE, enough[group[rows]]),
+                               bound[rows])
             known[rows], bound[rows] = True, found
-            np.maximum.at(most, group[rows], found)
+            farther = rows[found > enough[group[rows]]]  # of others it is known only that they are not farther
+            np.maximum.at(most, group[farther], bound[farther])
+            enough = most * (1.0 + 2.0 * SHARE) + CLOSE
             at = np.full(len(most), -1)
             at[group[rows]] = np.arange(len(rows))
             other = np.flatnonzero(~known & (at[group] >= 0))

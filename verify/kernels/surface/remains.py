@@ -7,6 +7,10 @@ the distance from above, and cubes farther off are passed over. Other cubes are 
 [Land1960]. A cube that nothing settles counts as gone when its side is below ``LEAST_SIDE`` or ``FILM`` of its
 distance. So a distance is too small by rounding at most. It is too large by ``CLOSE`` or ``SHARE`` of it, or where all
 that is left nearer is thinner than such a cube.
+
+A side of a tool that runs along a face of the part, from within, would have cubes parted all over that face: half of
+each is outside the part, and half in the sweep. Where the part meets a cube in one plane only, its half of the cube is
+convex, and so is the distance to a sweep. So that half is gone where its corners are.
 """
 
 from __future__ import annotations
@@ -76,19 +80,97 @@ def fill_pieces(chosen, count, moves: MoveArrays, axes: AxisArrays, cutters, rea
 
 
 @njit(**KERNEL)
+def _carried(x, y, z, row, k, cutters):
+    """Signed distance of a point to one sweep."""
+    qx, qy, qz, dx, dy, dz = view(row, x, y, z)
+    r = cutters[k, 1]
+    return carried(qx, qy, qz, dx, dy, dz, cutters[k, 0] - r, r, cutters[k, 2], cutters[k, 3])
+
+
+@njit(**KERNEL)
 def _swept(x, y, z, enough, rows, tool, cutters):
     """Least signed distance of a point to the sweeps; the search ends at ``enough`` or below."""
     least = np.inf
     for j in range(len(rows)):
-        k = tool[j]
-        qx, qy, qz, dx, dy, dz = view(rows[j], x, y, z)
-        r = cutters[k, 1]
-        d = carried(qx, qy, qz, dx, dy, dz, cutters[k, 0] - r, r, cutters[k, 2], cutters[k, 3])
+        d = _carried(x, y, z, rows[j], tool[j], cutters)
         if d < least:
             least = d
             if least <= enough:
                 break
     return least
+
+
+@njit(**KERNEL)
+def _deepest(x, y, z, rows, tool, cutters):
+    """Row of the sweep with the least signed distance to a point."""
+    least, found = np.inf, -1
+    for j in range(len(rows)):
+        d = _carried(x, y, z, rows[j], tool[j], cutters)
+        if d < least:
+            least, found = d, j
+    return found
+
+
+@njit(**KERNEL)
+def _apart(t, x, y, z, half):
+    """Whether a facet (3, 3) is known not to meet a cube: a side of the cube or the facet's plane parts them."""
+    for c, m in ((0, x), (1, y), (2, z)):
+        if min(t[0, c], t[1, c], t[2, c]) > m + half or max(t[0, c], t[1, c], t[2, c]) < m - half:
+            return True
+    ux, uy, uz = t[1, 0] - t[0, 0], t[1, 1] - t[0, 1], t[1, 2] - t[0, 2]
+    vx, vy, vz = t[2, 0] - t[0, 0], t[2, 1] - t[0, 1], t[2, 2] - t[0, 2]
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    return abs((x - t[0, 0]) * nx + (y - t[0, 1]) * ny + (z - t[0, 2]) * nz) > half * (abs(nx) + abs(ny) + abs(nz))
+
+
+@njit(**KERNEL)
+def _one_plane(tree: TreeArrays, x, y, z, half, a, normal, slack, stack):
+    """Whether all facets that may meet the cube round a point lie within ``slack`` mm of the plane through a."""
+    stack[0], depth = 0, 1
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        low, high = tree.lower[node], tree.upper[node]
+        if (low[0] > x + half or high[0] < x - half or low[1] > y + half or high[1] < y - half
+                or low[2] > z + half or high[2] < z - half):
+            continue
+        c = tree.child[node]
+        if c >= 0:
+            stack[depth], stack[depth + 1] = c, c + 1
+            depth += 2
+            continue
+        for k in range(tree.first[node], tree.first[node] + tree.size[node]):
+            t = tree.corners[k]
+            if _apart(t, x, y, z, half):
+                continue
+            for i in range(3):
+                off = ((t[i, 0] - a[0]) * normal[0] + (t[i, 1] - a[1]) * normal[1] + (t[i, 2] - a[2]) * normal[2])
+                if abs(off) > slack:
+                    return False
+    return True
+
+
+@njit(**KERNEL)
+def _corners_gone(x, y, z, half, a, normal, slack, row, k, cutters):
+    """Whether a sweep holds, but for ``slack`` mm, the half of a cube behind the plane through a."""
+    height = np.empty(8)
+    for i in range(8):
+        cx, cy, cz = x + (half if i & 1 else -half), y + (half if i & 2 else -half), z + (half if i & 4 else -half)
+        height[i] = (cx - a[0]) * normal[0] + (cy - a[1]) * normal[1] + (cz - a[2]) * normal[2]
+        if height[i] <= 0.0 and _carried(cx, cy, cz, row, k, cutters) > slack:
+            return False
+    for i in range(8):
+        for bit in (1, 2, 4):
+            j = i | bit
+            if j == i or (height[i] <= 0.0) == (height[j] <= 0.0):
+                continue
+            f = height[i] / (height[i] - height[j])  # where the edge from i to j meets the plane
+            cx = x + (half if i & 1 else -half) + (2.0 * half * f if bit == 1 else 0.0)
+            cy = y + (half if i & 2 else -half) + (2.0 * half * f if bit == 2 else 0.0)
+            cz = z + (half if i & 4 else -half) + (2.0 * half * f if bit == 4 else 0.0)
+            if _carried(cx, cy, cz, row, k, cutters) > slack:
+                return False
+    return True
 
 
 @njit(**KERNEL)
@@ -131,8 +213,8 @@ def distance_left(px, py, pz, within, tree: TreeArrays, normals, rows, tool, cut
         swept = _swept(x, y, z, -rho, rows, tool, cutters)
         if swept <= -rho:
             continue
-        d2, _ = nearest_row(tree.lower, tree.upper, tree.child, tree.first, tree.size, tree.corners, x, y, z, np.inf,
-                            stack)
+        d2, facet = nearest_row(tree.lower, tree.upper, tree.child, tree.first, tree.size, tree.corners, x, y, z,
+                                np.inf, stack)
         off = math.sqrt(d2)
         inside = _inside(tree, normals, x, y, z)
         if not inside and off >= rho:
@@ -144,8 +226,20 @@ def distance_left(px, py, pz, within, tree: TreeArrays, normals, rows, tool, cut
                 return best
             if min(swept, off) >= rho:
                 continue
-        if 2.0 * half <= max(LEAST_SIDE, FILM * gap) or depth + 8 > len(cubes):
+        film = max(LEAST_SIDE, FILM * gap)
+        if 2.0 * half <= film or depth + 8 > len(cubes):
             continue
+        if swept <= 0.5 * film + rho and off < rho:
+            a = tree.corners[facet, 0]
+            n = np.cross(tree.corners[facet, 1] - a, tree.corners[facet, 2] - a)
+            size = math.sqrt(n[0] ** 2 + n[1] ** 2 + n[2] ** 2)
+            if size > 0.0:
+                n /= size
+                if _one_plane(tree, x, y, z, half, a, n, 0.25 * film, stack):
+                    d = 0.5 * half
+                    j = _deepest(x - d * n[0], y - d * n[1], z - d * n[2], rows, tool, cutters)
+                    if j >= 0 and _corners_gone(x, y, z, half, a, n, 0.25 * film, rows[j], tool[j], cutters):
+                        continue
         # eight children, the nearest last, so that it comes first
         quarter = 0.5 * half
         sx, sy, sz = (1.0 if px > x else -1.0), (1.0 if py > y else -1.0), (1.0 if pz > z else -1.0)
@@ -164,7 +258,7 @@ def distances_left(points, within, tree: TreeArrays, normals, moves: MoveArrays,
                    chosen, enough, out):
     """out[i] = ``distance_left`` of points[i] within within[i], inf where nothing is left there.
 
-    points : (n, 3) float64, mm, setup frame; within : (n,) float64, mm
+    points : (n, 3) float64, mm, setup frame; within, enough : (n,) float64, mm
     chosen : (c,) int64, index, feed moves that may come near
     """
     near, cubes, stack = np.empty(len(chosen), np.int64), np.empty((CUBES, 4)), np.empty(128, np.int64)
@@ -173,4 +267,4 @@ def distances_left(points, within, tree: TreeArrays, normals, moves: MoveArrays,
         far = math.sqrt(3.0) * within[i]
         count = near_moves(x, y, z, far, moves, axes, reach, chosen, near)
         rows, tool = fill_pieces(near, count, moves, axes, cutters, reach, x, y, z, far)
-        out[i] = distance_left(x, y, z, within[i], tree, normals, rows, tool, cutters, enough, cubes, stack)
+        out[i] = distance_left(x, y, z, within[i], tree, normals, rows, tool, cutters, enough[i], cubes, stack)
