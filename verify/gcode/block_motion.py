@@ -228,8 +228,9 @@ class BlockMotion(FrameWords):
     def _cycle(self, axes: list[float | None], values: dict[str, float]) -> None:
         """Write a drilling cycle along the third axis of the plane as rapids and feeds [Kramer2000].
 
-        In a series, G98 returns to the height where the series began, and G91 counts R from it, as in LinuxCNC. The
-        move to the next hole climbs on its way where the last hole was left at R.
+        In a series, G98 returns to the height where the series began, and G91 counts R from it, as in LinuxCNC. Its
+        move to the next hole climbs on its way where the last hole was left at R. LinuxCNC goes up to R first where the
+        series begins below it. Fanuc and Haas go aside at the height where the tool stands, and G98 returns there.
         """
         s, error = self.s, self.log.error
         self._settled("a drilling cycle")
@@ -253,11 +254,12 @@ class BlockMotion(FrameWords):
             return None
         self.log.room(repeats * hole.moves)
         across = [None if axis == k else a for axis, a in enumerate(axes)]
-        if repeats and s.cycle["top"] + s.origin[k] < hole.clear != here[k]:
+        if self.control is None and repeats and s.cycle["top"] + s.origin[k] < hole.clear != here[k]:
             self._line_to([hole.clear if axis == k else p for axis, p in enumerate(here)], RAPID, NAN)
         for _ in range(repeats):
             at = self._target(across)
-            at[k] = at[k] if at[k] > hole.clear else hole.back
+            if self.control is None:
+                at[k] = at[k] if at[k] > hole.clear else hole.back
             self._check_cutting(at)
             for point, kind in hole_moves(hole, at, k):
                 self._line_to(point, kind, feed if kind == FEED else NAN)
@@ -297,7 +299,8 @@ class BlockMotion(FrameWords):
         out = _EXITS.get(int(s.motion or 0), HoleExit.RAPID)
         if s.motion in (74, 84) and self.control is None:  # LinuxCNC feeds a tap all the way up
             out = HoleExit.FEED
-        return Hole(clear, bottom, clear if s.retract_to_r else max(top, clear), peck, s.motion == 83, out)
+        back = clear if s.retract_to_r else top if self.control is not None else max(top, clear)
+        return Hole(clear, bottom, back, peck, s.motion == 83, out)
 
 
 def _length(start: F64, end: F64, centre: F64, sweep: float, axes: tuple[int, int, int]) -> float:

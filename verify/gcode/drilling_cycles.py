@@ -57,7 +57,7 @@ class Hole:
 def hole_moves(hole: Hole, over: list[float], axis: int) -> Iterator[tuple[list[float], int]]:
     """Targets (x, y, z) in mm and kinds of the moves over the hole, down, and back.
 
-    over : (3,) mm, place above the hole where the tip arrives, not below ``hole.clear`` along ``axis``
+    over : (3,) mm, place above the hole where the tip arrives; Fanuc and Haas may arrive below ``hole.clear``
     axis : 0, 1 or 2, the drilling axis
 
     Notes
