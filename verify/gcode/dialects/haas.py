@@ -2,7 +2,7 @@
 
 G234 is tool centre point control, G154 P a work offset, G187 smoothness (E: its bound), G101 and G100 mirror. A whole P
 of G04 and of cycles counts ms, one with a decimal point s. F without a decimal point is refused like a coordinate. G28
-cancels the length offset. M16 is M6. I of a peck cycle is its first peck, and L the number of holes.
+cancels the length offset. M16 is M6. M0 and M1 stop the spindle and the coolant. I of a peck cycle is its first peck, and L the number of holes.
 """
 
 from __future__ import annotations
@@ -68,6 +68,10 @@ class HaasReader(FanucReader):
         if code == 92.1:
             raise BlockError("unknown word G92.1: Haas ends a shift with another G92, or with G52")
         return super()._code(code, values)
+
+    def _translated(self, words: list[tuple[str, str]], deleted: bool) -> list[str]:
+        stops = any(a == "M" and float(b) in (0.0, 1.0) for a, b in words)
+        return [*super()._translated(words, deleted), *(["M5", "M9"] if stops else [])]
 
     def _after(self, codes: list[float]) -> list[str]:
         return ["G49"] if 28 in codes and 43 not in codes else []
