@@ -24,7 +24,7 @@ from verify.checks.empty_spindle import with_nose
 from verify.checks.program_assumptions import program_assumptions, rapids_decided
 from verify.checks.program_sequence import FramedProgram, Given, check_numbers, counted, moves_of, read_all, slides_of
 from verify.checks.repeated_passes import repeats
-from verify.checks.sideways_cuts import sideways_findings
+from verify.checks.sideways_cuts import sideways_findings, torn_threads
 from verify.checks.table_clearance import table_findings
 from verify.findings import (
     Source,
@@ -144,6 +144,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                 *table_findings([p.program for p in framed], tools, setup),
                 *_idle_findings(framed, run, moves, source, [t for t in fine if t.cone_height <= 0.0], asked),
                 *again, *sideways_findings(moves, run.cut, tools, source),
+                *torn_threads(moves, run.cut, tools, source),
                 *(box_findings(moves, slides, *dogleg_limits(part.mesh, moves, tools, setup), source)
                   if setup.dogleg else ()),
                 *engagement_findings(angle, stretches, of, source, setup.max_engaged), *unheld,

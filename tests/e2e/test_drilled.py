@@ -131,6 +131,13 @@ def test_a_drill_goes_neither_sideways_nor_at_rapid_into_stock(verify):
         next(f["message"] for f in verify(program(more=more))["findings"] if f["kind"] == "rapid")
 
 
+@pytest.mark.slow
+def test_a_tap_that_leaves_its_thread_at_rapid_is_found(verify):
+    report = verify(program().replace("G1 Z-9.0 F350\nZ2\n", "G81 X4 Y0 Z-9 R2 F350\nG80\n"))
+    assert kinds(report) == {"program": 1}
+    assert "T3 is a tap and leaves its thread at rapid" in report["findings"][0]["message"]
+
+
 def test_jobs_refuse_such_tools_by_name():
     with pytest.raises(SetupError) as caught:
         check_plannable(parse_setup(json.dumps(SETUP)))

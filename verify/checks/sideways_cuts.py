@@ -1,6 +1,6 @@
-"""Drills and taps that cut sideways: their lips and leads cut along the axis only.
+"""Drills and taps that cut sideways, and taps that leave their thread at rapid.
 
-Coordinates are in the setup frame, lengths in mm.
+Lips and leads cut along the axis only. A tap comes out of its thread at the pitch, so it feeds out. Coordinates are in the setup frame, lengths in mm.
 """
 
 from __future__ import annotations
@@ -24,15 +24,21 @@ def sideways_findings(moves: Moves, cut: NDArray[np.bool_], tools: Sequence[Tool
 
     cut : (m,) bool, whether each move removes stock
 
-    The depth of a finding is the way across the axis, mm.
+    The way across the axis counts from where the tool began to cut, so steps of 0.009 mm are a way too. It is the depth
+    of a finding, mm.
     """
     only = np.array([t.along_axis_only for t in tools], np.bool_)
     if not only.any() or not len(moves):
         return []
     axes = moves.axes or ToolAxes.upright(len(moves))
     way, up = moves.end - moves.start, axes.middle
+    cuts = moves.feed & cut & only[moves.tool]
+    begins = cuts.copy()
+    begins[1:] &= ~(cuts[:-1] & (moves.tool[1:] == moves.tool[:-1]) & (source.program[1:] == source.program[:-1]))
+    first = np.maximum.accumulate(np.where(begins, np.arange(len(moves)), 0))
+    way = np.where(cuts[:, None], moves.end - moves.start[first], way)
     aside = np.linalg.norm(way - np.einsum("ij,ij->i", way, up)[:, None] * up, axis=1)
-    bad = np.flatnonzero(moves.feed & cut & only[moves.tool] & ((aside > ASIDE) | (axes.angle > 0.0)))
+    bad = np.flatnonzero(cuts & ((aside > ASIDE) | (axes.angle > 0.0)))
     out, seen = [], set[tuple[int, int]]()
     for m in bad.tolist():
         key = (int(source.program[m]), int(source.line[m]))
@@ -46,4 +52,31 @@ def sideways_findings(moves: Moves, cut: NDArray[np.bool_], tools: Sequence[Tool
     return out
 
 
-__all__ = ["sideways_findings"]
+def torn_threads(moves: Moves, cut: NDArray[np.bool_], tools: Sequence[ToolBody], source: Source) -> list[Finding]:
+    """One finding for each line in which a tap that has just cut moves at rapid: the thread would be torn out.
+
+    cut : (m,) bool, whether each move removes stock
+
+    The depth of a finding is the way of the rapid, mm.
+    """
+    taps = np.array([t.kind == "tap" for t in tools], np.bool_)
+    if not taps.any() or len(moves) < 2:
+        return []
+    way = np.linalg.norm(moves.end - moves.start, axis=1)
+    same = (moves.tool[1:] == moves.tool[:-1]) & (source.program[1:] == source.program[:-1])
+    bad = 1 + np.flatnonzero(taps[moves.tool[:-1]] & same & moves.feed[:-1] & cut[:-1] & ~moves.feed[1:]
+                             & (way[1:] > ASIDE))
+    out, seen = [], set[tuple[int, int]]()
+    for m in bad.tolist():
+        key = (int(source.program[m]), int(source.line[m]))
+        if key in seen:
+            continue
+        seen.add(key)
+        x, y, z = (round(float(v), 6) for v in moves.start[m])
+        out.append(Finding(FindingKind.PROGRAM, source.names[key[0]], key[1], None, None, (x, y, z), float(way[m]), 0.0,
+                           f"T{source.tool[m]} is a tap and leaves its thread at rapid; it feeds out as it fed in",
+                           tip=(x, y, z)))
+    return out
+
+
+__all__ = ["sideways_findings", "torn_threads"]

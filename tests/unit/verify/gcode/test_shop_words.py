@@ -260,3 +260,21 @@ def test_a_shift_that_is_left_is_told(dialect):
     ("haas", "G61\n", False), ("haas", "G1 X1. F100.\nG187 E0.005\n", True), ("fanuc", "G1 X1. F100.\nG61\n", True)])
 def test_a_path_mode_counts_from_its_word_on(dialect, words, free):
     assert read(f"{words}G1 X5. Y5. F100.\n", dialect).unbounded is free
+
+
+@pytest.mark.parametrize(("dialect", "heights"), [("fanuc", [5, 12, 5]), ("haas", [5, 12, 5]),
+                                                  ("linuxcnc", [12, 12, 12, 12])])
+def test_a_cycle_that_begins_below_r_goes_aside_where_the_control_does(dialect, heights):
+    # Fanuc and Haas go aside first; LinuxCNC goes up to R first
+    p = read("G0 Z5.\nG98 G82 X20. Y0. Z2. R12. F100.\nG80\n", dialect)
+    rapids = p.end[(p.line == 9) & (p.kind != FEED)]
+    assert rapids[:, 2].tolist() == heights, rapids
+    assert rapids[0, 0] == (0.0 if dialect == "linuxcnc" else 20.0)
+
+
+@pytest.mark.parametrize(("dialect", "stands"), [("haas", True), ("fanuc", False), ("linuxcnc", False)])
+@pytest.mark.parametrize("word", ["M0", "M01"])
+def test_the_spindle_stands_after_a_stop_of_haas(dialect, stands, word):
+    for again in ("", "M3\n"):
+        p = read(f"{word}\n{again}G1 X1. F100.\n", dialect)
+        assert any("spindle standing" in r.message for r in p.remarks) == (stands and not again)

@@ -9,7 +9,7 @@ import pytest
 
 from geometry.errors import ProgramError, VerificationError
 from tests.heidenhain_pairs import PAIRS
-from tests.program_pairs import NAMES, RADII, apart, read, same_feeds
+from tests.program_pairs import HEIDENHAIN, NAMES, RADII, apart, read, same_feeds
 from verify.gcode.dialects.heidenhain import heidenhain_flow
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
@@ -213,3 +213,12 @@ def test_case_files_are_read():
         turn = np.radians([5.0, 10.0])
         assert np.allclose(p.poses.end_turn[-1], turn) and p.end[-1].tolist() == [20.0, 5.0, 40.0]
         assert np.allclose(p.poses.end_axis[-1], Kinematics(kind).axis(turn[None])[0]), letters
+
+
+@pytest.mark.parametrize("word", ["M0", "M1", "M6"])
+def test_a_stop_ends_the_spindle_too(word):
+    head = "TOOL CALL 1 Z S1000\nL X+0 Y+0 Z+0 R0 FMAX M3\n"
+    stopped = read(f"{head}L X+5 F100 {word}\nL X+10\n", "heidenhain")
+    assert [r.line for r in stopped.remarks if "spindle standing" in r.message] == [len(HEIDENHAIN) + (3 if word == "M6" else 4)]
+    again = read(f"{head}L X+5 F100 {word}\nM3\nL X+10\n", "heidenhain")
+    assert not [r for r in again.remarks if "spindle standing" in r.message]
