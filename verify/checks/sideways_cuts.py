@@ -1,6 +1,7 @@
 """Drills and taps that cut sideways, and taps that leave their thread at rapid.
 
-Lips and leads cut along the axis only. A tap comes out of its thread at the pitch, so it feeds out. Coordinates are in the setup frame, lengths in mm.
+Lips and leads cut along the axis only. A tap comes out of its thread at the pitch, so it feeds out. Coordinates are in
+the setup frame, lengths in mm.
 """
 
 from __future__ import annotations
