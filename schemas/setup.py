@@ -225,6 +225,8 @@ class Operations(WireModel):
             raise ValueError("operations.roughing and operations.finishing are both false: nothing to do")
         if self.semi_finishing and not self.roughing:
             raise ValueError("operations.semi_finishing needs operations.roughing, which is false")
+        if self.faces is not None and not self.faces:
+            raise ValueError("operations.faces names no face: name one, or leave the field out for all of them")
         if both := sorted(set(self.faces or ()) & set(self.exclude_faces)):
             raise ValueError(f"faces {', '.join(both)} are in operations.faces and in operations.exclude_faces")
         return self

@@ -119,6 +119,7 @@ def test_a_tool_that_leaves_lengths_out_is_straight():
     (setup(fixtures=[{"box_mm": [[0, 0, 2], [1, 1, 1]]}]), "above the first"),
     (setup(placement={"z_axis": [0, 0, 0]}), "zero length"), (setup(placement={"x_axis": [0, 1, 1]}), "right angles"),
     (setup(operations={"roughing": False, "finishing": False}), "nothing to do"),
+    (setup(operations={"faces": []}), "names no face"),
     (setup(operations={"roughing": False, "semi_finishing": True}), "needs operations.roughing"),
     (setup(operations={"lean": {"tilt_deg": 15}}), "set machine.kind '5-axis'"),
     (setup(operations={"lean": {"tilt_deg": 15}}, machine={**FIVE, "simultaneous": False}), "5-axis"),
