@@ -105,6 +105,11 @@ def test_descents_and_end_regions():
     assert end_radii([TOOL]).tolist() == [2.0]
     wide = ProofSetup(ramp_angle=np.radians(3), ramp_angles={TOOL.number: np.radians(50)})
     assert descents(moves, [TOOL, TOOL], wide)[0].tolist() == [True, False, False, False, True]
+    plunges = ProofSetup(ramp_angle=np.radians(3), ramp_angles={TOOL.number: np.radians(90)})
+    assert not descents(moves, [TOOL, TOOL], plunges)[0].any()
+    hollow = replace(plunges, cores={TOOL.number: 1.0})
+    assert descents(moves, [TOOL, TOOL], hollow)[0].any()
+
 
 
 def test_nearest_point_of_a_triangle():

@@ -5,6 +5,7 @@ Tables of events are float64 rows (move, code, depth, clearance, x, y, z), mm, i
 
 from __future__ import annotations
 
+import math
 import queue
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,6 +28,7 @@ TAP_CORE = 0.75  # radii: what is nearer to the axis of a tap, the hole must hav
 PRESSED = 0.01  # diameters: a hollow end takes a stub that high
 SAME = 1e-6  # mm, and rad: closer ends of moves and axes are the same
 BESIDE = 5e-3  # mm: chords of two passes over one wall, and the decimals of their programs, differ by no more
+UPRIGHT = 0.5 * math.pi - 1e-9  # rad: a ramp that goes straight down
 Spare = queue.SimpleQueue[NDArray[np.int64]]
 
 
@@ -37,7 +39,7 @@ def descents(moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
     ways : of the moves; None: unknown, and then every way counts as if it were in the cut
 
     Down is along the tool axis, for a turning tool along its axis half way. Moves of tools that cut straight down do
-    not count.
+    not count, nor those of mills that cut to their centre and whose ramp angle is a right angle.
 
     Returns
     -------
@@ -53,14 +55,17 @@ def descents(moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
     if not len(moves):
         return np.zeros(0, np.bool_), np.zeros(0)
     d = moves.end - moves.start
-    slope = np.tan([setup.ramp_angles.get(t.number, setup.ramp_angle) for t in tools])[moves.tool]
+    angle = np.array([setup.ramp_angles.get(t.number, setup.ramp_angle) for t in tools])
+    slope = np.tan(angle)[moves.tool]
     if moves.axes is None:
         rise, aside = d[:, 2], np.hypot(d[:, 0], d[:, 1])
     else:
         up = moves.axes.middle
         rise = np.einsum("ij,ij->i", d, up)
         aside = np.linalg.norm(d - rise[:, None] * up, axis=1)
-    steep = moves.feed & (-rise > aside * slope + 1e-9) & ~np.array([t.cuts_down for t in tools])[moves.tool]
+    whole = np.array([t.number not in setup.cores for t in tools])  # cuts to its centre
+    straight = np.array([t.cuts_down for t in tools]) | (whole & (angle >= UPRIGHT))
+    steep = moves.feed & (-rise > aside * slope + 1e-9) & ~straight[moves.tool]
     pays = aside * slope
     if ways is not None:
         pays = np.minimum(aside * ways.share * slope, ways.depth)
