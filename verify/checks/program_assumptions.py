@@ -33,11 +33,12 @@ def rapids_decided(read: Sequence[FramedProgram], setup: ProofSetup) -> tuple[li
     """Programs and setup with the path of rapids by dialect, where the setup does not state one.
 
     Tool centre point control needs straight rapids (on Fanuc parameter 1401#1 LRP 1), so programs that turn rotary axes
-    count as run on a control that is set so.
+    count as run on a control that is set so. A word of the program (RTLIOF of Siemens) counts before the setup.
     """
-    if setup.dogleg is not None:
+    told = any(r.program.own_speed for r in read)
+    if setup.dogleg is not None and (setup.dogleg or not told):
         return list(read), setup
-    own = any(r.program.dialect in OWN_SPEED_RAPIDS and r.program.poses is None for r in read)
+    own = told or any(r.program.dialect in OWN_SPEED_RAPIDS and r.program.poses is None for r in read)
     return [replace(r, setup=replace(r.setup, dogleg=own)) for r in read], replace(setup, dogleg=own)
 
 

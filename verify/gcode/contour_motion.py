@@ -150,6 +150,9 @@ class ContourMotion(Origins):
             if "D" not in values:
                 raise BlockError(f"G{word:g} needs D, the diameter of the tool")
             return values["D"] * s.scale / 2
+        if "D" not in values and s.d is None and self.style is not LINUXCNC_STYLE:
+            self.log.remark("no_radius_offset", f"G{word:g} without D: the control takes the D that it had before the "
+                            "program, or none", s.tool)
         if "D" in values or s.d is None or self.style is LINUXCNC_STYLE:
             s.d = int(values["D"]) if "D" in values else s.tool
         written = self._written_radius(s.d, self.radii.get(s.tool))

@@ -88,7 +88,8 @@ class Reader(BlockMotion):
                        dialect, log.unbounded, tuple(log.pauses), log.leaves, tuple(log.places), cut_off,
                        open=() if self.control is None else tuple(self.control.assumed), cools=log.cools,
                        dwells=tuple(log.dwells), swaps=tuple(log.swaps), unplaced=tuple(log.unplaced),
-                       by_joints=frozenset(log.by_joints))
+                       by_joints=frozenset(log.by_joints),
+                       own_speed=self.control is not None and self.control.own_speed)
 
     def served(self, key: int | str) -> float:
         """A parameter that the control serves (``verify.gcode.flow.system_parameters``)."""

@@ -150,6 +150,7 @@ class Program:
     coolant : (m,) bool
     changes : number of times that a tool left the spindle
     dialect : dialect of the text
+    own_speed : whether a word of the program makes each axis go at its own speed in a rapid
     unbounded : whether, somewhere, no word bounds the deviation from the path: ``leaves`` does not hold there
     pauses  : in order
     """
@@ -188,6 +189,7 @@ class Program:
     swaps: tuple[Swap, ...] = ()
     unplaced: tuple[int, ...] = ()
     by_joints: frozenset[int] = frozenset()
+    own_speed: bool = False
 
     def __len__(self) -> int:
         return len(self.start)

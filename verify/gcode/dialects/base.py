@@ -59,6 +59,7 @@ class DialectReader:
               come after it
     assumed : what lines leave to the control, each kind once
     names   : T numbers by the names (ids) of the tools of the setup
+    own_speed : whether a word has made each axis go at its own speed in a rapid
     """
 
     style: Style = FANUC_STYLE
@@ -69,6 +70,7 @@ class DialectReader:
     bounds_path = True
     home_from: int | None = None
     gives_up_length = False
+    own_speed = False
 
     def __init__(self) -> None:
         self.notes: list[str] = []

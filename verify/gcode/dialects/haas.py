@@ -2,8 +2,8 @@
 
 G234 is tool centre point control, G154 P a work offset, G187 smoothness (E: its bound), G101 and G100 mirror. A whole P
 of G04 and of cycles counts ms, one with a decimal point s. F without a decimal point is refused like a coordinate. G28
-cancels the length offset. M16 is M6. M0 and M1 stop the spindle and the coolant. I of a peck cycle is its first peck, and
-L the number of holes.
+cancels the length offset. M16 is M6. M0 and M1 stop the spindle and the coolant. I of a peck cycle is its first peck,
+and L the number of holes.
 """
 
 from __future__ import annotations

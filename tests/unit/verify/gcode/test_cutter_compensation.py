@@ -118,6 +118,13 @@ def test_which_radius(body, radius):
     assert any("radius D3 with tool T10" in r.message for r in p.remarks) == ("D3" in body)
 
 
+@pytest.mark.parametrize(("dialect", "told"), [("fanuc", True), ("haas", True), ("linuxcnc", False)])
+def test_no_register_in_the_program_is_a_finding_where_the_control_keeps_one(dialect, told):
+    for first, word in (("", "G41"), ("", "G42"), ("G41 D10 X0. Y0. F800.\nX40.\nG40 Y20.\n", "G41")):
+        p = read(f"{first}{word} X0. Y-30. F800.\nX40.\nG40 Y20.\n", dialect=dialect)
+        assert any("without D" in r.message for r in p.remarks) == (told and not first)
+
+
 def test_a_register_that_is_no_tool_s_and_no_habit_is_a_finding():
     assert any("radius D11 with tool T10" in r.message for r in read("G41 D11 X0. Y0. F800.\nG40 X9.\n").remarks)
 

@@ -264,7 +264,7 @@ class SiemensReader(SiemensMoves):
             line.centre[letter] = (number, "")
             return None
         if letter in "FS":
-            line.values[letter] = number
+            line.values[letter] = self._held(letter, number, line)
             return None
         if letter == "H" or letter == "N":
             return None
@@ -278,6 +278,10 @@ class SiemensReader(SiemensMoves):
         if letter == "T":
             return self._select(n, line)
         return self._edge(n, line)
+
+    def _held(self, letter: str, number: float, line: Line) -> float:
+        """The number of an F or S word; a speed is held to that of G26, but for words that are no speed."""
+        return number if letter == "F" or {4, 25, 26} & set(line.codes) else min(number, self.top_speed)
 
     def _place(self, letter: str, number: float, kind: str, line: Line) -> None:
         if letter in line.places:
@@ -383,10 +387,8 @@ class SiemensReader(SiemensMoves):
             return self._place(name, number, kind, line)
         if name in ("I", "J", "K"):
             line.centre[name] = (number, kind)
-        elif name in ("F", "S"):
-            line.values[name] = number
-        elif name == "S1":
-            line.values["S"] = number
+        elif name in ("F", "S", "S1"):
+            line.values[name[0]] = self._held(name[0], number, line)
         elif name in ("M", "M1") and number == int(number) and number >= 0:
             self._m(int(number), line)
         elif name == "G" and number == int(number) and number >= 0:
@@ -411,6 +413,8 @@ class SiemensReader(SiemensMoves):
             line.frame = word
         elif word in COMPRESSORS:
             line.values["COMPRESS"] = 1.0
+        elif word == "RTLIOF":
+            self.own_speed = True
         elif word in CURVES:
             self.motion = word
         elif word in ("TRAORI", "TRAFOOF"):

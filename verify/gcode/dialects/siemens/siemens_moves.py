@@ -53,6 +53,7 @@ class SiemensMoves(SiemensCorners):
         self.motion: int | str | None = None
         self.tolerance: float | None = None
         self.rounding: float | None = None
+        self.top_speed = math.inf  # 1/min, of G26 S
         self.cycle: DrillingCall | None = None
         self.end = [math.nan] * 3
 
@@ -229,6 +230,9 @@ class SiemensMoves(SiemensCorners):
             return self._dwell(line)
         head = [" ".join([*line.out, *self._rates(line)])] if line.out else []
         if codes & {25, 26}:
+            if 26 in codes and "S" in line.values:
+                self.top_speed = line.values["S"]
+                head += [f"S{digits(self.top_speed)}"] if self.machine.s.speed > self.top_speed else []
             return head
         if pole := codes & {110, 111, 112}:
             if line.values.keys() & {"AP", "RP"}:

@@ -31,9 +31,9 @@ MOVES = {5: "an oblique plunge", 7: "an oblique plunge", 33: "thread cutting", 3
 
 IDLE = frozenset("""
     ACTBLOCNO BLSYNC BRISK CDOF CDOF2 CDON CFC CFIN CFTCP COMPOF CORROF CP CPRECOF CPRECON CUT2D CUT2DF
-    DELAYFSTOF DELAYFSTON DIAM90 DIAMOF DIAMON DISPLOF DISPLON DRIVE DYNFINISH DYNNORM DYNPOS DYNPREC DYNROUGH
+    DELAYFSTOF DELAYFSTON DIAMOF DISPLOF DISPLON DRIVE DYNFINISH DYNNORM DYNPOS DYNPREC DYNROUGH
     DYNSEMIFIN FCUB FFWOF FFWON FIFOCTRL FLIN FNORM FTOCOF GWPSOF IPTRLOCK IPTRUNLOCK NORM ORIRESET OSC OSD OSOF
-    OSS OSSE OST PAROTOF RTLIOF RTLION SAVE SBLOF SBLON SOFT SPATH SPCOF SPCON STARTFIFO STOPFIFO STOPRE SUPD
+    OSS OSSE OST PAROTOF RTLION SAVE SBLOF SBLON SOFT SPATH SPCOF SPCON STARTFIFO STOPFIFO STOPRE SUPD
     TOROTOF TOWSTD UPATH WALIMOF WALIMON""".split())
 """Words that change speed, smoothing, display or the flow of blocks only."""
 
@@ -72,6 +72,7 @@ NOT_FOLLOWED = {
 """Cycles and functions that move, turn or cut and are not followed, and what they do."""
 
 REFUSED = {
+    **_named("X by the diameter", "DIAMON DIAM90"),
     **_named("a spline", "ASPLINE BSPLINE CSPLINE"), **_named("a polynomial", "POLY PO"),
     **_named("an involute", "INVCW INVCCW"),
     **_named("another approach of cutter radius compensation", "KONT KONTT KONTC"), **_named("an allowance", "OFFN"),

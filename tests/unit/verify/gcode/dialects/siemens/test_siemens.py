@@ -12,7 +12,7 @@ from tests.program_pairs import NAMES, RADII, apart, read, same_feeds
 from tests.siemens_pairs import PAIRS
 from verify.gcode.dialects import dialect_of
 from verify.gcode.dialects.siemens import siemens_flow
-from verify.gcode.reader import read_program
+from verify.gcode.reader import FEED, read_program
 from verify.kinematics import Kinematics
 
 CASES = Path(__file__).resolve().parents[7] / "shared" / "cases"
@@ -180,3 +180,20 @@ def test_case_files_are_read():
     q = read_program(text, dialect="siemens", kinematics=Kinematics("table-table-AC"), tools={1})
     axis = np.array([0.0152, -0.0858, 0.9962])
     assert np.allclose(q.poses.end_axis[-1], axis / np.linalg.norm(axis)) and q.end[-1].tolist() == [20.0, 5.0, 40.0]
+
+
+def test_a_limit_of_the_spindle_holds_before_and_behind_it():
+    for opening in ("G26 S20\nS6000 M3\n", "S6000 M3\nG26 S20\n"):
+        p = read(f"{opening}G1 X5 F100\nS10\nX10\nG4 S100\nG26 S500\nS400\nX15\n", "siemens")
+        assert p.speed[p.kind == FEED].tolist() == [20.0, 10.0, 400.0]
+
+
+def test_rapids_of_their_own_speed_are_told():
+    assert read("RTLIOF\nG0 X5 Y9\n", "siemens").own_speed
+    assert not read("RTLION\nG0 X5 Y9\n", "siemens").own_speed
+
+
+@pytest.mark.parametrize("word", ["DIAMON", "DIAM90"])
+def test_diameters_are_refused(word):
+    with pytest.raises(ProgramError, match="diameter"):
+        read(f"{word}\nG1 X5 F100\n", "siemens")
