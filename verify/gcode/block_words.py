@@ -190,6 +190,8 @@ def _add(block: Block, letter: str, digits: str, rotary: str, further: Collectio
         block.idle = True
         if number in USER_M:
             block.functions.append(int(number))
+        elif number == 19:
+            block.ms.append(19)
         return
     if letter not in "XYZABCIJKRPQLFSTHDM@^" and not (letter == "E" and block.idle):
         raise BlockError(f"unknown word {letter}{digits}")

@@ -132,7 +132,7 @@ class Modes(ToolChanges):
             s.spindle = True
         if 4 in ms:
             self.log.remark("m4", "M4 turns the spindle backwards")
-        if 5 in ms:  # LinuxCNC stops the spindle before the motion of the block
+        if 5 in ms or 19 in ms:  # LinuxCNC stops or orients the spindle before the motion of the block
             s.spindle = False
 
     def _mode(self, g: float, values: dict[str, float]) -> None:

@@ -29,7 +29,9 @@ _FOREIGN: dict[str, frozenset[float]] = {
     "M": frozenset({70, 71, 72, 73}), "G": frozenset({59.1, 59.2, 59.3, 92.2, 92.3})}
 ROUNDING = "parameters of the machine set how far the control rounds corners: the error bound does not include it"
 _PLACES = "XYZABCIJKRUVW"
-_KNOWN_M = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30})
+ORIENTS = 19
+"""The M word that stops the spindle at an angle; Haas gives the angle as P or R."""
+_KNOWN_M = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, ORIENTS, 30})
 IDLE_G: frozenset[float] = frozenset({9, 13.1, 22, 23, 25, 26, 40.1, 50.2, 62, 63, 67, 69.1, 94.1, 97, 113})
 """G words without effect on a move: exact stop, modes of tapping and cutting, stroke checks, ends of modes."""
 SMOOTHING: frozenset[float] = frozenset({5, 5.1, 5.4, 8, 64, 61.1})
@@ -96,8 +98,10 @@ class FanucReader(FanucPlanes):
         if "".join(a + b for a, b in words) != text:
             raise BlockError(f"cannot read '{text[:60]}'")
         words = [(a, b) for a, b in words if not (a == "M" and self._idle_m(b))]
+        cycle = self.hole or any(a == "G" and 73 <= float(b) <= 89 and float(b) != 80 for a, b in words)
         for letter, digits in words:
-            self._check(letter, digits)
+            if not (cycle and letter == "K"):  # the number of holes
+                self._check(letter, digits)
         if len(ms := [b for a, b in words if a == "M"]) > 1:
             self._several(ms)
         return self._translated(words, deleted is not None)
@@ -161,8 +165,7 @@ class FanucReader(FanucPlanes):
             raise BlockError(f"{letter}{digits} is a word of LinuxCNC with another meaning, or none, on {self.title}")
         if letter == "G" and number in REFUSED and not self._followed(number):
             raise BlockError(f"unknown word G{number:g} ({REFUSED[number]})")
-        if letter in _PLACES and "." not in digits and number != 0 and not (letter in "IJK" and (
-                self.vectors or letter == "K" and self.hole)):
+        if letter in _PLACES and "." not in digits and number != 0 and not (letter in "IJK" and self.vectors):
             raise BlockError(f"{letter}{digits} without a decimal point is {digits} or {number / 1000:g}, depending on "
                              "a parameter of the machine", "write the decimal point: X10. is 10 mm everywhere")
 
@@ -194,6 +197,8 @@ class FanucReader(FanucPlanes):
         """One word in the words of the reader; none where another word of the block includes it."""
         if letter == "G":
             return self._code(float(digits), values)
+        if letter in "MPR" and float(values.get("M", "0")) == ORIENTS:
+            return ["M5"] if letter == "M" else []
         if letter in "PX" and 4 in codes:
             seconds = float(digits) if letter == "X" or self._in_seconds(digits) else float(digits) / 1000.0
             return [f"P{seconds:.6f}"]

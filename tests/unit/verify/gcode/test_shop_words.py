@@ -278,3 +278,17 @@ def test_the_spindle_stands_after_a_stop_of_haas(dialect, stands, word):
     for again in ("", "M3\n"):
         p = read(f"{word}\n{again}G1 X1. F100.\n", dialect)
         assert any("spindle standing" in r.message for r in p.remarks) == (stands and not again)
+
+
+@pytest.mark.parametrize(("dialect", "word"), [("fanuc", "M19"), ("haas", "M19"), ("haas", "M19 P90"),
+                                               ("haas", "M19 R90."), ("linuxcnc", "M19 R0")])
+def test_a_spindle_that_takes_an_angle_stands(dialect, word):
+    for again in ("", "M3\n"):
+        p = read(f"{word}\n{again}G1 X1. F100.\n", dialect)
+        assert any("spindle standing" in r.message for r in p.remarks) == (not again)
+
+
+@pytest.mark.parametrize(("dialect", "word"), [("fanuc", "K3"), ("fanuc", "L3"), ("haas", "L3")])
+def test_the_number_of_holes_has_no_point(dialect, word):
+    p = read(f"G91 G99 G81 X5. Z-3. R-1. F100. {word}\nG80 G90\n", dialect)
+    assert p.end[p.kind == FEED][:, 0].tolist() == [5, 10, 15]

@@ -215,8 +215,9 @@ def test_case_files_are_read():
         assert np.allclose(p.poses.end_axis[-1], Kinematics(kind).axis(turn[None])[0]), letters
 
 
-@pytest.mark.parametrize(("word", "line"), [("M0", 4), ("M1", 4), ("M6", 3)])  # M6 acts before the move of its block
+@pytest.mark.parametrize(("word", "line"), [("M0", 4), ("M1", 4), ("M6", 3), ("M19", 3)])
 def test_a_stop_ends_the_spindle_too(word, line):
+    # M6 and M19 act before the move of their block
     head = "TOOL CALL 1 Z S1000\nL X+0 Y+0 Z+0 R0 FMAX M3\n"
     stopped = read(f"{head}L X+5 F100 {word}\nL X+10\n", "heidenhain")
     assert [r.line for r in stopped.remarks if "spindle standing" in r.message] == [len(HEIDENHAIN) + line]
