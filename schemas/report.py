@@ -154,7 +154,7 @@ class Assumption(ReportModel):
 
     what: Annotated[str, Field(
         description="dialect, travel, max_rpm, rotary_sense, gauge_length, holder, above_holder, table, rapid_path, "
-                    "path_mode, change_position, coolant or between_samples.", examples=["travel"])]
+                    "path_mode, change_position, coolant, cutting_force or between_samples.", examples=["travel"])]
     value: Annotated[str | float, Field(description="What the proof takes it to be.", examples=["long enough"])]
     effect: Annotated[str, Field(description="What may go wrong on a machine where it is otherwise.")]
     remedy: Annotated[str, Field(description="The field of the setup, or the words of the program, that state it.")]

@@ -17,6 +17,10 @@ def setup_assumptions(inputs: JobInputs) -> tuple[Assumed, ...]:
         out.append(Assumed(AssumedKind.MAX_RPM, "fast enough",
                            f"{', '.join(open_rpm)} may turn faster than spindle or tool allow",
                            "state machine.max_rpm, or max_rpm of each tool"))
+    if inputs.material.specific_cutting_force_n_mm2 is None:
+        out.append(Assumed(AssumedKind.CUTTING_FORCE, "small enough", "a tool may break or bend in a deep cut: the "
+                           f"proof knows no cutting force of {inputs.material.name}",
+                           "state specific_cutting_force_n_mm2 and chip_thickness_exponent of the material"))
     return tuple(out)
 
 

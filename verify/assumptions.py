@@ -23,6 +23,7 @@ class AssumedKind(StrEnum):
     PATH_MODE = "path_mode"
     CHANGE_POSITION = "change_position"
     COOLANT = "coolant"
+    CUTTING_FORCE = "cutting_force"
     BETWEEN_SAMPLES = "between_samples"
 
 
