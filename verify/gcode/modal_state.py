@@ -118,7 +118,13 @@ class Modes(ToolChanges):
                 self.pause(f"M{m}", s.tool)
         if 61 in ms:
             self._settled("M61")
-            s.tool = s.selected = int(values["Q"])
+            number = int(values["Q"])
+            # a stop right before it is for a change by hand
+            waited = any(p.event == "M0" and p.moves == self.log.count for p in self.log.pauses[-1:])
+            if self.loaded and s.tool not in (0, number) and not waited:
+                self.log.remark("m61", f"M61 says that T{number} is in the spindle, and T{s.tool} was put in: a tool "
+                                "change is missing", (s.tool, number))
+            s.tool = s.selected = number
             self.loaded = True
         if 6 in ms:
             self._settled("M6")

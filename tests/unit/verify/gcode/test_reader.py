@@ -277,3 +277,11 @@ def test_a_path_mode_after_the_first_cut_does_not_count_for_it():
     p = read_program("G21 G90 G17 G94 G54\nT1 M6\nS900 M3\nG43 H1\nG0 X0 Y0 Z5\nG1 Z1 F100\nG61 X5\nM2\n")
     assert [r.line for r in p.remarks] == [6]
     assert read_program("G21 G90\nG0 X0 Y0\nZ5\nM2\n").remarks == ()
+
+
+@pytest.mark.parametrize(("lines", "told"), [
+    ("T1 M6\nG43 H1\nM61 Q2\nG43 H2\n", True), ("M61 Q1\nG43 H1\n", False), ("T1 M6\nM61 Q1\nG43 H1\n", False),
+    ("T1 M6\nG43 H1\nM0\nM61 Q2\nG43 H2\n", False), ("T1 M6\nT0 M6\nM61 Q2\nG43 H2\n", False)])
+def test_a_number_of_a_tool_that_nobody_changed_is_a_finding(lines, told):
+    p = read_program(f"G21 G90 G94 G17 G54\n{lines}S1000 M3\nG0 X0 Y0 Z9\nG1 Z0 F99\nM2\n")
+    assert any("a tool change is missing" in r.message for r in p.remarks) == told
