@@ -12,7 +12,8 @@ BARE = {"name": "own", "cutting_speed_m_min": 90, "feed_per_tooth": [{"diameter_
 FORCE = {"specific_cutting_force_n_mm2": 700, "chip_thickness_exponent": 0.25}
 
 
-@pytest.mark.parametrize(("material", "told"), [("Ti-6Al-4V", False), ("C45", False), (BARE, True), (BARE | FORCE, False)])
+@pytest.mark.parametrize(("material", "told"), [("Ti-6Al-4V", False), ("C45", False), (BARE, True),
+                                                (BARE | FORCE, False)])
 def test_a_material_without_a_cutting_force(material, told):
     text = json.dumps({"tools": [{"id": "T1", "kind": "flat", "diameter_mm": 8}], "material": material})
     assumed = setup_assumptions(JobInputs.of(parse_setup(text)))
