@@ -11,6 +11,8 @@ PAIRS = {
                  "G1 X1\nM0"),
     "blanks of all kinds": ("BLK FORM 0.1 Z X-20 Y-20 Z-18\nBLK FORM 0.2 X+40 Y+35 Z+0\nBLK FORM CYLINDER Z R50 L100\n"
                             "BLK FORM ROTATION Z DIM_R LBL 1\nL X+1", "G1 X1"),
+    "no tilt": ("M129\nFUNCTION RESET TCPM\nCYCL DEF 19.0 WORKING PLANE\nCYCL DEF 19.1 A+0 B+0 C+0 F9999 ABST50\n"
+                "CYCL DEF 19.0 WORKING PLANE\nCYCL DEF 19.1\nL X+5 M129", "G1 X5"),
     "commas": ("L X+10,5 Y-3,25 F100", "G1 X10.5 Y-3.25 F100"),
     # arcs
     "round a centre": ("L X+10 Y+0\nCC X+15 Y+0\nC X+15 Y+5 DR-\nC IX+5 IY-5 DR- F99", "G1 X10 Y0\nG2 X15 Y5 I5 J0\n"

@@ -55,6 +55,9 @@ SHOPS = {
     "Windows file": ("fanuc", "%\r\nO1 (TEIL F\u00dcR M\u00dcLLER)\r\nN10 G21 G90 G17 G54\r\nN20 T1 M6\r\nN30 S900 "
                      "M3\r\nN40 G43 H1\r\nN50 G0 X0. Y0. Z5. (\u00d8 6)\r\nN60 G1 Z-1. F200.\r\nN70 M88\r\nN80 X5.\r\n"
                      "N90 M30\r\n%\r\n\x1a", "cp1252", "G0 X0 Y0 Z5\nG1 Z-1 F200\nX5\n"),
+    "tape with a leader": ("fanuc", "PART 12 / REV A\n\n%12\nO1\nG21 G90 G17 G54\nT1 M6 ; END MILL 6\nS900 M3\nG43 "
+                           "H1\nG0 X0. Y0. Z5.\n; next one\nG1 Z-1. F200.\nX5.\nM30\n%\n", "ascii",
+                           "G0 X0 Y0 Z5\nG1 Z-1 F200\nX5\n"),
     "smooth Siemens": ("siemens", "%_N_A_MPF\n;$PATH=/_N_WKS_DIR\nN10 G710 G17 G90 G94 G54 ; \u00d6l\nN20 "
                        "T=\"MILL_D10\"\nN30 M6\nN35 S900 M3\nN40 CYCLE832(0.005,1,0.005)\nN50 COMPCAD\nN60 SOFT\n"
                        "N70 FFWON\nN80 M77\nN90 G0 X0 Y0 Z5\nN100 G1 Z-1 F200\nN110 X5\nN120 COMPOF\nN130 M30\n",

@@ -78,6 +78,12 @@ PAIRS = {
     "fanuc ream": ("fanuc", "G98 G85 X5. Y5. Z-9. R2.\nX8.\nG80\nM30\n", "G98 G85 X5 Y5 Z-9 R2\nX8\nG80\n"),
     "fanuc row": ("fanuc", "G99 G81 X0. Y0. Z-3. R2. K0\nG91 X5. K3\nG90 G80\nM30\n",
                   "G99 G81 X5 Y0 Z-3 R2\nX10\nX15\nG80\n"),
+    "fanuc row at once": ("fanuc", "G91 G99 G81 X5. Y0. Z-5. R-3. K3\nG90 G80\nM30\n",
+                          "G99 G81 X5 Y0 Z-3 R2\nX10\nX15\nG80\n"),
+    "fanuc after cycles": ("fanuc", "G98 G81 X5. Y5. Z-3. R2.\nG80\nX0. Y0.\nG0 Z9.\nG83 X1. Z-3. R2. Q2.\nG82 X2. "
+                                    "P100\nG80 Z20.\nX4.\nM30\n",
+                           "G98 G81 X5 Y5 Z-3 R2\nG80\nG1 X0 Y0\nG0 Z9\nG98 G83 X1 Z-3 R2 Q2\nG82 X2 P0.1\nG80\n"
+                           "G0 Z20\nX4\n"),
     "fanuc rotation": ("fanuc", "G68 X10. Y0. R90.\nX20. Y0.\nX20. Y10.\nG3 X10. Y20. R10.\nG69\nG1 X0. Y0.\nM30\n",
                        "X10 Y10\nX0 Y10\nG3 X-10 Y0 R10\nG1 X0 Y0\n"),
     "fanuc rotated holes": ("fanuc", "G68 X0. Y0. R90.\nG98 G81 X5. Y0. Z-3. R2.\nX9.\nG80\nG69\nM30\n",
@@ -98,6 +104,9 @@ PAIRS = {
     "fanuc second offset": ("fanuc", "G55\nX1. Y1.\nG54\nX1.\nM30\n", "X31 Y1\nX1\n"),
     "fanuc wear": ("fanuc", "G10 L11 P1 R0.25\nG43 H1\nZ1.\nM30\n", "Z1.25\n"),
     "fanuc ends": ("fanuc", "X1.\nM98 P7\nM99\nO7\nX2.\nM99\n", "X1\nX2\n"),
+    "haas after a cycle": ("haas", "G0 Z9.\nG99 G84 X5. Y5. Z-3. R2. J2\nG80\nZ20.\nX0.\nM30\n",
+                           "G0 Z9\nG99 G84 X5 Y5 Z-3 R2\nG80\nG0 Z20\nX0\n"),
+    "haas without a look ahead": ("haas", "G103 P1\n#100=3.\nX#100\nG103\nY1.\nM30\n", "X3\nY1\n"),
     "haas local": ("haas", "M97 P100 L2\nM30\nN100 G91 X1. Y2.\nG90\nM99\n", "X1 Y2\nX2 Y4\n"),
     "haas peck": ("haas", "G98 G83 X5. Y5. Z-9. R2. Q2.5\nX9. L1\nG80\nM30\n", "G98 G83 X5 Y5 Z-9 R2 Q2.5\nX9\nG80\n"),
     "haas first": ("haas", "G99 G81 X5. Z-9. R2. L0\nX9.\nX12.\nG80\nM30\n", "G99 G81 X9 Z-9 R2\nX12\nG80\n"),

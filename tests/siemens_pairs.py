@@ -20,6 +20,11 @@ PAIRS = {
               f"G0 X{30 + 10 * math.cos(math.pi / 6):.9f} Y25\nG1 X30 Y30\nG2 X40 Y20 Z40 I0 J-10"),
     "pole from here": ("G1 X10 Y0\nG110 X10 Y0\nG1 AP=180 RP=5", "G1 X10 Y0\nX15 Y0"),
     "radius": ("G3 X15 Y15 CR=15", "G3 X15 Y15 I0 J15"),
+    "opening angle to an end": ("G2 X0 Y10 AR=180\nG3 X10 Y0 AR=270", "G2 X0 Y10 I0 J5\nG3 X10 Y0 I0 J-10"),
+    "opening angle round a centre": ("G1 X10 Y0\nG3 I-10 J0 AR=90\nG2 I=AC(0) J=AC(0) AR=180",
+                                     "G1 X10 Y0\nG3 X0 Y10 I-10 J0\nG2 X0 Y-10 I0 J-10"),
+    "feed of one block": ("G1 X10 F300\nX11 FB=50\nX12\nFB=70 X13 F200\nX14",
+                          "G1 X10 F300\nX11 F50\nX12 F300\nX13 F70\nX14 F200"),
     # corners
     "rounding": ("G1 X20 RND=5\nY20 RND=5\nX40", "G1 X15\nG3 X20 Y5 I0 J5\nG1 Y15\nG2 X25 Y20 I5 J0\nG1 X40"),
     "chamfer by its width": ("G1 X20 F300 CHR=5\nY20 F100\nX0", "G1 X15 F300\nX20 Y5\nY20 F100\nX0"),
@@ -29,6 +34,11 @@ PAIRS = {
                             "G1 X15\nG3 X20 Y5 I0 J5\nG1 Y20\nZ0\nX35\nG2 X40 Y15 I0 J-5\nG1 Y0\nX50"),
     "rounding with compensation": ("G41 G1 X20 Y0\nY30 RND=8\nX-20\nG40 X-30 Y50",
                                    "G1 X15 Y0\nY22\nG3 X12 Y25 I-3 J0\nG1 X-20\nX-30 Y50"),
+    "roundings with a feed": ("G1 X20 F300 RND=5 FRC=50\nY20\nX0", "G1 X15 F300\nG3 X20 Y5 I0 J5 F50\nG1 Y20 F300\nX0"),
+    "all corners with a feed": ("RNDM=5 FRCM=50\nG1 X20 F300\nY20 FRC=60\nG0 X40\nRNDM=0 FRCM=0\nG1 Y50",
+                                "G1 X15 F300\nG3 X20 Y5 I0 J5 F50\nG1 Y15 F300\nG2 X25 Y20 I5 J0 F60\nG0 X35\n"
+                                "G3 X40 Y25 I0 J5 F50\nG1 Y50 F300"),
+    "the feed before a corner": ("G1 X20 F300 RND=5\nY20\nX0", "G1 X15 F300\nG3 X20 Y5 I0 J5\nG1 Y20\nX0"),
     "last corner": ("G1 X20 RND=5", "G1 X20"),
     # frames
     "shift": ("TRANS X20 Y5\nG0 X0 Y0\nATRANS X1\nG1 X2\nTRANS\nX0", "G0 X20 Y5\nG1 X23\nX0"),
@@ -91,6 +101,9 @@ PAIRS = {
                    "G601\n"
                    "FGROUP(X,Y,Z)\nOVR=80 ACC[X]=50\n$AC_TIMER[1]=0\nGROUP_BEGIN(0,\"a\",0,0)\nMSG()\nY1 M41 H5",
                    "G1 X1\nY1"),
+    "run from the start": ("IF $P_SEARCH OR $P_SIM GOTOF OUT\nG1 X1\nOUT: Y1\nWAITP(C)\nX2", "G1 X1\nY1\nX2"),
+    "no tilt": ("TRAFOOF\nG54\nCYCLE800(0,\"\",0,57,0,0,0,0,0,0,0,0,0,1,,1)\nG1 X1 Y1\nCYCLE800()\nX2 Y1",
+                "G1 X1 Y1\nX2"),
     "labels and skips": ("AAA: G1 X1\n/N20 Y1\n/1 X2", "G1 X1\nY1\nX2"),
     "fixed point": ("G1 X5\nG75 Z0\nY3", "G1 X5\nG0 G53 Z0\nG1 Y3"),
     "all frames suppressed": ("G1 X5\nSUPA G0 Z0 D0\nD1\nX3 Y3\nZ10", "G1 X5\nG0 G53 Z0\nX3 Y3\nZ10"),

@@ -28,6 +28,7 @@ class Modes(ToolChanges):
     gauge       : mm by T number, spindle face to tip
     spindle_tool : T number in the spindle, its length offset on, before the first line; 0 for none
     fits        : whether the control drops points by the P of a G64 without Q
+    before_cycle : the motion before the cycle in force or the latest one, None for none
     """
 
     fits = True
@@ -44,6 +45,7 @@ class Modes(ToolChanges):
         self.incremental_line = 0
         self.incremental_after_cuts = self.incremental_moved = self.cut_absolute = False
         self.stated: set[float] = set()
+        self.before_cycle: float | None = None
         self.assumed: tuple[str, ...] = ()
 
     def _set_modes(self, block: Block) -> None:
@@ -210,11 +212,14 @@ class Modes(ToolChanges):
                                 s.relative, s.home, counted))
 
     def _motion(self, g: float) -> None:
-        """Set the motion mode; a new cycle keeps no words of the one before."""
+        """Set the motion mode; a new cycle keeps no words of the one before.
+
+        G80 ends a cycle. After it LinuxCNC needs a motion word; on other controls that of before the cycle counts.
+        """
         s = self.s
         if s.motion not in CYCLES:
-            s.cycle = {}
-        s.motion = g
+            s.cycle, self.before_cycle = {}, s.motion
+        s.motion = g if g != 80 or self.fits else self.before_cycle
 
     def _unit(self, g: int) -> None:
         s = self.s

@@ -40,6 +40,7 @@ from verify.progress import Report, silent
 BLEND_LIMIT = 0.01
 _BINARY = re.compile("[\x00-\x08]")
 _CLOSES = re.compile(r"%$|(?:\d+\s+)?END PGM\b")  # what may stand behind the end of a program
+_RETURNS = re.compile(r"\bM99\b|\b(?:M17|RET|ENDPROC)\b|\bLBL 0\b|\bENDSUB\b", re.IGNORECASE)
 # what begins another program or a part of one
 _OPENS = re.compile(r"[O:]\s*[0-9<]|%_N_|PROC\b|LBL\b|\d+\s+(?:BEGIN|LBL)\b", re.IGNORECASE)
 REPORT_LINES = 4096  # lines between two reports of progress
@@ -135,7 +136,11 @@ class Reader(BlockMotion):
         """
         end = self.log.line
         bare = (lines[k - 1].split("(")[0].split(";")[0].strip() for k in range(end + 1, len(lines) + 1))
-        rest = [(k, text) for k, text in enumerate(bare, end + 1) if text and not seen[k] and not _CLOSES.match(text)]
+        texts = [(k, text) for k, text in enumerate(bare, end + 1) if text and not _CLOSES.match(text)]
+        ran = [bool(seen[k]) for k, _ in texts]
+        rest = [line for n, line in enumerate(texts) if not ran[n]
+                and not (_OPENS.match(line[1]) and any(ran[n + 1:n + 2]))  # the head and the return of a subprogram
+                and not (_RETURNS.search(line[1]) and n and ran[n - 1])]
         if not rest:
             return 0
         first = rest[0][0]

@@ -24,6 +24,8 @@ from verify.gcode.machine_words import FANUC_M
 _PLAIN = re.compile(r"(?:N[0-9]+ ?)?(?:G0?[01] ?)?(?:[XYZABC][+-]?(?:[0-9]*\.[0-9]*|0) ?)*(?:F[0-9]+\.[0-9]* ?)?\r?")
 _WORD = re.compile(rf"([A-Z])({NUMBER})")
 _NAME = re.compile(r"[O:](?:[0-9]+|<[^<>]*>)?(?:<[^<>]*>)?|<[^<>]*>")
+_CORNER = re.compile(r",[RC][-+.0-9]*")
+_TAPE = re.compile(r"%[O:]?[0-9]*")
 _DELETED = re.compile(r"(N[0-9]+)?/[1-9]?(?=[A-Z]|$)")
 _FOREIGN: dict[str, frozenset[float]] = {
     "M": frozenset({70, 71, 72, 73}), "G": frozenset({59.1, 59.2, 59.3, 92.2, 92.3})}
@@ -51,10 +53,14 @@ REFUSED = {
 
 
 class FanucReader(FanucPlanes):
-    """Fanuc 0i, 30i and relatives."""
+    """Fanuc 0i, 30i and relatives.
+
+    further : G word of the work offsets after G59; counts : letters of whole numbers in a drilling cycle
+    """
 
     title = "Fanuc"
     further = 54.1
+    counts = "K"
     local_calls = False
     bounds_path = False
     further_words = FURTHER
@@ -72,9 +78,20 @@ class FanucReader(FanucPlanes):
     def order(self, lines: Sequence[str], machine: Machine) -> Iterator[tuple[int, str]]:
         """As in the base class; ``verify.gcode.flow.macro_flow`` follows subprograms, macros, jumps and variables."""
         self.machine = machine
+        lines = self._without_leader(lines)
         if has_macros(lines):
             return MacroFlow(lines, machine, self.local_calls).lines_run()
         return super().order(lines, machine)
+
+    def _without_leader(self, lines: Sequence[str]) -> Sequence[str]:
+        """The lines, those before the first % empty: a control reads from there. Lines that may be blocks stay."""
+        first = next((k for k, line in enumerate(lines) if line.lstrip().startswith("%")), 0)
+        ahead = [k for k in range(first) if lines[k].strip()]
+        if not ahead or any(_may_run(lines[k]) for k in ahead):
+            return lines
+        self.notes.append(f"lines {ahead[0] + 1} to {ahead[-1] + 1} stand before the % and are not read"
+                          if len(ahead) > 1 else f"line {ahead[0] + 1} stands before the % and is not read")
+        return [*([""] * first), *lines[first:]]
 
     def blocks(self, raw: str) -> list[str]:
         """A plain straight move unchanged; every other line word by word.
@@ -87,30 +104,30 @@ class FanucReader(FanucPlanes):
         if not self.polar and _PLAIN.fullmatch(raw):
             return [raw]
         text = self._bare(raw)
-        if not text or text == "%":
-            return [text] if text else []
+        if not text or _TAPE.fullmatch(text):
+            return [text[:1]] if text else []
         if _NAME.fullmatch(text):
             return []
         deleted = _DELETED.match(text)
         if deleted:
             text = (deleted[1] or "") + text[deleted.end():]
         words = _WORD.findall(text)
+        if corner := _CORNER.search(text):
+            raise BlockError(f"{corner[0]} (a chamfer or rounded corner) is not followed")
         if "".join(a + b for a, b in words) != text:
             raise BlockError(f"cannot read '{text[:60]}'")
         words = [(a, b) for a, b in words if not (a == "M" and self._idle_m(b))]
-        cycle = self.hole or any(a == "G" and 73 <= float(b) <= 89 and float(b) != 80 for a, b in words)
-        for letter, digits in words:
-            if not (cycle and letter == "K"):  # the number of holes
-                self._check(letter, digits)
-        if len(ms := [b for a, b in words if a == "M"]) > 1:
-            self._several(ms)
-        return self._translated(words, deleted is not None)
-
-    def _translated(self, words: list[tuple[str, str]], deleted: bool) -> list[str]:
-        """Blocks of a line from its words."""
-        values = dict(words)
         codes = [float(b) for a, b in words if a == "G"]
         self._follow(codes)
+        for letter, digits in words:
+            self._check(letter, digits)
+        if len(ms := [b for a, b in words if a == "M"]) > 1:
+            self._several(ms)
+        return self._translated(words, codes, deleted is not None)
+
+    def _translated(self, words: list[tuple[str, str]], codes: list[float], deleted: bool) -> list[str]:
+        """Blocks of a line from its words and G words."""
+        values = dict(words)
         if 68.2 in codes:
             if 91 in codes:
                 raise BlockError("G68.2 in incremental coordinates (G91)")
@@ -152,7 +169,7 @@ class FanucReader(FanucPlanes):
         while (less := re.sub(r"\([^()]*\)", " ", raw)) != raw:
             raw = less
         before, _, after = raw.partition(";")
-        if after.strip():
+        if _may_run(after):
             raise BlockError(f"'{after.strip()[:40]}' follows a ; which ends the block: give it its own line")
         text = "".join(bare(before).upper().split())
         if "#" in text or "[" in text:
@@ -165,7 +182,8 @@ class FanucReader(FanucPlanes):
             raise BlockError(f"{letter}{digits} is a word of LinuxCNC with another meaning, or none, on {self.title}")
         if letter == "G" and number in REFUSED and not self._followed(number):
             raise BlockError(f"unknown word G{number:g} ({REFUSED[number]})")
-        if letter in _PLACES and "." not in digits and number != 0 and not (letter in "IJK" and self.vectors):
+        if letter in _PLACES and "." not in digits and number != 0 and not (
+                letter in "IJK" and self.vectors or self.hole and letter in self.counts):
             raise BlockError(f"{letter}{digits} without a decimal point is {digits} or {number / 1000:g}, depending on "
                              "a parameter of the machine", "write the decimal point: X10. is 10 mm everywhere")
 
@@ -247,6 +265,12 @@ class FanucReader(FanucPlanes):
     def _after(self, codes: list[float]) -> list[str]:
         """Blocks that follow a block with these G words."""
         return []
+
+
+def _may_run(text: str) -> bool:
+    """Whether a text behind a ; may be a block: plain language and text without a number are comments."""
+    words = "".join(text.upper().split())
+    return bool(words) and ("#" in words or "[" in words or "".join(a + b for a, b in _WORD.findall(words)) == words)
 
 
 def codes_move(codes: Sequence[float]) -> bool:

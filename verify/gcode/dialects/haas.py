@@ -3,15 +3,19 @@
 G234 is tool centre point control, G154 P a work offset, G187 smoothness (E: its bound), G101 and G100 mirror. A whole P
 of G04 and of cycles counts ms, one with a decimal point s. F without a decimal point is refused like a coordinate. G28
 cancels the length offset. M16 is M6. M0 and M1 stop the spindle and the coolant. I of a peck cycle is its first peck,
-and L the number of holes.
+and L the number of holes. G110 to G129 are G154 P1 to P20. J of a tapping cycle is the speed of its retract. G103
+limits how far the control reads ahead.
 """
 
 from __future__ import annotations
 
-from verify.gcode.dialects.base import BlockError
+from verify.gcode.dialects.base import BlockError, zero_word
 from verify.gcode.dialects.fanuc import FanucReader
 from verify.gcode.machine_words import HAAS_M
 
+WORDS = {35: "probing", 136: "probing", 141: "compensation in space", 143: "a length along the tilted tool",
+         150: "a pocket", 253: "a turn of the tool", 254: "a dynamic work offset", 268: "a tilted plane"}
+"""G words that move or cut and are not followed, and what they are."""
 _MIRRORS = {101: "G51.1", 100: "G50.1"}
 
 
@@ -22,6 +26,7 @@ class HaasReader(FanucReader):
     further = 154.0
     local_calls = bounds_path = True
     repeats = "L"
+    counts = "KJ"
     refused_m = HAAS_M
 
     def _check(self, letter: str, digits: str) -> None:
@@ -45,6 +50,8 @@ class HaasReader(FanucReader):
             return ["M6"]
         if self.hole and letter in "IJK" and not {73, 83}.isdisjoint(codes):
             return [f"Q{digits}"] if letter == "I" and "Q" not in values else []
+        if (self.hole and letter == "J") or (letter == "P" and 103 in codes):
+            return []
         return super()._word(letter, digits, codes, values)
 
     def _code(self, code: float, values: dict[str, str]) -> list[str]:
@@ -52,8 +59,12 @@ class HaasReader(FanucReader):
             return ["G43.4"]
         if code in _MIRRORS:
             return [_MIRRORS[int(code)]]
-        if code == 150:
-            raise BlockError("unknown word G150 (a pocket)")
+        if code in WORDS:
+            raise BlockError(f"unknown word G{code:g} ({WORDS[int(code)]})")
+        if code == 103:
+            return []
+        if 110 <= code <= 129:
+            return [zero_word(6 + int(code) - 109, f"G{code:g}")]
         if code == 187:
             if "E" not in values:
                 self.notes.append("G187 without E: a setting of the machine decides how far the control rounds "

@@ -7,6 +7,7 @@ import pytest
 
 from geometry.errors import ProgramError
 from verify.gcode.dialects.fanuc import REFUSED
+from verify.gcode.dialects.haas import WORDS
 from verify.gcode.reader import FEED, read_program
 from verify.kinematics import Kinematics
 
@@ -121,7 +122,8 @@ def test_repeats_and_returns_of_cycles():
     "G61\nG1 X1. F100.\nG64\n", "G62\nG63\nG9 G1 X1. F100.\n", "G67 G69 G50 G15 G40 G49 G80\nG43 H1 G1 X1. F100.\n",
     "M88\nM29 S1000\nG1 X1. F100.\nM89\n", "G1 X1. A0. F100.\n", "(A (NESTED) COMMENT)\nG1 X1. F100. (END)\n",
     "G1 X1. F100. ;\n", "/M8\n/2 M8\nN10/M9\nG1 X1. F100.\n", "G97 S1000\nG1 X1. F100.\n", "g1 x1. f100.\n",
-    "G1X1.F100.M8\n", "N0100 G01 X+1.000 F100.0\n", "<NAME>\nG1 X1. F100.\n", "G22\nG23\nG94.1\nG1 X1. F100.\n"])
+    "G1X1.F100.M8\n", "N0100 G01 X+1.000 F100.0\n", "<NAME>\nG1 X1. F100.\n", "G22\nG23\nG94.1\nG1 X1. F100.\n",
+    "G1 X1. F100. ; END MILL 6\n; next\n;;\n"])
 def test_modes_comments_and_devices_move_nothing(body):
     p = read(body)
     assert p.end[p.kind == FEED].tolist() == [[1, 0, 10]] and p.remarks == ()
@@ -131,7 +133,8 @@ def test_modes_comments_and_devices_move_nothing(body):
     lambda t: t.replace("\n", "\r\n"), lambda t: t.replace("\n", "\r"), lambda t: "\ufeff" + t, lambda t: t + "\x1a",
     lambda t: "\x00\x00" + t + "\x00" * 9, lambda t: t.replace("%\n", "\n\n", 1).removesuffix("%\n"),
     lambda t: t.replace("O1000", ":1000"), lambda t: t.replace("O1000", "O1000(Fr\xe4sen)"),
-    lambda t: t.replace("\n", "\r\r\n"), lambda t: t.removesuffix("%\n"), lambda t: t + "anything\n"])
+    lambda t: t.replace("\n", "\r\r\n"), lambda t: t.removesuffix("%\n"), lambda t: t + "anything\n",
+    lambda t: "PART 12, REV A\n\n(X)\n" + t, lambda t: t.replace("%\n", "%1000\n", 1)])
 def test_line_ends_tape_codes_and_names_as_they_are(change):
     text = HEAD + "G1 X1. F100.\nX2.\nM30\n%\n"
     p = read_program(change(text), dialect="fanuc")
@@ -162,7 +165,10 @@ def test_a_place_of_the_machine_needs_no_g0_on_these_controls():
     ("fanuc", "G68 R10.\nG92 X0\n", "rotated"), ("fanuc", "G16\nG91 G1 X1. Y1. F100.\n", "polar"),
     ("fanuc", "G10 L2 P0 X5.\n", "a common shift"), ("fanuc", "G10 L20 P1 X5.\n", "G54.1"),
     ("fanuc", "G10 L3\n", "G10"), ("fanuc", "G41.1\n", "normal direction control"),
-    ("fanuc", "G1 X1. F100.\nG10 L2 P1 X5.\n", "G10 L2 of G54 after feed moves")])
+    ("fanuc", "G1 X1. F100.\nG10 L2 P1 X5.\n", "G10 L2 of G54 after feed moves"),
+    ("fanuc", "G1 X1. ,C2. F100.\n", ",C2. (a chamfer"), ("haas", "G1 X1. F100. ,R.5\n", ",R.5 (a chamfer"),
+    ("haas", "G143 H1\n", "G143 (a length"), ("haas", "G113\n", "G113 is work offset 10"),
+    ("fanuc", "G1 X1. F100. ; X7.\n", "'X7.' follows a ;")])
 def test_what_moves_and_is_not_followed_is_refused_by_name(dialect, body, words):
     with pytest.raises(ProgramError) as caught:
         read(body, dialect)
@@ -220,7 +226,12 @@ def test_a_plane_needs_rotary_axes():
 def test_the_page_lists_every_word_that_is_refused():
     page = (Path(__file__).resolve().parents[4] / "docs" / "verify.md").read_text().partition("## Words it refuses")[2]
     listed = set(page.replace(",", " ").split())
-    assert not [f"G{code:g}" for code in REFUSED if f"G{code:g}" not in listed]
+    assert not [f"G{code:g}" for code in (*REFUSED, *WORDS) if f"G{code:g}" not in listed]
+
+
+def test_a_percent_behind_blocks_is_no_leader():
+    with pytest.raises(ProgramError, match="does not begin with one"):
+        read_program("G21 G90\n" + HEAD + "M30\n%\n", dialect="fanuc")
 
 
 @pytest.mark.parametrize(("dialect", "body", "expected"), [

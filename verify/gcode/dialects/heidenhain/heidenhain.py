@@ -29,6 +29,7 @@ from verify.gcode.dialects.heidenhain.heidenhain_flow import HeidenhainFlow, blo
 from verify.gcode.dialects.heidenhain.heidenhain_paths import HeidenhainPaths
 from verify.gcode.dialects.heidenhain.heidenhain_q import VALUE
 from verify.gcode.dialects.heidenhain.heidenhain_words import M_AFTER, M_BEFORE
+from verify.gcode.dialects.orientation import needed
 from verify.gcode.dialects.stated_places import digits
 
 _NUM = r"[+-]?(?:[0-9]{1,8}(?:\.[0-9]*)?|\.[0-9]+)"
@@ -41,6 +42,7 @@ _TCPM = re.compile(rf"FUNCTION TCPM(?:\s+F\s*(TCP|CONT))?(?:\s+AXIS\s*(POS|SPAT)
                    rf"(?:\s+REFPNT\s*(\S+))?(?:\s+F\s*{VALUE})?")
 _CALLED = re.compile(r"CYCL CALL(?:\s+(POS|PAT))?\s*(.*)")
 _COORDINATE = re.compile(rf"\s*(I?)([XYZABC])\s*({VALUE})(?=\s|$)")
+_UNTILTED = re.compile(rf"(?:(?:[ABCF]|ABST|DIST)\s*{VALUE}\s*)*")
 SMALL = 0.01
 """deg, deviation of a rotary axis that needs no note."""
 _IDLE = ("BLK FORM", "TOOL DEF", "* -", "*", "FUNCTION PROG PATH", "FUNCTION MODE MILL", "FUNCTION FEED DWELL",
@@ -235,7 +237,7 @@ class HeidenhainReader(HeidenhainPaths):
                 self.cycle = CycleCall(cycle, {})
             elif cycle in OLD:
                 self.cycle = None
-            elif cycle not in (7, 8, 9, 10, 11, 13, 14, 32):
+            elif cycle not in (7, 8, 9, 10, 11, 13, 14, 19, 32):
                 raise BlockError(f"cycle {cycle} is not followed")
             return []
         items = self.dotted.setdefault(cycle, {})
@@ -253,9 +255,18 @@ class HeidenhainReader(HeidenhainPaths):
             self.rotate(math.radians(self._single(rest, "I?ROT")), "IROT" in rest)
         elif cycle == 11:
             self.scale(self._single(rest, "SCL"))
+        elif cycle == 19:
+            self._untilted(rest)
         elif cycle == 32:
             return self._tolerant(part, rest)
         return []
+
+    def _untilted(self, rest: str) -> None:
+        """Cycle 19 without a tilt: all angles are 0, or none is given."""
+        if _UNTILTED.fullmatch(rest) is None or any(self.q.value(v) for v in re.findall(rf"[ABC]\s*({VALUE})", rest)):
+            raise BlockError("cycle 19 (a tilted plane) is not followed", "let the post write PLANE SPATIAL")
+        if self.plane is not None:
+            raise BlockError("cycle 19 in a plane of PLANE: end it with PLANE RESET")
 
     def _single(self, rest: str, word: str) -> float:
         m = re.fullmatch(rf"(?:{word})\s*({VALUE})(?:\s+DIST\s*{VALUE})?", rest)
@@ -311,7 +322,7 @@ class HeidenhainReader(HeidenhainPaths):
         self._unheld("FUNCTION")
         if text.startswith("FUNCTION RESET TCPM"):
             self.tcp, self.spat, self.circle = False, False, None
-            return ["M429"]
+            return [] if self.machine.machine is None else ["M429"]
         m = _TCPM.fullmatch(text)
         if m is None:
             for opening, what in _REFUSED.items():
@@ -322,6 +333,7 @@ class HeidenhainReader(HeidenhainPaths):
             raise BlockError(f"FUNCTION TCPM with REFPNT {m[4]}: only the tip (TIP-TIP) is followed")
         if self.longer:
             raise BlockError("FUNCTION TCPM after TOOL CALL with DL is not followed")
+        needed(self.machine.machine, "FUNCTION TCPM")
         self.tcp, self.spat, self.circle = True, m[2] == "SPAT", m[3] == "VECTOR"
         self.spatial = {}
         self.forget()

@@ -13,6 +13,7 @@ from verify.gcode.dialects.corners import Leg
 from verify.gcode.dialects.heidenhain.heidenhain_flow import HeidenhainFlow
 from verify.gcode.dialects.heidenhain.heidenhain_frames import HeidenhainFrames
 from verify.gcode.dialects.heidenhain.heidenhain_q import VALUE, QParameters
+from verify.gcode.dialects.orientation import needed
 from verify.gcode.dialects.stated_places import digits
 from verify.gcode.machine_words import HEIDENHAIN_M
 
@@ -191,7 +192,10 @@ class HeidenhainWords(HeidenhainFrames):
         self.turned.update(angles)
 
     def _switch(self, ms: list[int]) -> list[int]:
-        """The M words without M126 and M127; tool centre point control is kept as state."""
+        """The M words without M126 and M127; tool centre point control is kept as state.
+
+        M129 ends nothing where the machine has no rotary axes.
+        """
         if 128 in ms and self.longer:
             raise BlockError("M128 after TOOL CALL with DL is not followed")
         if 128 in ms or 129 in ms:
@@ -200,7 +204,10 @@ class HeidenhainWords(HeidenhainFrames):
                 self.wanted = None
             self.forget()
         self.shortest = 127 not in ms and (self.shortest or 126 in ms)
-        return [m for m in ms if m not in (126, 127)]
+        if 128 in ms:
+            needed(self.machine.machine, "M128")
+        idle = (126, 127, 129) if self.machine.machine is None else (126, 127)
+        return [m for m in ms if m not in idle]
 
     def ordered_words(self, rest: str) -> tuple[list[str], list[str]]:
         """Blocks of M words alone: those before a move, and those after it.

@@ -16,6 +16,7 @@ import re
 from collections.abc import Iterator, Sequence
 
 from verify.gcode.dialects.base import NUMBER, ZEROS, BlockError, Machine, zero_word
+from verify.gcode.dialects.orientation import needed
 from verify.gcode.dialects.siemens.siemens_cycles import DrillingCall, drilling_blocks, row_of_holes
 from verify.gcode.dialects.siemens.siemens_expressions import MAX_ELEMENTS, Value, ValueReader, Variables, arguments
 from verify.gcode.dialects.siemens.siemens_flow import LABEL, NUMBERED, PLAIN, SiemensFlow, statement
@@ -36,6 +37,7 @@ from verify.gcode.dialects.siemens.siemens_words import (
     SIEMENS_STYLE,
     UNBOUNDED,
     UNITS,
+    VALUES,
 )
 from verify.gcode.dialects.stated_places import digits
 from verify.gcode.machine_words import SIEMENS_M
@@ -101,6 +103,8 @@ class SiemensReader(SiemensMoves):
             if place == place:
                 return place / self.unit
             raise BlockError(f"{name}[{index}] is unknown because the program has not stated {index}")
+        if name in ("$P_SEARCH", "$P_SEARCHL", "$P_SIM", "$P_ISTEST"):
+            return 0.0  # the proof is that of a run on the machine, from the first block
         if name in ("$P_TOOLNO", "$TC_MPP6"):
             return float(self.tool)
         if name == "$P_TOOLR" and self.tool in self.machine.radii:
@@ -395,10 +399,7 @@ class SiemensReader(SiemensMoves):
             self._code(int(number), line)
         elif name == "D" and number == int(number) and number >= 0:
             self._edge(int(number), line)
-        elif name in ("RND", "RNDM", "CHF", "CHR", "CR", "TURN", "ADIS", "ADISPOS", "AP", "RP", "I1", "J1", "K1", "A3",
-                      "B3", "C3", "RPL", "CTOL",
-                      "X1",
-                      "Y1", "Z1", "A1", "B1", "C1", "FP", "OTOL", "ATOL"):
+        elif name in VALUES:
             line.values[name], line.kinds[name] = number, kind
         else:
             raise BlockError(f"unknown word {name}={number:g}")
@@ -448,7 +449,10 @@ class SiemensReader(SiemensMoves):
             self.notes.append(self.loose)
         self.lost, self.tcp = word, word == "TRAORI"
         self.forget()
-        line.out.append("M428" if self.tcp else "M429")
+        if self.tcp:
+            needed(self.machine.machine, "TRAORI")
+        if self.machine.machine is not None:
+            line.out.append("M428" if self.tcp else "M429")
 
     def _call(self, name: str, parts: list[str], line: Line) -> None:
         if name == "TRAORI" and parts in ([""], ["1"]):
@@ -529,7 +533,7 @@ class SiemensReader(SiemensMoves):
 
     def _check_context(self, line: Line) -> None:
         """Refuse names whose value nothing in the block uses."""
-        allowed = {"CR": self.motion in (2, 3), "TURN": self.motion in (2, 3), "RPL": False}
+        allowed = {"RPL": False, **dict.fromkeys(("CR", "TURN", "AR"), self.motion in (2, 3))}
         allowed |= dict.fromkeys(("I1", "J1", "K1"), self.motion == "CIP")
         fixed = not {74, 75}.isdisjoint(line.codes)
         allowed |= dict.fromkeys(("X1", "Y1", "Z1", "A1", "B1", "C1", "FP"), fixed)
@@ -564,8 +568,9 @@ class SiemensReader(SiemensMoves):
             raise BlockError(f"a move after {self.lost} without a work offset: it may be off (G500)",
                              "state the work offset (G54 to G57, G505 and up) before the move")
         line.out += self._path(line)
+        self.feed_of_block(line)
         if not moves:
-            self.corner_of({k: v for k, v in line.values.items() if k == "RNDM"})
+            self.corner_of({k: v for k, v in line.values.items() if k in ("RNDM", "FRCM")})
             head = [*line.out, *self._rates(line)]
             if line.after or any(w[0] in "TG" for w in line.out):
                 self.unheld("another word")

@@ -24,6 +24,7 @@ class Cornered:
 
     number : its line; head : other words of its block; word : G0 to G3; leg : in the plane, mm
     end    : (3,) mm; feed : the F word, or ''; corner : name and size, mm, of the corner at its end, None for none
+    modal  : the F word in force at its end, or ''; rate : the F word of its corner, or ''
     """
 
     number: int
@@ -33,20 +34,22 @@ class Cornered:
     end: tuple[float, ...]
     feed: str
     corner: tuple[str, float] | None = None
+    modal: str = ""
+    rate: str = ""
 
 
 class SiemensCorners(SiemensPaths):
     """Moves that are held back.
 
     held   : the move before a corner, None for none
-    always : mm, radius of RNDM, 0 for none
+    always : mm, radius of RNDM, 0 for none; slow : feed of all corners (FRCM), 0 for that of the moves
     number : of the line
     """
 
     def __init__(self) -> None:
         super().__init__()
         self.held: Cornered | None = None
-        self.always = 0.0
+        self.always = self.slow = 0.0
         self.number = 0
 
     @property
@@ -77,6 +80,7 @@ class SiemensCorners(SiemensPaths):
         BlockError
             Two corners, or a negative size.
         """
+        self.slow = values.get("FRCM", self.slow)
         if "RNDM" in values:
             self.always = values["RNDM"] * self.unit
         named = [(k, values[k] * self.unit) for k in ("RND", "CHR", "CHF") if k in values]
@@ -105,12 +109,16 @@ class SiemensCorners(SiemensPaths):
         middle = self._centre(start, end, word, centre, values)
         leg = Leg(complex(start[i], start[j]), complex(end[i], end[j]), middle, word == "G3")
         s = self.machine.s
-        feed = f"F{digits(values['F'])}" if "F" in values else ""
-        if not feed and word != "G0" and not math.isnan(s.feed) and s.feed_mode != 93:
-            feed = f"F{digits(s.feed / s.scale)}"
-        move = Cornered(self.number, tuple(w for w in head if w not in ("G0", "G1", "G2", "G3")), word, leg, tuple(end),
-                        feed,
-                        corner)
+        modal = "" if math.isnan(s.feed) or s.feed_mode == 93 else f"F{digits(s.feed / s.scale)}"
+        if self.held is not None:
+            modal = self.held.modal
+        if "F" in values:
+            modal = f"F{digits(values['F'])}"
+        slow = values.get("FRC", self.slow)
+        feed = modal if word != "G0" or "F" in values else ""
+        others = tuple(w for w in head if w not in ("G0", "G1", "G2", "G3"))
+        move = Cornered(self.number, others, word, leg, tuple(end), feed, corner, modal,
+                        f"F{digits(slow)}" if slow else "")
         out: list[str | tuple[int, str]] = []
         if self.held is not None:
             if any(w.startswith(("G40", "G41", "G42")) for w in move.head):
@@ -156,7 +164,9 @@ class SiemensCorners(SiemensPaths):
         if first.word == "G0" and word == "G1":
             word = "G0"
         short = replace(first, leg=replace(first.leg, end=p), end=tuple(end))
-        corner = Cornered(first.number, (), word, piece, tuple(onward), "")
+        corner = Cornered(first.number, (), word, piece, tuple(onward), first.rate if word != "G0" else "")
+        if corner.feed:
+            second = replace(second, feed=second.modal)
         return ([(first.number, self._text(short)), (first.number, self._text(corner))],
                 replace(second, leg=replace(second.leg, start=q)))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -57,6 +58,16 @@ class SiemensMoves(SiemensCorners):
         self.cycle: DrillingCall | None = None
         self.end = [math.nan] * 3
 
+    def feed_of_block(self, line: Line) -> None:
+        """FB, the feed of one block: it counts as F, and the F before it counts again in the next block."""
+        if "FB" not in line.values:
+            return
+        s = self.machine.s
+        old = line.values.get("F", s.feed if s.feed_mode == 93 else s.feed / s.scale)
+        line.values["F"] = line.values["FB"]
+        if not math.isnan(old):
+            line.after.append(f"F{digits(old)}")
+
     def _rates(self, line: Line) -> list[str]:
         return [f"{k}{digits(line.values[k])}" for k in "SF" if k in line.values]
 
@@ -79,6 +90,8 @@ class SiemensMoves(SiemensCorners):
         words, centre = self._absolute(line, machine_place)
         if {"AP", "RP"} & line.values.keys():
             self._polar(line, words)
+        if "AR" in line.values:
+            self._opened(line, words, centre)
         here = self.here()
         self.end = [h if k not in words else float(words[k]) * self.unit + (
             h if self.relative and k in line.places and line.places[k][1] != "AC" else 0.0)
@@ -96,8 +109,9 @@ class SiemensMoves(SiemensCorners):
             ends = self.flushed()
             return [*ends, *self._move(line)]
         if self.held is not None or corner is not None:
-            if (machine_place or self.relative or turns or any(v is not None for v in vector) or "TURN" in line.values
-                    or self.motion not in (0, 1, 2, 3) or self.cycle is not None):
+            if (machine_place or self.relative or turns or any(v is not None for v in vector)
+                    or {"TURN", "FB"} & line.values.keys() or self.motion not in (0, 1, 2, 3)
+                    or self.cycle is not None):
                 raise BlockError("a corner (RND, RNDM, CHF, CHR) next to a move that is not a plain G0, G1, G2 or G3 "
                                  "in "
                                  "absolute coordinates")
@@ -221,6 +235,24 @@ class SiemensMoves(SiemensCorners):
         if self.motion in (2, 3) and not line.centre and "CR" not in line.values:
             for n in (i, j):
                 words["IJK"[n]] = digits((self.pole[n] - here[n]) / self.unit)
+
+    def _opened(self, line: Line, words: dict[str, str], centre: dict[str, str]) -> None:
+        """An arc by its opening angle AR, deg: the radius follows from its end, or its end from the centre."""
+        angle, here = math.radians(line.values["AR"]), self.known("AR=")
+        if self.relative or not 0.0 < angle < math.tau or "CR" in line.values:
+            raise BlockError("AR= in incremental coordinates, with CR=, or outside of 0 to 360 deg")
+        i, j, _ = PLANE_AXES[self.machine.s.plane]
+        start = complex(here[i], here[j]) / self.unit
+        if line.centre:
+            arm = -complex(*(float(centre.get("IJK"[n], "0")) for n in (i, j)))
+            end = start - arm + arm * cmath.rect(1.0, angle if self.motion == 3 else -angle)
+            if {"XYZ"[i], "XYZ"[j]} & words.keys():
+                raise BlockError("AR= with both the end and the centre of an arc")
+            words["XYZ"[i]], words["XYZ"[j]] = digits(end.real), digits(end.imag)
+            return
+        end = complex(*(float(words.get("XYZ"[n], repr(here[n] / self.unit))) for n in (i, j)))
+        radius = 0.5 * abs(end - start) / math.sin(0.5 * angle)
+        line.values["CR"] = radius if angle <= math.pi else -radius
 
     def _special(self, line: Line) -> list[str] | None:
         """Blocks whose coordinates mean something else; None for all others."""

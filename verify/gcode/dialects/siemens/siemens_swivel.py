@@ -136,7 +136,6 @@ class SiemensFrames(OrientedMoves):
 
     def _swing(self, call: str, retract: float, matrix: F64, direction: float) -> list[str]:
         """Blocks that turn the rotary axes to the plane with these axes as columns."""
-        machine = needed(self.machine.machine, "CYCLE800")
         out = ["M429"] if self.swung else []
         if retract in SWINGS:
             out += SWINGS[int(retract)]
@@ -145,6 +144,9 @@ class SiemensFrames(OrientedMoves):
                              f"machine "
                              "are followed")
         upright = bool(np.abs(matrix[:2, 2]).max() < 1e-12 and matrix[2, 2] > 0)
+        if upright and self.machine.machine is None:
+            return out
+        machine = needed(self.machine.machine, "CYCLE800")
         near = self.machine.s.turn
         angles = [0.0, 0.0] if upright else angles_of(machine, matrix[:, 2].tolist(), near, int(direction))
         out.append("G0 " + " ".join(f"{k}{digits(v)}" for k, v in zip(machine.letters, angles, strict=True)))

@@ -32,7 +32,7 @@ MOVES = {5: "an oblique plunge", 7: "an oblique plunge", 33: "thread cutting", 3
 IDLE = frozenset("""
     ACTBLOCNO BLSYNC BRISK CDOF CDOF2 CDON CFC CFIN CFTCP COMPOF CORROF CP CPRECOF CPRECON CUT2D CUT2DF
     DELAYFSTOF DELAYFSTON DIAMOF DISPLOF DISPLON DRIVE DYNFINISH DYNNORM DYNPOS DYNPREC DYNROUGH
-    DYNSEMIFIN FCUB FFWOF FFWON FIFOCTRL FLIN FNORM FTOCOF GWPSOF IPTRLOCK IPTRUNLOCK NORM ORIRESET OSC OSD OSOF
+    DYNSEMIFIN FCUB FFWOF FFWON FIFOCTRL FLIN FNORM FTOCOF GWPSOF IPTRLOCK IPTRUNLOCK NORM OSC OSD OSOF
     OSS OSSE OST PAROTOF RTLION SAVE SBLOF SBLON SOFT SPATH SPCOF SPCON STARTFIFO STOPFIFO STOPRE SUPD
     TOROTOF TOWSTD UPATH WALIMOF WALIMON""".split())
 """Words that change speed, smoothing, display or the flow of blocks only."""
@@ -41,14 +41,19 @@ COMPRESSORS = frozenset({"COMPON", "COMPCURV", "COMPCAD", "COMPSURF"})
 """Words after which the control may leave the path, by CTOL where it is stated."""
 
 IDLE_VALUES = frozenset("""
-    ACC ACCLIMA FGREF FL FRC FRCM H JERKLIM JERKLIMA LIMS OVR OVRA OVRRAP SPOS SPOSA STOLF SVC VELOLIM
+    ACC ACCLIMA FGREF FL H JERKLIM JERKLIMA LIMS OVR OVRA OVRRAP SPOS SPOSA STOLF SVC VELOLIM
     VELOLIMA""".split())
 """Names with a value that change speed, smoothing or outputs only."""
 
 IDLE_CALLS = frozenset("""
     BRISKA CLRINT DELETE DISABLE DRIVEA ENABLE FGREF FGROUP GROUP_ADDEND GROUP_BEGIN GROUP_END MSG NEWCONF SETAL
-    SETMS SOFTA SPCOF SPCON SPI WORKPIECE WRITE""".split())
+    SETMS SOFTA SPCOF SPCON SPI WAITP WORKPIECE WRITE""".split())
 """Calls without a move: lines on the screen, the blank of the graphics, limits of speed."""
+
+VALUES = frozenset("""
+    A1 A3 ADIS ADISPOS AP AR ATOL B1 B3 C1 C3 CHF CHR CR CTOL FB FP FRC FRCM I1 J1 K1 OTOL RND RNDM RP RPL TURN X1 Y1
+    Z1""".split())
+"""Names with a value that belong to the move of their block."""
 
 ENVELOPES = ("CYCLE81", "CYCLE82", "CYCLE83", "CYCLE84", "CYCLE840", "CYCLE85", "CYCLE86", "CYCLE87", "CYCLE88",
              "CYCLE89")
@@ -67,7 +72,7 @@ NOT_FOLLOWED = {
     **_named("another transformation", "TRANSMIT TRACYL TRAANG"), **_named("a tangential axis", "TANG TANGON TANGOF"),
     **_named("a coupled axis", "TRAILON LEADON COUPON"), **_named("travel to a stop", "FXS"),
     **_named("a preset axis", "PRESETON PRESETONS"), **_named("a contour table", "EXECTAB CONTPRON CONTDCON"),
-    **_named("a positioning axis", "POS POSA"), **_named("a tool offset", "TOFFON"),
+    **_named("a wait for another channel", "INIT START WAITE WAITM WAITMC"), **_named("a tool offset", "TOFFON"),
 }
 """Cycles and functions that move, turn or cut and are not followed, and what they do."""
 
@@ -88,10 +93,12 @@ REFUSED = {
      **_named("an angle of a line", "ANG"), **_named("surface normals",
                                                                                       "A4 B4 C4 A5 B5 C5"),
     **_named("a lead or tilt angle", "LEAD TILT"), **_named("a turn of the tool about itself", "THETA"),
-    **_named("an opening angle of an arc", "AR"), **_named("a feed per tooth", "FZ"), **_named(_SOFT, "DISR DISCL"),
+    **_named("a feed per tooth", "FZ"), **_named(_SOFT, "DISR DISCL"),
     **_named("another transformation", "TRACON TRANSMIT TRACYL TRAANG"),
+    **_named("a positioning axis", "POS POSA POSP"), **_named("a turn of the tool", "ORIRESET"),
+    **_named("coordinates that count as diameters", "DIAMCHANA"),
 }
 """Words and names that move or cut and are not followed, and what they are."""
 
 __all__ = ["COMPRESSORS", "ENVELOPES", "IDLE", "IDLE_CALLS", "IDLE_CODES", "IDLE_VALUES", "MOVES", "NOT_FOLLOWED",
-           "REFUSED", "SAME", "SHARP_STYLE", "SIEMENS_STYLE", "UNBOUNDED", "UNITS"]
+           "REFUSED", "SAME", "SHARP_STYLE", "SIEMENS_STYLE", "UNBOUNDED", "UNITS", "VALUES"]
