@@ -77,6 +77,7 @@ PAIRS = {
                "DEF 8.1\n"
                "L X+0", "G1 X-10 Y5\nG3 X-20 Y5 I-5 J0\nG1 X0"),
     "scale": ("CYCL DEF 11.0 SCALING\nCYCL DEF 11.1 SCL 2\nL X+10 Y+5 Z+10", "G1 X20 Y10 Z20"),
+    "a selected preset ends a shift": ("TRANS DATUM AXIS X+5\nPRESET SELECT #1\nL X+1", "G1 X1"),
     "preset ends a shift": ("TRANS DATUM AXIS X+5\nCYCL DEF 247 DATUM SETTING ~\n  Q339=+1 ;NUMBER\nL X+1", "G1 X1"),
     "longer tool": ("TOOL CALL 1 Z S1000 F200 DL+0.5\nM3\nL X+0 Y+0 Z+50 FMAX\nL Z+0\nTOOL CALL 1 Z DL+0\nM3\nL Z+5 "
                     "FMAX",

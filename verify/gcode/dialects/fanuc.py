@@ -137,8 +137,11 @@ class FanucReader(FanucPlanes):
             return self.square(values)
         before = self.level() if 69 in codes and self.frame is not None else []
         out = []
+        arc = not {2.0, 3.0}.isdisjoint(codes) or (self.machine.s.motion in (2, 3) and {0.0, 1.0}.isdisjoint(codes)
+                                                   and not self.hole)
+        if arc and "P" in values and codes_move(codes) and not values.keys().isdisjoint("XYZIJKR"):
+            raise BlockError(f"P{values['P']} in a block of an arc: the control has no turns there")
         if self.vectors and not values.keys().isdisjoint("IJK"):
-            arc = not {2.0, 3.0}.isdisjoint(codes) or (self.machine.s.motion in (2, 3) and {0.0, 1.0}.isdisjoint(codes))
             out = self.vector(values, arc)
             words = [(a, b) for a, b in words if a not in "IJK"]
         for letter, digits in words:

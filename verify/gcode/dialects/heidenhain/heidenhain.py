@@ -135,6 +135,10 @@ class HeidenhainReader(HeidenhainPaths):
             return out
         if text.startswith("FUNCTION"):
             return self._function(text)
+        if m := re.fullmatch(r"PRESET SELECT #\s*([0-9]+)", text):
+            self._unheld("PRESET SELECT")
+            self.reset_frames()
+            return [zero_word(int(m[1]), f"preset {m[1]}")]
         if text.startswith("TRANS DATUM"):
             return self._datum(text)
         if re.fullmatch(r"(?:STOP)?\s*(?:M.*)?", text):

@@ -266,6 +266,8 @@ class HeidenhainWords(HeidenhainFrames):
             elif m["sense"]:
                 w.sense = m["sense"]
             elif m["feed"]:
+                if w.feed:
+                    raise BlockError(f"two feeds in one block: F{w.feed} and F{m['feed']}")
                 w.feed = m["feed"]
             else:
                 self._put_word(w, m["name"], self.q.value(m["value"]))

@@ -268,6 +268,8 @@ class SiemensReader(SiemensMoves):
             line.centre[letter] = (number, "")
             return None
         if letter in "FS":
+            if letter in line.values:
+                raise BlockError(f"the word {letter} appears twice")
             line.values[letter] = self._held(letter, number, line)
             return None
         if letter == "H" or letter == "N":
@@ -356,7 +358,7 @@ class SiemensReader(SiemensMoves):
         if name in REFUSED:
             raise BlockError(f"{name}= ({REFUSED[name]}) is not followed")
         if name == "DISC" or name in IDLE_VALUES or re.fullmatch(r"H[0-9]+", name):
-            value = reader.value()
+            value = self._stood(reader) if name in ("SPOS", "SPOSA") else reader.value()
             if name == "DISC" and value:
                 raise BlockError("DISC= above 0 (other outside corners of cutter radius compensation) is not followed")
             if name in ("SPOS", "SPOSA"):
@@ -369,6 +371,15 @@ class SiemensReader(SiemensMoves):
         if kind:
             reader.need(")")
         return self._named(name, number, kind, line)
+
+    def _stood(self, reader: ValueReader) -> Value:
+        """The angle at which the spindle is to stand, with or without DC( ), ACP( ) and the like."""
+        if (m := _PLACED.match(reader.text, reader.at)) is None:
+            return reader.value()
+        reader.at = m.end()
+        angle = reader.value()
+        reader.need(")")
+        return angle
 
     def _tool(self, value: Value, line: Line) -> None:
         """T = number or name: the name is an id of the setup, or a number."""

@@ -90,7 +90,7 @@ REFUSED = {
     **_named("orientation on a curve or cone", "ORICURVE ORICONCW ORICONCCW ORICONIO"),
     **_named("other orientation angles", "ORIEULER ORIRPY ORIRPY2 ORIVIRT1 ORIVIRT2 A2 B2 C2"),
     **_named("a move of the machine's maker", "OEMIPO1 OEMIPO2"),
-     **_named("an angle of a line", "ANG"), **_named("surface normals",
+    **_named("an angle of a line", "ANG"), **_named("surface normals",
                                                                                       "A4 B4 C4 A5 B5 C5"),
     **_named("a lead or tilt angle", "LEAD TILT"), **_named("a turn of the tool about itself", "THETA"),
     **_named("a feed per tooth", "FZ"), **_named(_SOFT, "DISR DISCL"),

@@ -86,6 +86,7 @@ REFUSED = [
     ("CYCL DEF 400 Q200=2", "a touch probe"), ("TCH PROBE 1.0", "a touch probe"),
     ("CYCL DEF 19.0 WORKING PLANE\nCYCL DEF 19.1 A+0 B+5", "cycle 19 (a tilted plane)"),
     ("CYCL DEF 19.1 X+0", "cycle 19 (a tilted plane)"), ("M128", "M128 turns the tool axis"),
+    ("L X+5 FMAX F100", "two feeds"), ("PRESET SELECT #40", "a setup can name"),
     ("CYCL DEF 26.0 AXIS SCALING", "cycle 26"), ("PATTERN DEF POS1 (X+1)", "a pattern of points"),
     ("CYCL CALL PAT", "PAT"),
     ("CYCL CALL", "none is defined"), ("APPR LCT X+1 Y+1 R5 RL", "APPR LCT is not followed"),
