@@ -82,7 +82,7 @@ PAIRS = {
                           "G99 G81 X5 Y0 Z-3 R2\nX10\nX15\nG80\n"),
     "fanuc after cycles": ("fanuc", "G98 G81 X5. Y5. Z-3. R2.\nG80\nX0. Y0.\nG0 Z9.\nG83 X1. Z-3. R2. Q2.\nG82 X2. "
                                     "P100\nG80 Z20.\nX4.\nM30\n",
-                           "G98 G81 X5 Y5 Z-3 R2\nG80\nG1 X0 Y0\nG0 Z9\nG98 G83 X1 Z-3 R2 Q2\nG82 X2 P0.1\nG80\n"
+                           "G98 G81 X5 Y5 Z-3 R2\nG80\nG1 X0 Y0\nG0 Z9\nG98 G83 X1 Z-3 R2 Q2\nG82 X2 Z-3 R2 P0.1\nG80\n"
                            "G0 Z20\nX4\n"),
     "fanuc rotation": ("fanuc", "G68 X10. Y0. R90.\nX20. Y0.\nX20. Y10.\nG3 X10. Y20. R10.\nG69\nG1 X0. Y0.\nM30\n",
                        "X10 Y10\nX0 Y10\nG3 X-10 Y0 R10\nG1 X0 Y0\n"),
