@@ -66,6 +66,10 @@ PAIRS = {
     "fanuc macro": ("fanuc", "G65 P9 X4. Y2. R3. K3.\nM30\nO9\n#30=0\nWHILE[#30LT#6]DO1\n"
                              "X[#24+#18*COS[#30*120]] Y[#25+#18*SIN[#30*120]]\n#30=#30+1\nEND1\nM99\n",
                     "X7 Y2\nX[4-1.5] Y[2+3*SIN[60]]\nX[4-1.5] Y[2-3*SIN[60]]\n"),
+    "fanuc two values": ("fanuc", "#1=POW[2.,3.]\n#2=ATAN[1.,1.]\nX[#1+POW[4.,0.5]] Y[ATAN[1.]/[-1.]] Z[#2/9.]\nM30\n",
+                         "X10 Y135 Z5\n"),
+    "fanuc modes kept": ("fanuc", "#1=#4003\n#2=#4001\n#3=#4109\nG91\nG0 X3. Y#4120\nX1.\nG#1 G#2 F[#3/2.]\nX5.\nM30\n",
+                         "G0 X3 Y1\nX4\nG1 F250 X5\n"),
     "fanuc helix": ("fanuc", "#5=0\nN1 #5=#5-0.5\nG3 I3. Z#5\nIF[#5GT-2.]GOTO1\nG1\nM30\n",
                     "G3 I3 Z-0.5\nI3 Z-1\nI3 Z-1.5\nI3 Z-2\nG1\n"),
     "fanuc cycle": ("fanuc", "G98 G81 X5. Y5. Z-3. R2.\nX9.\nG80\nG1 X0.\nM30\n",

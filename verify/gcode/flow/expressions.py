@@ -11,7 +11,7 @@ import math
 import operator
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from verify.gcode.block_words import NUMBER, BlockError
@@ -47,16 +47,18 @@ class Grammar:
     functions  : of one value, by name; atan takes two, exists a name
     operators  : of two values, by sign
     precedence : level of each operator, from 1
+    pairs      : functions of two values in one bracket, by name
     """
 
     functions: Mapping[str, Callable[[float], float]]
     operators: Mapping[str, Callable[[float, float], float]]
     precedence: Mapping[str, int]
+    pairs: Mapping[str, Callable[[float, float], float]] = field(default_factory=dict)
 
     @cached_property
     def function(self) -> re.Pattern[str]:
         """Matches the name of a function."""
-        return _one_of({*self.functions, "atan", "exists"})
+        return _one_of({*self.functions, *self.pairs, "atan", "exists"})
 
     @cached_property
     def operator(self) -> re.Pattern[str]:
@@ -134,13 +136,7 @@ class ExpressionReader:
         self.take("[")
         inside = self._joined(1)
         self.take("]")
-
-        def checked(scope: Parameters) -> float:
-            result = inside(scope)
-            if not math.isfinite(result):
-                raise BlockError("the value of an expression is not a finite number")
-            return result
-        return checked
+        return _finite(inside)
 
     def target(self) -> ParameterReference:
         """The parameter behind a # sign."""
@@ -167,12 +163,40 @@ class ExpressionReader:
             if target.number is not None:
                 raise BlockError("EXISTS takes a named parameter, such as EXISTS[#<depth>], not a numbered one")
             return lambda scope: float(scope.exists(target.name))
+        if pair := self.grammar.pairs.get(name):
+            if (both := self._both(pair)) is not None:
+                return both
         first = self.bracket()
         if name == "atan":
             self.take("/")
             return _join(lambda y, x: math.degrees(math.atan2(y, x)), first, self.bracket())
+        if name not in self.grammar.functions:
+            raise BlockError(f"{name.upper()} takes two values in its bracket")
         function = self.grammar.functions[name]
         return lambda scope: function(first(scope))
+
+
+    def _both(self, function: Callable[[float, float], float]) -> Value | None:
+        """A function of two values in one bracket; None where the bracket holds one value."""
+        start = self.at
+        self.take("[")
+        left = _finite(self._joined(1))
+        if not self.text.startswith(",", self.at):
+            self.at = start
+            return None
+        self.at += 1
+        right = _finite(self._joined(1))
+        self.take("]")
+        return _join(function, left, right)
+
+
+def _finite(value: Value) -> Value:
+    def checked(scope: Parameters) -> float:
+        result = value(scope)
+        if not math.isfinite(result):
+            raise BlockError("the value of an expression is not a finite number")
+        return result
+    return checked
 
 
 def _join(operation: Callable[[float, float], float], left: Value, right: Value) -> Value:
@@ -205,7 +229,14 @@ def modulo(left: float, right: float) -> float:
     return left % abs(right)
 
 
-def _power(left: float, right: float) -> float:
+def power(left: float, right: float) -> float:
+    """The power.
+
+    Raises
+    ------
+    BlockError
+        It has no value, or overflows.
+    """
     if left < 0 and right != math.floor(right):
         raise BlockError(f"{left:g} ** {right:g} has no value: a negative number has whole powers only")
     if left == 0 and right < 0:
@@ -242,7 +273,7 @@ def rounded(number: float) -> float:
 
 
 _OPERATIONS: dict[str, Callable[[float, float], float]] = {
-    "**": _power, "*": operator.mul, "/": divided, "mod": modulo, "+": operator.add, "-": operator.sub,
+    "**": power, "*": operator.mul, "/": divided, "mod": modulo, "+": operator.add, "-": operator.sub,
     "eq": lambda a, b: float(abs(a - b) < EQUAL), "ne": lambda a, b: float(abs(a - b) >= EQUAL),
     "gt": lambda a, b: float(a > b), "ge": lambda a, b: float(a >= b), "lt": lambda a, b: float(a < b),
     "le": lambda a, b: float(a <= b), "and": lambda a, b: float(a != 0 and b != 0),

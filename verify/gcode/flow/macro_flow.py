@@ -17,7 +17,7 @@ from geometry.errors import VerificationError
 from verify.gcode.block_words import NUMBER, BlockError, bare
 from verify.gcode.dialects.base import Machine
 from verify.gcode.flow.expressions import ExpressionReader, Value
-from verify.gcode.flow.macro_variables import ARGUMENTS, MACRO_GRAMMAR, MacroVariables
+from verify.gcode.flow.macro_variables import ARGUMENTS, MACRO_GRAMMAR, WORD_GRAMMAR, MacroVariables
 from verify.gcode.flow.parameters import CallFrame
 from verify.gcode.flow.parametric_lines import digits
 
@@ -90,7 +90,7 @@ class _Filled:
         head = "/" if text.startswith("/") else ""
         if "#" not in text and "[" not in text:
             return cls(text.upper(), ())
-        reading, words = ExpressionReader(text, MACRO_GRAMMAR), []
+        reading, words = ExpressionReader(text, WORD_GRAMMAR), []
         reading.at = len(head)
         while reading.rest:
             letter = text[reading.at].upper()

@@ -13,12 +13,17 @@ import operator
 from collections.abc import Callable
 
 from verify.gcode.block_words import BlockError
-from verify.gcode.flow.expressions import Grammar, divided, modulo, rounded, small_enough, within
+from verify.gcode.flow.expressions import Grammar, divided, modulo, power, rounded, small_enough, within
 from verify.gcode.flow.parameters import Parameters
 
 LOCALS = 33
 POSITIONS = {5001: 5420, 5002: 5421, 5003: 5422, 5041: 5420, 5042: 5421, 5043: 5422}
 """Places of the tip in programmed coordinates, and the numbers of LinuxCNC for them."""
+MODES: dict[int, tuple[str, tuple[float, ...]]] = {
+    4001: ("_motion_mode", (0, 1, 2, 3)), 4002: ("_plane", ()), 4003: ("_absolute", (91, 90)),
+    4006: ("_metric", (20, 21)), 4010: ("_retract_r_plane", (98, 99)),
+    4109: ("_feed", ()), 4119: ("_rpm", ()), 4120: ("_current_tool", ())}
+"""Modal words by the variable that holds them: their name in the reader, and the G words of 0 and 1."""
 IDLE = frozenset({3003, 3004, 3005, 3006, 3007})
 """Variables that stop, show messages or lock switches, but move nothing."""
 ALARM = 3000
@@ -50,9 +55,9 @@ class MacroVariables(Parameters):
             if found != found:
                 self.vacant = n
             return found
-        if n in POSITIONS:
+        if n in POSITIONS or n in MODES:
             self.changes += 1
-            return self._served(POSITIONS[n])
+            return self._served(POSITIONS[n]) if n in POSITIONS else self._mode(n)
         if n not in self._numbers:
             if any(n in r for r in _COMMON):
                 raise BlockError(f"#{n} has no value: the program has not set it, and a control keeps it from the "
@@ -62,6 +67,15 @@ class MacroVariables(Parameters):
         if self._numbers[n] != self._numbers[n]:
             self.vacant = n
         return self._numbers[n]
+
+    def _mode(self, n: int) -> float:
+        """A modal word of the block before: #4001 holds the motion, #4002 the plane, #4003 90 or 91, and so on."""
+        name, codes = MODES[n]
+        found = self._served(name)
+        code = found / 10.0 if name in ("_motion_mode", "_plane") else codes[int(found)] if codes else found
+        if n == 4001 and code not in codes:
+            raise BlockError("#4001 in a drilling cycle, which controls count differently")
+        return code
 
     def put(self, number: float, value: float) -> None:
         """Give a variable a value; nan makes it vacant.
@@ -150,7 +164,18 @@ _OPERATORS: dict[str, Callable[[float, float], float]] = {
     "eq": _equal, "ne": lambda a, b: 1.0 - _equal(a, b), "gt": _ordered(operator.gt), "ge": _ordered(operator.ge),
     "lt": _ordered(operator.lt), "le": _ordered(operator.le),
 }
-MACRO_GRAMMAR = Grammar(_FUNCTIONS, _OPERATORS, {
-    "*": 3, "/": 3, "mod": 3, "and": 3, "+": 2, "-": 2, "or": 2, "xor": 2,
-    "eq": 1, "ne": 1, "gt": 1, "ge": 1, "lt": 1, "le": 1})
-"""Expressions of macro B."""
+_PRECEDENCE = {"*": 3, "/": 3, "mod": 3, "and": 3, "+": 2, "-": 2, "or": 2, "xor": 2,
+               "eq": 1, "ne": 1, "gt": 1, "ge": 1, "lt": 1, "le": 1}
+_PAIRS: dict[str, Callable[[float, float], float]] = {
+    "pow": power, "atan": lambda y, x: math.degrees(math.atan2(y, x))}
+
+
+def _in_word(number: float) -> float:
+    raise BlockError(f"ROUND[{number:g}] in a word rounds to the least increment of the control, in an assignment to a "
+                     "whole number", "round in an assignment before: #1=ROUND[#2]")
+
+
+MACRO_GRAMMAR = Grammar(_FUNCTIONS, _OPERATORS, _PRECEDENCE, _PAIRS)
+"""Expressions of macro B in assignments and conditions."""
+WORD_GRAMMAR = Grammar({**_FUNCTIONS, "round": _in_word, "rnd": _in_word}, _OPERATORS, _PRECEDENCE, _PAIRS)
+"""Expressions of macro B behind a letter."""

@@ -169,6 +169,8 @@ def test_a_place_of_the_machine_needs_no_g0_on_these_controls():
     ("fanuc", "G1 X1. ,C2. F100.\n", ",C2. (a chamfer"), ("haas", "G1 X1. F100. ,R.5\n", ",R.5 (a chamfer"),
     ("haas", "G143 H1\n", "G143 (a length"), ("haas", "G113\n", "G113 is work offset 10"),
     ("fanuc", "G3 X0. Y0. I5. P3 F100.\n", "P3 in a block of an arc"), ("haas", "G3 X0. I5. P2 F9.\n", "P2 in a block"),
+    ("fanuc", "G1 X[ROUND[1.2]] F100.\n", "ROUND[1.2] in a word"), ("haas", "#1=POW[2.]\n", "POW takes two values"),
+    ("fanuc", "#1=#4014\n", "#4014 is a variable of the control"),
     ("fanuc", "G1 X1. F100. ; X7.\n", "'X7.' follows a ;")])
 def test_what_moves_and_is_not_followed_is_refused_by_name(dialect, body, words):
     with pytest.raises(ProgramError) as caught:
