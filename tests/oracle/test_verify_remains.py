@@ -6,8 +6,10 @@ import time
 import numpy as np
 import pytest
 
+from geometry.kernels.nearest import nearest_row
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, blocks, prism, terraces, tool
+from verify.kernels.surface import remains
 from verify.kernels.surface.remains import CLOSE, SHARE
 from verify.moves import Moves
 from verify.surface.remains import Rays, Remains, depths_both_ways
@@ -125,6 +127,64 @@ def test_distances_are_those_of_a_dense_cloud(seed):
             assert true > FAR - 2.0 * step
         else:  # a place of the cloud is no farther from what is left than its step allows
             assert value <= true * (1.0 + SHARE) + CLOSE and value >= true - 2.0 * step
+
+
+def plain_distance(place, within, tree, normals, rows, tool, cutters):
+    """The search of the kernel through all sweeps for every cube."""
+    best, cubes, root3 = np.inf, [(*place, within)], math.sqrt(3.0)
+    every, away, stack = np.arange(len(rows)), np.empty(len(rows)), np.empty(128, np.int64)
+    while cubes:
+        x, y, z, half = cubes.pop()
+        gap = remains._cube_gap(*place, x, y, z, half)
+        if gap > (within if best > within else best - max(CLOSE, SHARE * best)):
+            continue
+        rho = root3 * half
+        least = remains._swept(x, y, z, -np.inf, rows, tool, cutters, every, away)
+        if least <= -rho:
+            continue
+        d2, _ = nearest_row(tree.lower, tree.upper, tree.child, tree.first, tree.size, tree.corners, x, y, z, np.inf,
+                            stack)
+        off, inside = math.sqrt(d2), remains._inside(tree, normals, x, y, z)
+        if not inside and off >= rho:
+            continue
+        if inside and least > 0.0:
+            way = math.sqrt((place[0] - x) ** 2 + (place[1] - y) ** 2 + (place[2] - z) ** 2)
+            best = min(best, max(way - min(least, off), 0.0))
+            if best <= 0.0:
+                return best
+            if min(least, off) >= rho:
+                continue
+        if 2.0 * half <= max(remains.LEAST_SIDE, remains.FILM * gap):
+            continue
+        q, signs = 0.5 * half, [1.0 if p > c else -1.0 for p, c in zip(place, (x, y, z), strict=True)]
+        for i in range(7, -1, -1):
+            cubes.append(tuple(c + q * (-s if i >> k & 1 else s)
+                               for k, (c, s) in enumerate(zip((x, y, z), signs, strict=True))) + (q,))
+    return best if best <= within else np.inf
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 3])
+def test_short_lists_of_sweeps_change_no_bit(seed):
+    rng = np.random.default_rng(seed)
+    mesh, body = blocks(seed), [ball(3.0), tool(4.0, 0.0), tool(4.0, 1.0), ball(2.0)][seed]
+    low, high = mesh.bounds
+    tips = np.cumsum(rng.normal(0.0, 0.4, (120, 3)), axis=0)
+    tips = low + (high - low) * (0.5 + 0.45 * np.sin(tips))
+    axes = None
+    if seed >= 2:
+        lean = rng.normal([0, 0, 5.0], 1.0, (120, 3))
+        lean /= np.linalg.norm(lean, axis=1)[:, None]
+        axes = ToolAxes.between(lean[:-1].copy(), lean[1:].copy())
+    left = Remains(TriangleTree(mesh), path(*tips, axes=axes), [body])
+    w, at = rng.dirichlet([1, 1, 1], 6), rng.integers(0, len(mesh.faces), 6)
+    places = np.einsum("ij,ijk->ik", w, mesh.triangles[at])
+    found, counts = left.distances(places, np.full(6, 2.0)), []
+    for place, value in zip(places.tolist(), found.tolist(), strict=True):
+        rows, k = remains.fill_pieces(left.feeds, len(left.feeds), left.moves.arrays, left.axes, left.cutters,
+                                      left.reach, *place, 2.0 * math.sqrt(3.0))
+        counts.append(len(k))
+        assert value == plain_distance(place, 2.0, left.tree.arrays, mesh.normals, rows, k, left.cutters)
+    assert max(counts) > 4 * remains.FEW
 
 
 def of_part(mesh, points):

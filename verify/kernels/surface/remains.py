@@ -4,9 +4,10 @@ What is left is the part without the volumes that cutting parts sweep. A cube is
 rho of the ball round it: one sweep holds all of it where the signed distance of c to that sweep is at most -rho, and
 none of it is part where c is outside the mesh by rho or more. Where c is left, a ball round it is left too: that bounds
 the distance from above, and cubes farther off are passed over. Other cubes are parted into eight, the nearest first
-[Land1960]. A cube that nothing settles counts as gone when its side is below ``LEAST_SIDE`` or ``FILM`` of its
-distance. So a distance is too small by rounding at most. It is too large by ``CLOSE`` or ``SHARE`` of it, or where all
-that is left nearer is thinner than such a cube.
+[Land1960]. Of the sweeps these eight look only through those that may be the nearest somewhere in the cube: a signed
+distance changes by no more than the way between places. A cube that nothing settles counts as gone when its side is
+below ``LEAST_SIDE`` or ``FILM`` of its distance. So a distance is too small by rounding at most. It is too large by
+``CLOSE`` or ``SHARE`` of it, or where all that is left nearer is thinner than such a cube.
 
 A side of a tool that runs along a face of the part, from within, would have cubes parted all over that face: half of
 each is outside the part, and half in the sweep. Where the part meets a cube in one plane only, its half of the cube is
@@ -30,6 +31,7 @@ from verify.kernels.tables import AxisArrays, MoveArrays
 
 CLOSE, SHARE = 1e-4, 0.01  # mm, and of the distance: what the result may be too large by
 LEAST_SIDE, FILM = 1e-4, 0.03  # mm, and of its distance: side of a cube that is not parted
+LISTS, FEW = 6, 4  # times the count of sweeps: room for their lists; a list that is not shortened
 CUBES = 8 * 40  # rows of the stack of cubes: a cube is parted 40 times at most
 ASIDE = (0.3571 / 0.9998, 0.2833 / 0.9998, 0.8901 / 0.9998)  # no edge or face lies along it
 
@@ -88,11 +90,16 @@ def _carried(x, y, z, row, k, cutters):
 
 
 @njit(**KERNEL)
-def _swept(x, y, z, enough, rows, tool, cutters):
-    """Least signed distance of a point to the sweeps; the search ends at ``enough`` or below."""
+def _swept(x, y, z, enough, rows, tool, cutters, listed, away):
+    """Least signed distance of a point to the sweeps ``listed`` (k,); the search ends at ``enough`` or below.
+
+    away : (k,) float64, their signed distances, overwritten as far as the search goes
+    """
     least = np.inf
-    for j in range(len(rows)):
+    for i in range(len(listed)):
+        j = listed[i]
         d = _carried(x, y, z, rows[j], tool[j], cutters)
+        away[i] = d
         if d < least:
             least = d
             if least <= enough:
@@ -101,10 +108,10 @@ def _swept(x, y, z, enough, rows, tool, cutters):
 
 
 @njit(**KERNEL)
-def _deepest(x, y, z, rows, tool, cutters):
-    """Row of the sweep with the least signed distance to a point."""
+def _deepest(x, y, z, rows, tool, cutters, listed):
+    """Row of the sweep with the least signed distance to a point, of those ``listed`` (k,)."""
     least, found = np.inf, -1
-    for j in range(len(rows)):
+    for j in listed:
         d = _carried(x, y, z, rows[j], tool[j], cutters)
         if d < least:
             least, found = d, j
@@ -197,20 +204,24 @@ def distance_left(px, py, pz, within, tree: TreeArrays, normals, rows, tool, cut
 
     rows, tool : pieces of moves that come that near, from ``fill_pieces``
     enough     : mm; a distance below it need not be found any better
-    cubes      : (CUBES, 4) float64, overwritten; stack : (128,) int64, overwritten
+    cubes      : (CUBES, 6) float64, overwritten: middle, half a side, and the part of ``lists`` that is looked through;
+                 stack : (128,) int64, overwritten
     """
     best = np.inf
-    cubes[0, 0], cubes[0, 1], cubes[0, 2], cubes[0, 3] = px, py, pz, within
+    lists, aside = np.empty(LISTS * len(rows), np.int64), np.empty(len(rows))
+    lists[:len(rows)] = np.arange(len(rows))
+    cubes[0, 0], cubes[0, 1], cubes[0, 2], cubes[0, 3], cubes[0, 4], cubes[0, 5] = px, py, pz, within, 0.0, len(rows)
     depth = 1
     while depth > 0:
         depth -= 1
         x, y, z, half = cubes[depth, 0], cubes[depth, 1], cubes[depth, 2], cubes[depth, 3]
+        begin, end = int(cubes[depth, 4]), int(cubes[depth, 5])
         gap = _cube_gap(px, py, pz, x, y, z, half)
         limit = within if best > within else best - max(CLOSE, SHARE * best)
         if gap > limit:
             continue
         rho = math.sqrt(3.0) * half
-        swept = _swept(x, y, z, -rho, rows, tool, cutters)
+        swept = _swept(x, y, z, -rho, rows, tool, cutters, lists[begin:end], aside)
         if swept <= -rho:
             continue
         d2, facet = nearest_row(tree.lower, tree.upper, tree.child, tree.first, tree.size, tree.corners, x, y, z,
@@ -237,9 +248,19 @@ def distance_left(px, py, pz, within, tree: TreeArrays, normals, rows, tool, cut
                 n /= size
                 if _one_plane(tree, x, y, z, half, a, n, 0.25 * film, stack):
                     d = 0.5 * half
-                    j = _deepest(x - d * n[0], y - d * n[1], z - d * n[2], rows, tool, cutters)
+                    j = _deepest(x - d * n[0], y - d * n[1], z - d * n[2], rows, tool, cutters, lists[begin:end])
                     if j >= 0 and _corners_gone(x, y, z, half, a, n, 0.25 * film, rows[j], tool[j], cutters):
                         continue
+        if end - begin > FEW and 2 * end - begin <= len(lists):  # behind its own list, which its neighbours keep
+            nearest, count = end, 0
+            for i in range(end - begin):
+                if aside[i] <= swept + 2.0 * rho + CLOSE:
+                    if aside[i] == swept:
+                        nearest = end + count
+                    lists[end + count] = lists[begin + i]
+                    count += 1
+            lists[end], lists[nearest] = lists[nearest], lists[end]  # the nearest is looked at first
+            begin, end = end, end + count
         # eight children, the nearest last, so that it comes first
         quarter = 0.5 * half
         sx, sy, sz = (1.0 if px > x else -1.0), (1.0 if py > y else -1.0), (1.0 if pz > z else -1.0)
@@ -248,7 +269,7 @@ def distance_left(px, py, pz, within, tree: TreeArrays, normals, rows, tool, cut
             cubes[depth, 0] = x + quarter * (-sx if i & 1 else sx)
             cubes[depth, 1] = y + quarter * (-sy if i & 2 else sy)
             cubes[depth, 2] = z + quarter * (-sz if i & 4 else sz)
-            cubes[depth, 3] = quarter
+            cubes[depth, 3], cubes[depth, 4], cubes[depth, 5] = quarter, begin, end
             depth += 1
     return best if best <= within else np.inf
 
@@ -261,7 +282,7 @@ def distances_left(points, within, tree: TreeArrays, normals, moves: MoveArrays,
     points : (n, 3) float64, mm, setup frame; within, enough : (n,) float64, mm
     chosen : (c,) int64, index, feed moves that may come near
     """
-    near, cubes, stack = np.empty(len(chosen), np.int64), np.empty((CUBES, 4)), np.empty(128, np.int64)
+    near, cubes, stack = np.empty(len(chosen), np.int64), np.empty((CUBES, 6)), np.empty(128, np.int64)
     for i in range(len(points)):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         far = math.sqrt(3.0) * within[i]
