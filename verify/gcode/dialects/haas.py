@@ -81,9 +81,9 @@ class HaasReader(FanucReader):
             raise BlockError("unknown word G92.1: Haas ends a shift with another G92, or with G52")
         return super()._code(code, values)
 
-    def _translated(self, words: list[tuple[str, str]], deleted: bool) -> list[str]:
+    def _translated(self, words: list[tuple[str, str]], codes: list[float], deleted: bool) -> list[str]:
         stops = any(a == "M" and float(b) in (0.0, 1.0) for a, b in words)
-        return [*super()._translated(words, deleted), *(["M5", "M9"] if stops else [])]
+        return [*super()._translated(words, codes, deleted), *(["M5", "M9"] if stops else [])]
 
     def _after(self, codes: list[float]) -> list[str]:
         return ["G49"] if 28 in codes and 43 not in codes else []

@@ -70,7 +70,7 @@ REFUSED = [
     ("KONT", "KONT (another approach"), ("BSPLINE X1", "a spline"), ("G58 X1", "programmable work offset"),
     ("G33 Z1 K1", "thread cutting"), ("G1 X9 F9 RND=20\nY9", "does not fit"),
     ("G1 X9 F9 CHR=2\nTRANS X1", "TRANS between a corner"), ("G1 Z1 F9 RND=2", "leaves the plane"),
-    ("X=R5", "R5 has no value yet"), ("DIAMON", "count as diameters"), ("RTLIOF", "speeds of their own"),
+    ("X=R5", "R5 has no value yet"), ("DIAMON", "X by the diameter"),
     ("POS[X]=5", "POS (a positioning axis)"), ("ORIRESET(0,0)", "a turn of the tool"),
     ("WAITM(1,1,2)", "another channel"),
     ("G1 X5 AR=90", "AR= is used by no word"), ("G91 G3 X5 Y5 AR=90", "AR= in incremental"),
