@@ -38,7 +38,7 @@ from verify.material.cutting_loads import cut_sequence, loads
 from verify.material.dogleg_rapids import box_findings
 from verify.material.engagement import engaged_angles, engagement_findings, engagements, in_parts
 from verify.material.fine_plunges import fine_plunges
-from verify.material.material import contacts, dogleg_limits, unseen
+from verify.material.material import contacts, dogleg_limits, unseen, unseen_cores
 from verify.material.stock_pass import StockPass
 from verify.model import (
     Asked,
@@ -126,7 +126,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     met = contacts(part.mesh, np.concatenate([cuts.guard, cuts.edge]), moves, tools, setup, slides, threads,
                    stages.span(HELD, MET))
     run = met.run
-    fine = unseen([tools[k] for k in np.unique(moves.tool[moves.feed])], met.spacing, met.upright)
+    used = [tools[k] for k in np.unique(moves.tool[moves.feed])]
+    fine = unseen(used, met.spacing, met.upright)
     skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
     stretches, of = in_parts(moves, tools)
     known = counted(framed, np.unique(source.tool).tolist())
@@ -135,7 +136,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     loaded, cautions = loads(in_cut, tools, setup.cutting)
     angle = engaged_angles(run.engaged, stretches, tools)
     again, springs = repeats(moves, run.cut, source, _finishes(cuts, setup, len(moves)))
-    dug = fine_plunges(moves, tools, fine, part.mesh.bounds, setup, threads)
+    dug = fine_plunges(moves, tools, fine, part.mesh.bounds, setup, threads,
+                       unseen_cores(used, setup, met.spacing, met.upright))
     dug = dug[~np.isin(dug[:, 0], run.events[run.events[:, 1] == PLUNGE, 0])]
     met_by = contact_findings(np.concatenate([run.events, dug]), moves, source, skins, tools)
     findings = [*as_collisions(met_by, [p.program for p in framed]),

@@ -19,7 +19,7 @@ from benchmarks.adversary.adversary_parts import (
     R,
     rows,
 )
-from benchmarks.adversary.harm_bodies import HIGH, _faced, _high_stock, _into_stock
+from benchmarks.adversary.harm_bodies import HIGH, _faced, _high_stock, _into_stock, _tools
 from benchmarks.adversary.harm_surface import LEVELLED, base, choice, contact, dip, level, load
 
 Rng = np.random.Generator
@@ -118,7 +118,7 @@ def no_length_moves(rng: Rng) -> Case:
 
 
 def helix_entry(rng: Rng) -> Case:
-    """The pocket entered by helices of less than three degrees in place of ramps."""
+    """The pocket entered by helices of less than three degrees in place of ramps, by mills of both kinds."""
     s = Script(group="good")
     right = PARTS["pocket"].program()
     first = next(k for k, op in enumerate(right.ops) if op.kind == "rapid" and op.x == -4.0)
@@ -138,7 +138,9 @@ def helix_entry(rng: Rng) -> Case:
     s.arc(radius, 0.0, (0.0, 0.0))
     s.rapid(z=SAFE)
     s.ops += right.ops[first:]
-    return made("helix entry", "pocket", s, what=f"radius {radius:.2f}")
+    hollow = rng.random() < 0.5  # no core is left: the radius is more than 0.15 D
+    return made("helix entry", "pocket", s, setup=_tools(center_cutting=False) if hollow else None,
+                what=f"radius {radius:.2f}, {'no ' if hollow else ''}centre")
 
 
 def other_order(rng: Rng) -> Case:

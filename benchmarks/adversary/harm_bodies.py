@@ -274,7 +274,7 @@ def pecks_paid_in_air(rng: Rng) -> Case:
 
 def no_centre_straight(rng: Rng) -> Case:
     """Straight down by less than a tenth of the diameter, by a mill that does not cut to its centre."""
-    s, deep = Script(group="harm"), float(rng.uniform(0.2, 0.5))
+    s, deep = Script(group="harm"), float(rng.uniform(0.07, 0.5))
     x, y, top = _into_stock(s, rng)
     ops = [s.feed(z=top - deep, feed=100.0)]
     _faced(s)

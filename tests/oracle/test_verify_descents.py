@@ -8,9 +8,11 @@ import pytest
 
 from tests.pocket_case import SETUP, TOOL, block, scored, text
 from verify.kernels.stock import PLUNGE
+from verify.material import stock_pass
+from verify.material.material import stock_spacing, unseen_cores
 from verify.material.stock_field import run_field, stock_field
 from verify.material.stock_lines import blank, run_stock
-from verify.material.stock_pass import Ways, cores, descents, parts
+from verify.material.stock_pass import Ways, descents, hollow_ends, parts
 from verify.model import NcProgram, ScoredSamples
 from verify.moves import Moves
 from verify.prove import prove
@@ -102,7 +104,7 @@ def pressed(path, core, setup=HOLLOW):
     ramp = replace(setup, cores={1: 2.0 * core}, ramp_angles={1: math.radians(60.0)}, plunge_skin=1e9)
     run = run_stock(blank(PART.mesh, 0.1, setup), moves, [TOOL], ramp)
     events = run.events[run.events[:, 1] == PLUNGE]
-    return float(events[:, 2].max(initial=0.0)), float(cores([TOOL], ramp)[1][0])
+    return float(events[:, 2].max(initial=0.0)), float(hollow_ends([TOOL], ramp)[0, 1])
 
 
 def twin(path, core, step=0.1, per=0.01):
@@ -151,3 +153,136 @@ def test_a_helix_round_the_core_of_a_hollow_end(radius, harm):
     assert len(found[None]) == 0 and (len(found[1.2]) > 0) == harm
     if harm:
         assert found[1.2].max() == pytest.approx(turns * pitch, rel=0.02)
+
+
+def stubs(path, setup=HOLLOW, spacing=0.15):
+    """Depth by move of what the end presses or digs along a path over (n, 3) points."""
+    path = np.array(path, dtype=float)
+    moves = Moves(path[:-1].copy(), path[1:].copy(), np.ones(len(path) - 1, bool), np.zeros(len(path) - 1, np.int32))
+    events = run_stock(blank(PART.mesh, spacing, setup), moves, [TOOL], setup).events
+    events = events[events[:, 1] == PLUNGE]
+    return dict(zip(events[:, 0].astype(int).tolist(), events[:, 2].tolist(), strict=True))
+
+
+@pytest.mark.parametrize("deep", [0.045, 0.1, 0.16, 0.3])
+def test_straight_down_a_hollow_end_presses_a_hundredth_of_its_diameter(deep):
+    """The stub of a sound ramp, 0.166 mm here, is no limit where no way aside is made."""
+    at = [1.03, 2.07]
+    assert stubs([[*at, 2.0], [*at, 0.5 - deep]]) == {0: pytest.approx(deep)}
+    assert stubs([[*at, 2.0], [*at, 0.5 - deep]], SETUP) == {}
+    assert stubs([[*at, 2.0], [*at, 0.465], [*at, 1.0], [*at, 0.465]]) == {}  # pressed once only
+    steps = [[at[0] + 0.001 * (k % 2), at[1], 0.5 - deep * k / 9] for k in range(10)]
+    assert stubs(steps)[8] == pytest.approx(deep, abs=1e-6)
+    pecks = [p for k in range(1, 10) for p in ([*at, 0.6], [*at, 0.5 - deep * k / 9])]
+    assert stubs(pecks)[16] == pytest.approx(deep, abs=1e-6)
+    # a way on the top pays nothing
+    aside = [[*at, 0.501], [at[0] + 1.1, at[1], 0.499], [*at, 0.499], [*at, 0.5 - deep]]
+    assert 2 in stubs(aside)
+
+
+def test_straight_down_at_the_end_of_a_ramp():
+    ramp = [[-6.0, 0.0, 0.5], [2.0, 0.0, 0.5 - 8.0 * math.tan(SETUP.ramp_angle)]]
+    assert stubs(ramp) == {}
+    assert list(stubs([*ramp, [2.0, 0.0, ramp[1][2] - 0.06]])) == [1]
+    # the ring has been over what stood under the core
+    assert stubs([*ramp, [-6.0, 0.0, ramp[1][2]], [2.0, 0.0, ramp[1][2]], [2.0, 0.0, ramp[1][2] - 0.03]]) == {}
+
+
+@pytest.mark.parametrize("radius, deep", [(0.1, 0.13), (0.2, 0.2), (0.0, 0.06)])
+def test_a_shallow_helix_inside_the_core(radius, deep):
+    pitch = 2.0 * math.pi * max(radius, 0.01) * math.tan(SETUP.ramp_angle)
+    turns = math.ceil(deep / pitch)
+    assert turns * pitch > 2.0 * math.sqrt(8.0) * radius * math.tan(SETUP.ramp_angle) + 0.04
+    found = stubs(helix(radius, pitch, turns, per=24))
+    assert found and max(found.values()) == pytest.approx(turns * pitch, rel=0.02)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_sound_ramps_of_a_hollow_end_are_none(seed):
+    """To and fro along ways longer than its core, with corners, at the angle of a ramp; and helices round the core."""
+    rng = np.random.default_rng(seed)
+    if seed % 2:
+        radius = float(rng.uniform(0.65, 2.5))
+        pitch = 0.99 * 2.0 * math.pi * radius * math.tan(SETUP.ramp_angle)  # chords are steeper than arcs
+        assert stubs(helix(radius, pitch, math.ceil(2.0 / radius))) == {}
+        return
+    corners = [np.zeros(2)]
+    for turn in rng.uniform(-1.2, 1.2, 2).cumsum():
+        corners.append(corners[-1] + rng.uniform(1.5, 4.0) * np.array([math.cos(turn), math.sin(turn)]))
+    way = [*corners, *corners[-2:0:-1]] * 3
+    path = [[*way[0], 0.5]]
+    for a, b in zip(way[:-1], way[1:], strict=True):
+        path.append([*b, path[-1][2] - float(np.linalg.norm(b - a)) * math.tan(SETUP.ramp_angle)])
+    assert stubs(path) == {}
+
+
+def sheer_twin(path, core, slope, step=0.15, per=0.004):
+    """Most that a core presses beyond what ramps over the same ground leave, pose by pose."""
+    x, y = np.meshgrid(np.arange(-3.0, 3.0, step), np.arange(-3.0, 3.0, step))
+    top, low = np.full(x.shape, 0.5), np.full(x.shape, np.inf)
+    dug, paid, worst = np.zeros(x.shape), np.zeros(x.shape), 0.0
+    box = np.array([np.full(x.shape, v) for v in (np.inf, -np.inf, np.inf, -np.inf)])
+    for a, b in zip(path[:-1], path[1:], strict=True):
+        count = max(int(np.linalg.norm(b - a) / per), 1)
+        aside, drop = np.hypot(*(b - a)[:2]), max(a[2] - b[2], 0.0)
+        for s in np.arange(1, count + 1) / count:
+            tip = a + s * (b - a)
+            rho = np.hypot(x - tip[0], y - tip[1])
+            cut = (rho >= core) & (rho <= TOOL.radius) & (top > tip[2])
+            top[cut] = tip[2]
+            dug[cut] = np.minimum(dug[cut], np.maximum(top[cut] - low[cut], 0.0))
+            paid[cut] = np.minimum(paid[cut], dug[cut])
+            low[cut & (dug == 0.0)] = np.inf
+            box[0::2, cut & (dug == 0.0)], box[1::2, cut & (dug == 0.0)] = np.inf, -np.inf
+            over = np.minimum(low, top)
+            down = (rho < core) & (over > tip[2]) & (drop > 0.0)
+            gone = np.where(down, np.minimum(over - tip[2], drop), 0.0)
+            dug, paid = dug + gone, paid + gone * min(1.0, aside * slope / drop if drop else 0.0)
+            low = np.where((rho < core) & (over > tip[2]), tip[2], low)
+            for k, v in enumerate((tip[0], tip[0], tip[1], tip[1])):
+                box[k] = np.where(down, (np.minimum, np.maximum)[k % 2](box[k], v), box[k])
+            ground = np.where(dug > 0.0, np.hypot(box[1] - box[0], box[3] - box[2]), 0.0)
+            sheer = np.where(down, dug - np.minimum(paid, 2.0 * ground * slope), 0.0)
+            worst = max(worst, float(sheer.max()))
+    return worst
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_no_ramp_pays_for_is_that_of_a_twin(seed):
+    """Ways at random: a skin a little lower than what the twin states is found, one a little higher is not."""
+    rng = np.random.default_rng(40 + seed)
+    n = 7
+    path = np.column_stack([rng.uniform(-0.6, 0.6, (n, 2)).cumsum(axis=0) * 0.6, 0.5 - np.arange(n) * 0.03])
+    path[2, :2], path[5, :2] = path[1, :2], path[4, :2]  # straight down
+    core, slope = 0.6, math.tan(math.radians(20.0))
+    want = sheer_twin(path, core, slope)
+    moves = Moves(path[:-1].copy(), path[1:].copy(), np.ones(n - 1, bool), np.zeros(n - 1, np.int32))
+    setup = replace(HOLLOW, ramp_angles={1: math.radians(20.0)}, plunge_skin=1e9)
+    found = []
+    for skin in (want - 0.012, want + 0.012):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(stock_pass, "PRESSED", max(skin, 1e-9) / TOOL.diameter)
+            events = run_stock(blank(PART.mesh, 0.1, setup), moves, [TOOL], setup).events
+        found.append(bool((events[:, 1] == PLUNGE).any()))
+    assert want > 0.02 and found == [True, False]
+
+
+def test_a_stub_far_from_a_dug_hole_stays_found():
+    """Blocks in which ways decide over a plunge run twice, over the moves up to the last steep one."""
+    down = [[-10.0, -8.0, 2.0], [-10.0, -8.0, -0.4], [-10.0, -8.0, 2.0]]
+    pitch = 2.0 * math.pi * 0.2 * math.tan(SETUP.ramp_angle)
+    path = np.concatenate([down, helix(0.2, pitch, 12, per=24) + [9.0, 8.0, 0.0]])
+    moves = Moves(path[:-1].copy(), path[1:].copy(), np.ones(len(path) - 1, bool), np.zeros(len(path) - 1, np.int32))
+    fine = replace(SETUP, cores={1: 1.2}, ramp_angles={1: math.radians(4.0)})
+    events = run_stock(blank(PART.mesh, 0.15, fine), moves, [TOOL], fine).events
+    found = events[events[:, 1] == PLUNGE]
+    assert found[:, 0].min() == 0 and found[:, 0].max() > len(path) - 10
+
+
+def test_lines_stand_in_every_core():
+    moves = Moves(np.zeros((1, 3)), np.ones((1, 3)), np.ones(1, bool), np.zeros(1, np.int32))
+    thin = replace(SETUP, cores={1: 0.2})
+    assert stock_spacing(thin, moves, [TOOL]) == pytest.approx(0.14)
+    assert stock_spacing(SETUP, moves, [TOOL]) > 0.14
+    assert unseen_cores([TOOL], thin, 0.14, True) == [] and unseen_cores([TOOL], SETUP, 0.3, False) == []
+    assert unseen_cores([TOOL], thin, 0.3, True) == unseen_cores([TOOL], thin, 0.14, False) == [TOOL]

@@ -22,7 +22,8 @@ from verify.kernels.heights import INF, _cells, bottom, entered, lowest, lowest_
 from verify.kernels.profile import carried
 from verify.kernels.tables import F64, I64, Bool, ContactLimits, MoveArrays, RapidArrays, ToolArrays
 
-CUTTER, NECK, SHANK, HOLDER, PLUNGE, FIXTURE = 0, 1, 2, 3, 4, 8
+CUTTER, NECK, SHANK, HOLDER, PLUNGE, STUB, FIXTURE = 0, 1, 2, 3, 4, 5, 8
+STUB_TOP, STUB_LOW, STUB_DUG, STUB_PAID, STUB_X0, STUB_X1, STUB_Y0, STUB_Y1 = 0, 1, 2, 3, 4, 5, 6, 7
 REFRESH = 64
 ARM = 0.05  # mm by which a line that stands over the flutes must reach into them
 UNITS = 1e9  # whole numbers of 1e-9 mm³ and 1e-9 mm: sums do not depend on the order of the blocks
@@ -51,16 +52,29 @@ class DescentArrays(NamedTuple):
     earned : (m,) float64, mm, depth that ramps could have taken before
     way    : (m,) float64, mm, sideways way of feed moves before; far off after a rapid or another tool
     skin   : (k,) float64, mm, depth that the end of each tool may dig
-    core   : (k,) float64, mm, radius at the end of each tool within which it does not cut; 0: it cuts to its centre
-    left   : (k,) float64, mm, height of the stock that such a core may stand over
+    hollow : (k, 4) float64, rows as ``HollowEnd``
     """
 
     steep: Bool
     earned: F64
     way: F64
     skin: F64
-    core: F64
-    left: F64
+    hollow: F64
+
+
+class HollowEnd(NamedTuple):
+    """The end of a tool that does not cut to its centre.
+
+    core  : float, mm, radius within which it does not cut; 0: it cuts to its centre
+    left  : float, mm, height of the stub that it may stand over after ramps
+    skin  : float, mm, height that it may press straight down
+    slope : float, dimensionless, of a ramp
+    """
+
+    core: float
+    left: float
+    skin: float
+    slope: float
 
 
 class LineHistory(NamedTuple):
@@ -71,8 +85,9 @@ class LineHistory(NamedTuple):
     come  : (nx, ny) float64, mm, height of the line before the cutter began to lower it
     begun : (nx, ny) float64, mm, sideways way of the feed moves then
     whole : (nx, ny) float64, mm, depth that ends of tools have dug, whatever ramps could have paid for
-    stub  : (nx, ny) float64, mm, height of the line where ends without a cutting centre leave a stub; no size where
-            all tools cut to their centre
+    stub  : (nx, ny, 8) float64, mm, of the stub that ends without a cutting centre leave; no size where all tools cut
+            to their centre. Its top; the lowest place of a core on it; how deep cores went since the ring round one
+            lowered it; how much of that ramps pay for; least and most x and y of the tips meanwhile
     """
 
     since: F64
@@ -243,10 +258,51 @@ def _lower(lines, box, a, d, cutter, end, descents, m, history, engaged, totals,
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _over_stub(x, y, top, floor, a, d, cutter, core, stock_bottom):
-    """What an end without a cutting centre does to a line on a move: (new height, height of the stub under the core).
+def _lower_stub(row, top):
+    """The ring round the core lowers a stub to ``top``: what the core had pressed above is gone."""
+    if top < row[STUB_TOP]:
+        row[STUB_TOP] = top
+        row[STUB_DUG] = min(row[STUB_DUG], max(top - row[STUB_LOW], 0.0))
+        row[STUB_PAID] = min(row[STUB_PAID], row[STUB_DUG])
+        if row[STUB_DUG] <= 0.0:
+            row[STUB_LOW] = INF
 
-    top : mm, of the line before; floor : mm, lowest tip of the move
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _press(row, low, begin, end, a, d, slope):
+    """The core goes over a stub down to ``low`` between two parts ``begin`` and ``end`` of a move.
+
+    slope : of a ramp
+
+    Returns the height pressed, and how much of it no ramp over the same ground could have left.
+    """
+    top = row[STUB_TOP]
+    over = min(row[STUB_LOW], top)
+    gone = min(over - low, -d[2])
+    if gone > 0.0:
+        begin = max(begin, end - (over - low) / -d[2])  # before, the core was over the stub
+        aside = math.sqrt(d[0] * d[0] + d[1] * d[1])
+        if row[STUB_DUG] <= 0.0:
+            row[STUB_X0], row[STUB_Y0] = INF, INF
+            row[STUB_X1], row[STUB_Y1] = -INF, -INF
+        row[STUB_DUG] += gone
+        row[STUB_PAID] += gone * min(1.0, aside * slope / -d[2])
+        for s in (begin, end):
+            row[STUB_X0], row[STUB_X1] = min(row[STUB_X0], a[0] + s * d[0]), max(row[STUB_X1], a[0] + s * d[0])
+            row[STUB_Y0], row[STUB_Y1] = min(row[STUB_Y0], a[1] + s * d[1]), max(row[STUB_Y1], a[1] + s * d[1])
+    row[STUB_LOW] = min(over, low)
+    if row[STUB_DUG] <= 0.0:
+        return top - low, 0.0
+    wide, deep = row[STUB_X1] - row[STUB_X0], row[STUB_Y1] - row[STUB_Y0]
+    ground = math.sqrt(wide * wide + deep * deep)
+    return top - low, row[STUB_DUG] - min(row[STUB_PAID], 2.0 * ground * slope)
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _over_stub(x, y, row, a, d, cutter, core, slope, stock_bottom):
+    """What an end without a cutting centre does to the stub on a line on a move, as ``_press``.
+
+    row : (8,) float64, of the line, changed in place
 
     The ring round the core lowers the line in front of the core and behind it. What stands under the core is pressed.
     """
@@ -256,41 +312,45 @@ def _over_stub(x, y, top, floor, a, d, cutter, core, stock_bottom):
     plan2 = d[0] * d[0] + d[1] * d[1]
     if plan2 < 1e-18:
         rho = math.sqrt(wx * wx + wy * wy)
+        low = min(a[2], a[2] + d[2]) + bottom(rho, flat, corner, cone)
         if rho < core:
-            return top, top - max(floor, stock_bottom)
-        return (min(top, floor + bottom(rho, flat, corner, cone)) if rho <= radius else top), 0.0
+            return _press(row, max(low, stock_bottom), 0.0, 1.0, a, d, slope)
+        if rho <= radius:
+            _lower_stub(row, low)
+        return 0.0, 0.0
     s0 = (wx * d[0] + wy * d[1]) / plan2
     miss2 = max(wx * wx + wy * wy - s0 * s0 * plan2, 0.0)
     if miss2 >= core * core:
-        return min(top, lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, 0.0, cone)[0]), 0.0
+        _lower_stub(row, lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, 0.0, cone)[0])
+        return 0.0, 0.0
     plan = math.sqrt(plan2)
     wide, narrow = math.sqrt(radius * radius - miss2) / plan, math.sqrt(core * core - miss2) / plan
     s1, s2, s3, s4 = max(s0 - wide, 0.0), s0 - narrow, s0 + narrow, min(s0 + wide, 1.0)
     if s1 > 1.0 or s4 < 0.0:
-        return top, 0.0
+        return 0.0, 0.0
     rim = bottom(core, flat, corner, cone)
-    pressed = 0.0
+    pressed, sheer = 0.0, 0.0
     if s2 > s1:
         far = math.sqrt(miss2 + (s1 - s0) * (s1 - s0) * plan2)
         near = min(s2, 1.0)
         there = rim if s2 <= 1.0 else bottom(math.sqrt(miss2 + (1.0 - s0) * (1.0 - s0) * plan2), flat, corner, cone)
-        top = min(top, a[2] + s1 * d[2] + bottom(far, flat, corner, cone), a[2] + near * d[2] + there)
+        _lower_stub(row, min(a[2] + s1 * d[2] + bottom(far, flat, corner, cone), a[2] + near * d[2] + there))
     if s2 < 1.0 and s3 > 0.0:
-        low = a[2] + min(max(s2, 0.0) * d[2], min(s3, 1.0) * d[2])
-        pressed = top - max(low, stock_bottom)
+        low = lowest_within(x, y, a[0], a[1], a[2], d[0], d[1], d[2], core, flat, corner, cone)[0]
+        pressed, sheer = _press(row, max(low, stock_bottom), max(s2, 0.0), min(s3, 1.0), a, d, slope)
     if s3 < s4:
         far = math.sqrt(miss2 + (s4 - s0) * (s4 - s0) * plan2)
         near = max(s3, 0.0)
         there = rim if s3 >= 0.0 else bottom(math.sqrt(miss2 + s0 * s0 * plan2), flat, corner, cone)
-        top = min(top, a[2] + s4 * d[2] + bottom(far, flat, corner, cone), a[2] + near * d[2] + there)
-    return top, pressed
+        _lower_stub(row, min(a[2] + s4 * d[2] + bottom(far, flat, corner, cone), a[2] + near * d[2] + there))
+    return pressed, sheer
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _leave_stubs(lines, box, a, d, cutter, core, left, stub, best):
-    """Lower the stubs under a feed move, and find those higher than ``left`` under the core of its tool.
+def _leave_stubs(lines, box, a, d, cutter, hollow: HollowEnd, stub, best):
+    """Lower the stubs under a feed move, and find those that the core of its tool may not press.
 
-    stub : (nx, ny) float64, mm, of the lines of the box, changed in place
+    stub : (nx, ny, 8) float64, of the lines of the box, changed in place
     """
     _height, origin, step, stock_bottom = lines
     i0, i1, j0, j1 = box
@@ -302,13 +362,13 @@ def _leave_stubs(lines, box, a, d, cutter, core, left, stub, best):
     for i in range(a0, a1 + 1):
         x = origin[0] + (i + 0.5) * step
         for j in range(b0, b1 + 1):
-            top = stub[i - i0, j - j0]
-            if top <= floor or top > over_flutes:
+            row = stub[i - i0, j - j0]
+            if row[STUB_TOP] <= floor or row[STUB_TOP] > over_flutes:
                 continue
             y = origin[1] + (j + 0.5) * step
-            stub[i - i0, j - j0], pressed = _over_stub(x, y, top, floor, a, d, cutter, core, stock_bottom)
-            if pressed > left:
-                _worse(best, PLUNGE, pressed, 0.0, x, y, floor)
+            pressed, sheer = _over_stub(x, y, row, a, d, cutter, hollow.core, hollow.slope, stock_bottom)
+            if pressed > hollow.left or sheer > hollow.skin:
+                _worse(best, STUB, pressed, 0.0, x, y, floor)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
@@ -405,9 +465,10 @@ def stock_tile(box, lines: LineArrays, moves: MoveArrays, rapids: RapidArrays, d
     cutters, ends_radius, _reach, bodies, body_first = tools
     free, rooms = rapids
     skins, parts, sectors = descents.skin, engaged.first, engaged.sectors
-    stub = np.zeros((0, 0))
-    if descents.core.max() > 0.0:
-        stub = height[i0:i1, j0:j1].copy()
+    stub = np.zeros((0, 0, 8))
+    if descents.hollow[:, 0].max() > 0.0:
+        stub = np.zeros((i1 - i0, j1 - j0, 8))
+        stub[:, :, STUB_TOP], stub[:, :, STUB_LOW] = height[i0:i1, j0:j1], INF
     history = LineHistory(np.zeros((i1 - i0, j1 - j0)), np.zeros((i1 - i0, j1 - j0)), np.zeros((i1 - i0, j1 - j0)),
                           np.full((i1 - i0, j1 - j0), -INF), np.zeros((i1 - i0, j1 - j0)), stub)
     best = np.zeros((16, 5))
@@ -435,7 +496,9 @@ def stock_tile(box, lines: LineArrays, moves: MoveArrays, rapids: RapidArrays, d
                                  sectors[parts[m]:parts[m + 1]],
                                  CutTotals(totals.taken[parts[m]:parts[m + 1]], totals.open), best)
             if stubs:
-                _leave_stubs(lines, box, a, d, cutter, descents.core[k], descents.left[k], history.stub, best)
+                hollow = HollowEnd(descents.hollow[k, 0], descents.hollow[k, 1], descents.hollow[k, 2],
+                                   descents.hollow[k, 3])
+                _leave_stubs(lines, box, a, d, cutter, hollow, history.stub, best)
             if below:
                 under[m] = 1
             if went:

@@ -1,10 +1,10 @@
-"""Plunges of ends so fine that they may come down between the lines or nodes of the stock.
+"""Plunges of ends, and of cores that do not cut, that may come down between the lines or nodes of the stock.
 
 A ray goes up the axis from where the tip of each steep descent ends. What the moves before it have left on that ray is
 exact, so no spacing matters. Coordinates are float64, mm, in the setup frame.
 
 Notation: s is the skin of a tool, the depth that a steep descent may take off; e is the depth that ramps could have
-earned meanwhile.
+earned meanwhile. Straight down the skin of a tool that does not cut to its centre is what its core may press.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from verify.blank.blank import stock_on_normals
-from verify.kernels.stock import PLUNGE
-from verify.material.stock_pass import descents
+from verify.kernels.stock import PLUNGE, ROUNDING
+from verify.material.stock_pass import descents, hollow_ends
 from verify.model import ProofSetup
 from verify.moves import Moves
 from verify.surface.removal import first_below
@@ -29,11 +29,12 @@ INT = NDArray[np.int64]
 
 
 def fine_plunges(moves: Moves, tools: Sequence[ToolBody], fine: Sequence[ToolBody], bounds: F64, setup: ProofSetup,
-                 threads: int = 2) -> F64:
+                 threads: int = 2, hollow: Sequence[ToolBody] = ()) -> F64:
     """Plunges along the middle of the axis of fine tools.
 
     tools  : those that ``Moves.tool`` refers to; fine : the ones that are looked at
     bounds : (2, 3) float64, mm, of the part, setup frame
+    hollow : those that are looked at where they go straight down only
 
     Returns (e, 7) float64, mm, rows of ``verify.material.stock_pass.StockPass.events``.
 
@@ -43,12 +44,17 @@ def fine_plunges(moves: Moves, tools: Sequence[ToolBody], fine: Sequence[ToolBod
     steep descent was the first to leave less than 3 s there, and ramps could have earned less than 2 s since.
     """
     steep, earned = descents(moves, tools, setup)
-    rows = np.flatnonzero(steep & np.isin(moves.tool, [k for k, t in enumerate(tools) if t in fine]))
+    rows = np.flatnonzero(steep & np.isin(moves.tool, [k for k, t in enumerate(tools) if t in fine or t in hollow]))
     if not len(rows):
         return np.zeros((0, 7))
-    tip = moves.end[rows]
-    up = np.tile([0.0, 0.0, 1.0], (len(rows), 1)) if moves.axes is None else np.asarray(moves.axes.middle[rows])
-    skin = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool[rows]]
+    up = np.tile([0.0, 0.0, 1.0], (len(moves), 1)) if moves.axes is None else np.asarray(moves.axes.middle)
+    straight = np.linalg.norm(np.cross(moves.end[rows] - moves.start[rows], up[rows]), axis=1) <= ROUNDING
+    rows, straight = (v[straight | np.isin(moves.tool[rows], [k for k, t in enumerate(tools) if t in fine])]
+                      for v in (rows, straight))
+    tip, up, which = moves.end[rows], up[rows], moves.tool[rows]
+    core, _, pressed, _ = hollow_ends(tools, setup)[which].T
+    skin = setup.plunge_skin * np.array([t.diameter for t in tools])[which]
+    skin = np.where(straight & (core > 0.0), np.minimum(skin, pressed), skin)
     over = stock_on_normals(tip, up, bounds, setup, np.inf)
 
     def first(some: INT, level: F64) -> INT:

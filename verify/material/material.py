@@ -114,18 +114,27 @@ def stock_spacing(setup: ProofSetup, moves: Moves, tools: Sequence[ToolBody]) ->
 
     A square lattice has a line in every circle of radius 1 / sqrt 2 of its spacing. Lines are twice as close, and nodes
     closer still, since an end may come down on rest material that is narrower than itself. An end with a narrow tip
-    counts as half its radius.
+    counts as half its radius. A line stands in every core that does not cut.
     """
     used = [tools[k] for k in np.unique(moves.tool[moves.feed])]
     wide = np.maximum(end_radii(used), [0.5 * t.radius if t.cone_height > 0.0 else 0.0 for t in used])
-    share = LINES_APART if moves.axes is None else NODES_APART
-    return min(setup.line_spacing, share * float(wide.min(initial=np.inf)))
+    if moves.axes is not None:
+        return min(setup.line_spacing, NODES_APART * float(wide.min(initial=np.inf)))
+    core = np.array([setup.cores[t.number] for t in used if setup.cores.get(t.number, 0.0) > 0.0])
+    return min(setup.line_spacing, LINES_APART * float(wide.min(initial=np.inf)),
+               LINES_APART * float(core.min(initial=np.inf)))
 
 
 def unseen(tools: Sequence[ToolBody], spacing: float, upright: bool) -> list[ToolBody]:
     """The tools whose end may come down between lines or nodes of the stock that are ``spacing`` mm apart."""
     min_radius = spacing / (LINES_APART if upright else NODES_APART) - 1e-9
     return [t for t, end in zip(tools, end_radii(tools).tolist(), strict=True) if end < min_radius and not t.cuts_down]
+
+
+def unseen_cores(tools: Sequence[ToolBody], setup: ProofSetup, spacing: float, upright: bool) -> list[ToolBody]:
+    """The tools whose core that does not cut may come down between lines, or at all where nodes do not judge it."""
+    seen = spacing / LINES_APART - 1e-9 if upright else np.inf
+    return [t for t in tools if 0.0 < setup.cores.get(t.number, 0.0) < seen]
 
 
 def dogleg_limits(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup) -> tuple[F64, float]:

@@ -16,8 +16,9 @@ of the part check necks, shanks and holders, so the spacing matters only for sto
   depths add up; sideways travel in the cut reduces them at the slope of the ramp. Which travel is in the cut is known
   after all moves, so blocks in which it may matter are run a second time. It is a plunge where more than
   ``plunge_skin`` tool diameters are open, so a descent interrupted by side steps, lifts or pecks is still one descent.
-  An end that does not cut to its centre leaves a stub under its core; a stub higher than four ramps over the radius of
-  the core and a hundredth of the diameter is a plunge, and no way pays for it. The end-cutting
+  An end that does not cut to its centre leaves a stub under its core. A stub higher than four ramps over the radius of
+  the core and a hundredth of the diameter is a plunge, and so is a hundredth of the diameter that no ramp over the same
+  ground would have left. The end-cutting
   region is the whole end of a flat, the flat and half the corner of a bull nose, and the inner half radius of a ball
   (to 30 degrees of its sphere). A ball that finishes downhill through a thin skin therefore does not plunge. It is the
   flat at the tip of a chamfer mill, and the core of a tap. A drill and a pointed chamfer mill cut straight down.
@@ -37,17 +38,17 @@ from verify.blank.blank import blank_cylinder, blank_mesh, stock_bounds
 from verify.kernels.bodies import body_tile
 from verify.kernels.engaged import EngagedArrays
 from verify.kernels.heights import raise_offset
-from verify.kernels.stock import PLUNGE, CutTotals, DescentArrays, LineArrays, stock_tile
+from verify.kernels.stock import PLUNGE, STUB, CutTotals, DescentArrays, LineArrays, stock_tile
 from verify.material.stock_pass import (
     BESIDE,
     StockPass,
     WaysInCut,
     contact_limits,
-    cores,
     descents,
     end_radii,
     event_table,
     gather,
+    hollow_ends,
     noted,
     parts,
     rapid_arrays,
@@ -133,6 +134,14 @@ def run_stock(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup:
 
     Returns StockPass. Raises VerificationError as ``cutter_table``. Same bytes for any number of threads.
     """
+    run = _run_twice(field, moves, tools, setup, threads, progress)
+    run.events[run.events[:, 1] == STUB, 1] = PLUNGE
+    return run
+
+
+def _run_twice(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, threads: int,
+               progress: Progress | None) -> StockPass:
+    """One pass over all blocks, and a second over those where the ways in the cut decide over plunges."""
     start = field.height.copy() if descents(moves, tools, setup)[0].any() else field.height
     run, again = _run(field, moves, tools, setup, None, None, threads, StageProgress(progress).span(0.0, 0.8))
     if not again:
@@ -163,7 +172,7 @@ def _run(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     bodies = Bodies.of(tools, setup) if chosen is None else Bodies.none(tools)
     sizes = bodies.arrays(cutters, end_radii(tools))
     allowed = DescentArrays(*descents(moves, tools, setup, ways), ways_before(moves),
-                            setup.plunge_skin * 2.0 * cutters[:, 0], *cores(tools, setup))
+                            setup.plunge_skin * 2.0 * cutters[:, 0], hollow_ends(tools, setup))
     cut, under = np.zeros(len(moves), np.uint8), np.zeros(len(moves), np.uint8)
     limits, rapids = contact_limits(setup), rapid_arrays(moves, setup)
     lines, steps = LineArrays(field.height, field.origin, field.step, field.bottom), moves.arrays

@@ -25,7 +25,7 @@ from verify.moves import Moves
 EVENTS = 4096
 ANOTHER_TOOL = 1e6  # mm
 TAP_CORE = 0.75  # radii: what is nearer to the axis of a tap, the hole must have taken; less than any ISO 68 core
-PRESSED = 0.01  # diameters: a hollow end takes a stub that high
+PRESSED = 0.01  # diameters: a hollow end takes a stub that high, straight down too
 SAME = 1e-6  # mm, and rad: closer ends of moves and axes are the same
 BESIDE = 5e-3  # mm: chords of two passes over one wall, and the decimals of their programs, differ by no more
 UPRIGHT = 0.5 * math.pi - 1e-9  # rad: a ramp that goes straight down
@@ -74,19 +74,24 @@ def descents(moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
     return np.asarray(steep), np.asarray(earned + ANOTHER_TOOL * np.cumsum(changed))
 
 
-def cores(tools: Sequence[ToolBody], setup: ProofSetup) -> tuple[F64, F64]:
-    """Radius of the core of each tool that does not cut, and how high a stub may stand under it.
+def hollow_ends(tools: Sequence[ToolBody], setup: ProofSetup) -> F64:
+    """What the end of each tool that does not cut to its centre may stand over.
 
-    Returns two (k,) float64, mm; 0 for a tool that cuts to its centre.
+    Returns (k, 4) float64, rows of ``verify.kernels.stock.HollowEnd``, mm and dimensionless; core 0 for a tool that
+    cuts to its centre.
 
     Notes
     -----
     A ramp of the angle r that turns round passes 4 c before the ring round a core of radius c has come over each place
-    that the core stood on, so the stub of a sound ramp is at most 4 c tan(r) high.
+    that the core stood on, so the stub of a sound ramp is at most 4 c tan(r) high. Where the tips lie no more than e
+    apart while the core stands on a place, a sound ramp leaves 2 e tan(r).
     """
-    radius = np.array([0.5 * setup.cores.get(t.number, 0.0) for t in tools] or [0.0])
-    slope = np.tan([setup.ramp_angles.get(t.number, setup.ramp_angle) for t in tools] or [0.0])
-    return radius, np.asarray(4.0 * radius * slope + PRESSED * np.array([t.diameter for t in tools] or [0.0]))
+    if not tools:
+        return np.zeros((1, 4))
+    radius = np.array([0.5 * setup.cores.get(t.number, 0.0) for t in tools])
+    slope = np.tan([setup.ramp_angles.get(t.number, setup.ramp_angle) for t in tools])
+    skin = PRESSED * np.array([t.diameter for t in tools])
+    return np.column_stack([radius, 4.0 * radius * slope + skin, skin, slope])
 
 
 def ways_before(moves: Moves) -> F64:

@@ -16,7 +16,7 @@ SETUP = ProofSetup(stock_kind="box", margin=0.5, uncertainty=0.0)
 SKIN = 0.01
 
 
-def dug(points, tools=None, feed=True, axes=False):
+def dug(points, tools=None, feed=True, axes=False, setup=SETUP, fine=(FINE,), hollow=()):
     """Depth by move of what a path through (n, 3) points digs; tools: index of the tool of each move."""
     points = np.array(points, dtype=float)
     n = len(points) - 1
@@ -24,7 +24,7 @@ def dug(points, tools=None, feed=True, axes=False):
     up = np.tile([0.0, 0.0, 1.0], (n, 1))
     moves = Moves(points[:-1].copy(), points[1:].copy(), np.full(n, feed), which,
                   ToolAxes.between(up, up) if axes else None)
-    events = fine_plunges(moves, [FINE, WIDE], [FINE], BOX, SETUP)
+    events = fine_plunges(moves, [FINE, WIDE], fine, BOX, setup, hollow=hollow)
     assert (events[:, 1] == PLUNGE).all()
     return dict(zip(events[:, 0].astype(int).tolist(), events[:, 2].tolist(), strict=True))
 
@@ -56,3 +56,16 @@ def test_many_small_steps_are_one_descent():
 def test_rapids_and_other_tools_are_not_looked_at():
     straight = [[3.0, 4.0, 2.0], [3.0, 4.0, -0.3]]
     assert dug(straight, feed=False) == {} and dug(straight, [1]) == {}
+
+
+@pytest.mark.parametrize("axes", [False, True])
+def test_a_core_that_goes_straight_down(axes):
+    setup = ProofSetup(stock_kind="box", margin=0.5, uncertainty=0.0, cores={1: 0.2})
+    straight = [[9.0, 9.0, 2.0], [9.0, 9.0, 0.4], [9.0, 9.0, 2.0]]
+    assert dug(straight, [1, 1], axes=axes, setup=setup, fine=()) == {}
+    found = dug(straight, [1, 1], axes=axes, setup=setup, fine=(), hollow=(WIDE,))
+    assert found == {0: pytest.approx(0.1, abs=1e-3)}
+    shallow = [[9.0, 9.0, 2.0], [9.0, 9.0, 0.47]]
+    assert dug(shallow, [1], axes=axes, setup=setup, fine=(), hollow=(WIDE,)) == {}
+    steep = [[9.0, 9.0, 0.5], [9.5, 9.0, 0.4]]  # no way straight down: lines judge it
+    assert dug(steep, [1], axes=axes, setup=setup, fine=(), hollow=(WIDE,)) == {}
