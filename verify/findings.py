@@ -20,6 +20,7 @@ from verify.moves import Moves
 MAX_FINDINGS = 200
 KEPT_OF_A_KIND = MAX_FINDINGS // len(FindingKind)
 NEAR = 5.0
+TIE = 1e-3  # mm, of depths: the first line counts
 LINES_APART = 5
 SAME_PLACE = 1e-6  # mm
 SAME_WIDTH = 0.05  # mm: relief of less than half of it aside is no relief
@@ -81,6 +82,8 @@ def contact_findings(events: F64, moves: Moves, source: Source, skins: F64,
     events : (e, 7) float64, rows of ``verify.material.stock_pass.StockPass``, mm, setup frame
     skins  : (m,) float64, mm, depth that each move may plunge
 
+    The line of a finding is the first of those that are within a micrometre of the deepest.
+
     A neck or shank as wide as the cutting part runs along the walls of its own cut. Where it enters by no more than the
     skin, it rubs; deeper it collides.
     """
@@ -91,8 +94,10 @@ def contact_findings(events: F64, moves: Moves, source: Source, skins: F64,
     key = code + 16 * touching.astype(np.int32) * feed[move] + 32 * (~feed[move]).astype(np.int32)
     groups = chains(source.program[move], source.line[move], events[:, 4:7], key)
     out = []
-    for rows in worst_of(groups, events[:, 2] - events[:, 3]):
-        r = rows[0]
+    over = events[:, 2] - events[:, 3]
+    for rows in worst_of(groups, over):
+        deep = rows[over[rows] >= over[rows[0]] - TIE]  # a lift out of what a rapid ran into is no deeper
+        r = deep[np.argmin(move[deep])]
         m = move[r]
         depth, clearance = float(events[r, 2]), float(events[r, 3])
         kind, text, limit = _contact(int(code[r]), bool(feed[m]), depth, clearance, float(skins[m]))

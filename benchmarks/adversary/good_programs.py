@@ -166,10 +166,10 @@ def within_tolerance(rng: Rng) -> Case:
     load(s, part, 2)
     if part in LEVELLED:
         x, y, z = level(part, rng)
-        dip(s, x, y, z - d)
+        dip(s, part, x, y, z - d)
     else:
         p, n = contact(part, rng)
-        dip(s, *(p + (R - d) * n - [0.0, 0.0, R]).tolist())
+        dip(s, part, *(p + (R - d) * n - [0.0, 0.0, R]).tolist())
     return made("within tolerance", part, s, setup={"quality": {"gouge_tolerance_mm": tolerance}},
                 what=f"{d / tolerance:.2f} x {tolerance}")
 

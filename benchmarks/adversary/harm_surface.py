@@ -81,10 +81,10 @@ def load(s: Script, part: str, number: int, speed: int = 6000) -> None:
         s.tool(number, speed)
 
 
-def dip(s: Script, x: float, y: float, tip: float, feed: float = DOWN) -> list[Op]:
-    """Down to a place and up again; the two feed moves."""
+def dip(s: Script, part: str, x: float, y: float, tip: float, feed: float = DOWN) -> list[Op]:
+    """Down to a place and up again; the two feed moves. No rapid goes below the top of the part, beside a wall."""
     s.over(x, y)
-    s.rapid(z=tip + 3.0)
+    s.rapid(z=max(tip + 3.0, PARTS[part].top + 1.5))
     s.feed(z=tip + 1.0, feed=FEED)
     ops = [s.feed(z=tip, feed=feed), s.feed(z=tip + 1.5)]
     s.rapid(z=SAFE)
@@ -130,7 +130,7 @@ def pit_level(rng: Rng) -> Case:
     s = base(part)
     load(s, part, number)
     x, y, z = level(part, rng)
-    return made("pit level", part, s, ("gouge",), dip(s, x, y, z - d), d, quality(tolerance),
+    return made("pit level", part, s, ("gouge",), dip(s, part, x, y, z - d), d, quality(tolerance),
                 what=f"T{number} {scale} x {tolerance}")
 
 
@@ -139,7 +139,7 @@ def _pit_on(part: str, rng: Rng) -> Case:
     s = base(part)
     p, n = contact(part, rng)
     tip = p + (R - d) * n - [0.0, 0.0, R]
-    ops = dip(s, *tip.tolist())
+    ops = dip(s, part, *tip.tolist())
     return made(f"pit {part}", part, s, ("gouge",), ops, d, quality(tolerance), what=f"{scale} x {tolerance}")
 
 
@@ -194,7 +194,7 @@ def needle(rng: Rng) -> Case:
         drop = d / n[2]
         z, d, depth = z + d - drop, d, d if part == "slope" else None
     s.group = "harm"
-    ops = dip(s, x, y, z - d, feed=60.0)
+    ops = dip(s, part, x, y, z - d, feed=60.0)
     setup = {**quality(tolerance), "tools": [FLAT, BALL, NEEDLE]}
     return made("needle", part, s, ("gouge",), ops, depth, setup, what=f"after T{number}, {scale} x {tolerance}")
 
@@ -208,7 +208,7 @@ def small_ball(rng: Rng) -> Case:
     s = base("cylinder")
     s.tool(3, 12000)
     p, n = contact("cylinder", rng)
-    ops = dip(s, *(p + (radius - d) * n - [0.0, 0.0, radius]).tolist(), feed=60.0)
+    ops = dip(s, "cylinder", *(p + (radius - d) * n - [0.0, 0.0, radius]).tolist(), feed=60.0)
     setup = {**quality(tolerance), "tools": [FLAT, BALL, tool]}
     return made("small ball", "cylinder", s, ("gouge",), ops, d, setup, what=f"R{radius}, {scale} x {tolerance}")
 
@@ -248,7 +248,8 @@ def rim_pit(rng: Rng) -> Case:
     else:
         a, x = math.radians(SLOPE_DEG), float(rng.uniform(7.0, 18.0))
         tip = PARTS[part].top - (x - R) * math.tan(a) - d / math.cos(a)
-    return made("rim pit", part, s, ("gouge",), dip(s, x, y, tip), d, quality(tolerance), what=f"{scale} x {tolerance}")
+    return made("rim pit", part, s, ("gouge",), dip(s, part, x, y, tip), d, quality(tolerance),
+                what=f"{scale} x {tolerance}")
 
 
 def contact_normal(part: str, x: float) -> tuple[float, float, float]:
@@ -357,7 +358,7 @@ def floor_dip(rng: Rng) -> Case:
     tolerance, scale, d = scale_of(rng, 0.85 * FLOOR)
     s = base("floor")
     x, y = float(rng.uniform(10.5, 15.5)), float(rng.uniform(-LOW, LOW))
-    return made("floor dip", "floor", s, ("gouge",), dip(s, x, y, FLOOR - d), d, quality(tolerance),
+    return made("floor dip", "floor", s, ("gouge",), dip(s, "floor", x, y, FLOOR - d), d, quality(tolerance),
                 what=f"{scale} x {tolerance}")
 
 
@@ -366,7 +367,7 @@ def floor_through(rng: Rng) -> Case:
     tolerance = float(rng.choice([0.01, 0.05, 0.25, 0.5]))
     s = base("floor")
     x, y = float(rng.uniform(10.5, 15.5)), float(rng.uniform(-LOW + 1, LOW - 1))
-    ops = dip(s, x, y, -float(rng.uniform(0.01, 1.0)))
+    ops = dip(s, "floor", x, y, -float(rng.uniform(0.01, 1.0)))
     return made("floor through", "floor", s, ("gouge",), ops, R, quality(tolerance), what=f"tolerance {tolerance}")
 
 
@@ -412,7 +413,7 @@ def allowance(rng: Rng) -> Case:
             op.z = 10.0 + keep
     s.group = "harm"
     x, y, _ = level("plate", rng)
-    ops = dip(s, x, y, 10.0 + keep - d)
+    ops = dip(s, "plate", x, y, 10.0 + keep - d)
     setup = {"quality": {"gouge_tolerance_mm": tolerance, "stock_allowance_mm": keep}}
     return made("allowance", "plate", s, ("allowance",), ops, d, setup, what=f"{scale} x {tolerance}")
 
@@ -424,10 +425,10 @@ def excluded_face(rng: Rng) -> Case:
     load(s, part, 2)
     if part == "plate":
         x, y, z = level(part, rng)
-        ops = dip(s, x, y, z - d)
+        ops = dip(s, part, x, y, z - d)
     else:
         p, n = contact(part, rng)
-        ops = dip(s, *(p + (R - d) * n - [0.0, 0.0, R]).tolist())
+        ops = dip(s, part, *(p + (R - d) * n - [0.0, 0.0, R]).tolist())
     operations = {"exclude_faces": ["F5"]} if rng.random() < 0.5 else {"faces": ["F1"]}
     return made("excluded face", part, s, ("gouge",), ops, d, {**quality(tolerance), "operations": operations},
                 what=f"{scale} x {tolerance} {operations}")
