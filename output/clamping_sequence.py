@@ -21,7 +21,6 @@ from output.program_grid import link as grid_link
 from output.workplan import AccessFrame, Clamping, Workplan
 from toolpath.workingsteps import ArcSpan, TrajectoryKind, Workingstep
 
-TURN_STEP = math.radians(2.0)  # rad, largest turn of a rotary axis in one block
 BALL_CLEARANCE = 0.5  # mm outside the ball, since linear joints leave the chords of a turn
 MAX_AXIS_DEVIATION = 1e-4  # rad, from the great circle between two points of a path
 AT_REST = 1e-9  # rad
@@ -223,7 +222,7 @@ class _ToolPosition:
         size = float(np.abs(wanted - self.turn).max())
         if size <= AT_REST:
             return []
-        share = np.linspace(0.0, 1.0, math.ceil(size / TURN_STEP) + 1)[:, None]
+        share = np.linspace(0.0, 1.0, math.ceil(size / self.clamping.step) + 1)[:, None]
         turns = (1.0 - share) * self.turn + share * wanted
         axes = self.machine.axes(turns)
         tips = self.clamping.centre + _turn_radius(self.clamping) * axes
@@ -233,7 +232,7 @@ class _ToolPosition:
 
 def _turn_radius(clamping: Clamping) -> float:
     """mm from the centre of the ball: the chords of a turn stay outside the ball from there on."""
-    return clamping.radius / math.cos(TURN_STEP) + BALL_CLEARANCE
+    return clamping.radius / math.cos(clamping.step) + BALL_CLEARANCE
 
 
 __all__ = ["Leg", "ClampedStep", "each_clamped_step", "home_of", "clamped_steps"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -86,6 +87,7 @@ class Clamping:
     centre  : (3,) float64, mm, setup frame
     radius  : mm; part, stock, fixtures and the clearance of rapids lie in this ball round ``centre``
     gauges  : mm, spindle face to tip, by T number
+    step    : rad, largest turn of a rotary axis in one block of a rapid
     """
 
     machine: RotaryMachine
@@ -93,6 +95,7 @@ class Clamping:
     centre: F64
     radius: float
     gauges: Mapping[int, float]
+    step: float = math.radians(2.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -134,9 +134,10 @@ class Machine(WireModel):
     rapid_motion: Annotated[Literal["linear", "dogleg"] | None, Field(
         description="Path of a rapid in several axes. linear: a straight line. dogleg: each axis moves at its own "
                     "speed, so the path is not straight. The whole box of the move must then stay clear of part, stock "
-                    "and fixtures. null: dogleg on fanuc and haas, linear on other controls and in programs that "
-                    "turn rotary axes, because tool centre point control needs it. The report lists the path under "
-                    "proof.assumed where it matters.")] = None
+                    "and fixtures. Plans for five axes then need pivots_mm and a table that tilts. null: dogleg on "
+                    "fanuc and haas, linear on other controls and in programs that turn rotary axes, because tool "
+                    "centre point control needs it. The report lists the path under proof.assumed where it "
+                    "matters.")] = None
     ap238: Annotated[Literal["cc1", "cc2", "integrated_cnc"], Field(
         description="Form of job.stpnc. cc1: conformance class 1 of AP238, tool paths. cc2: class 2, which adds the "
                     "shapes of part and blank, strategies and setup instructions. integrated_cnc: like cc1, with the "

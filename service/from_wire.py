@@ -138,12 +138,14 @@ def check_plannable(setup: Setup) -> None:
 
 def _check_turning(setup: Setup, machine: RotaryMachine) -> None:
     """Checks for a machine with rotary axes: rapids, lengths, limits, accesses, and a single clamping."""
-    if setup.machine.rapid_motion == "dogleg":
-        raise SetupError("a 5-axis job needs rapids along straight lines; on this machine each axis moves at its own "
-                         "speed, so the tool path during a turn is unknown", code="dogleg_rapids",
-                         subjects=("machine.rapid_motion",), measured="dogleg", limit="linear",
-                         remedy="set the control to linear rapids and set machine.rapid_motion 'linear', or plan on "
-                                "three axes")
+    if setup.machine.rapid_motion == "dogleg" and (machine.tilts_head or machine.pivots is None):
+        why = "a head that leans takes several linear axes up its tool" if machine.tilts_head else \
+            "the way of a turn depends on the pivots"
+        raise SetupError(f"on this machine each axis of a rapid moves at its own speed, and {why}",
+                         code="dogleg_rapids", subjects=("machine.rapid_motion", "machine.pivots_mm"),
+                         measured="dogleg", limit="linear",
+                         remedy="set the control to linear rapids and set machine.rapid_motion 'linear'"
+                                + ("" if machine.tilts_head else ", or give machine.pivots_mm"))
     if machine.tilts_head and not machine.tcp:
         bare = [t.id for t in setup.tools if not t.gauge_given]
         if bare:

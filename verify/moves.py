@@ -26,6 +26,7 @@ class Moves:
     feed       : (m,) bool, False for a rapid
     tool       : (m,) int32, index, place in the sequence of tools
     axes       : tool axes, None where all are +Z
+    stray      : (m,) float64, mm, how far a rapid may leave its straight way (``verify.checks.dogleg_turns``), or None
     """
 
     start: F64
@@ -33,6 +34,7 @@ class Moves:
     feed: NDArray[np.bool_]
     tool: I32
     axes: ToolAxes | None = None
+    stray: F64 | None = None
 
     def __len__(self) -> int:
         return len(self.start)
@@ -45,7 +47,8 @@ class Moves:
     def only(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Moves:
         """The moves where ``chosen`` (m,) bool is true, or those of its rows, (k,) int64, index."""
         axes = None if self.axes is None else self.axes.only(chosen)
-        return Moves(self.start[chosen], self.end[chosen], self.feed[chosen], self.tool[chosen], axes)
+        return Moves(self.start[chosen], self.end[chosen], self.feed[chosen], self.tool[chosen], axes,
+                     None if self.stray is None else self.stray[chosen])
 
     def parted(self, count: NDArray[np.int64]) -> tuple[Moves, NDArray[np.int64]]:
         """Each move in even pieces.
@@ -62,7 +65,8 @@ class Moves:
         ends = np.where((nth + 1 == pieces)[:, None], self.end[of],
                         self.start[of] + ((nth + 1) / pieces)[:, None] * way)
         axes = None if self.axes is None else self.axes.parted(of, share, pieces)
-        return Moves(self.start[of] + share[:, None] * way, ends, self.feed[of], self.tool[of], axes), of
+        return Moves(self.start[of] + share[:, None] * way, ends, self.feed[of], self.tool[of], axes,
+                     None if self.stray is None else self.stray[of]), of
 
 
 def cutter_table(tools: Sequence[ToolBody]) -> F64:

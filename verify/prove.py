@@ -22,7 +22,16 @@ from verify.checks.body_assumptions import body_assumptions
 from verify.checks.changed_tools import as_collisions
 from verify.checks.empty_spindle import with_nose
 from verify.checks.program_assumptions import program_assumptions, rapids_decided
-from verify.checks.program_sequence import FramedProgram, Given, check_numbers, counted, moves_of, read_all, slides_of
+from verify.checks.program_sequence import (
+    FramedProgram,
+    Given,
+    check_numbers,
+    counted,
+    moves_of,
+    read_all,
+    slides_of,
+    strays_of,
+)
 from verify.checks.repeated_passes import repeats
 from verify.checks.sideways_cuts import sideways_findings, torn_threads
 from verify.checks.table_clearance import table_findings
@@ -115,6 +124,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     framed, setup = rapids_decided(framed, setup)
     tools = with_nose(tools, framed, setup)
     moves, source = moves_of(framed, tools)
+    moves = replace(moves, stray=strays_of(framed, tools, setup))
     if asked is not None:
         scored = _settled(scored, part, tools, setup, moves, threads, stages.span(READ, SETTLED))
     cuts = surface_cuts(part, tools, setup, scored, moves, source, threads,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -37,6 +38,8 @@ from zones.reach.access_view import View, access_rotation, turned
 BOW, SPARE = 1.0 / 800.0, 0.01  # chord error of a swing over the distance from the tip; mm, for rounding
 RATE_SPARE = 1.05  # of the time the axes take at their fastest: words are rounded
 PARTS, LAST_NUMBER = 100, 7000  # from 8000 on numbers may be locked
+DOGLEG_STEP = math.radians(0.5)  # rad, largest turn of an axis in one block where each moves at its own speed
+ROUNDS = 4  # of the room for doglegs: each is nearer by the factor of a step
 NO_HOLDER = 200.0  # mm of shank above the stickout that are assumed where the setup names no holder
 
 
@@ -185,13 +188,56 @@ def clamped_workplan(ready: Prepared, access_plans: Sequence[AccessPlan]) -> Wor
               for t in step.trajectories if t.axes is not None]
     leans = float(np.arccos(np.clip(min(rises), -1.0, 1.0)))
     centre = 0.5 * (low + high)
-    lift = room_to_turn(centre[2], radius, leans, inputs.bodies,
-                        table_height(inputs, ready.blank) + inputs.clearances.rapid)
+    level = table_height(inputs, ready.blank) + inputs.clearances.rapid
+    lift = room_to_turn(centre[2], radius, leans, inputs.bodies, level)
     clamping = Clamping(machine, frames, centre + [0.0, 0.0, lift], radius + lift, inputs.gauge_lengths)
+    if inputs.machine.rapid_motion == "dogleg":
+        clamping = _wide_of_doglegs(clamping, np.array([low, high]), level, leans, inputs.bodies)
     words = ("fixed tool axes, one after the other, each from what those before leave",)
     steps = tuple(t for s in access_plans for t in s.plan.steps)
     work = _workplan(ready, steps, frame, float(home_of(clamping)[2]), access_of(ready, first), words)
     return replace(work, clamping=clamping)
+
+
+def _wide_of_doglegs(clamping: Clamping, box: F64, level: float, leans: float, tools: Sequence[ToolBody]) -> Clamping:
+    """A ball so much larger that tools clear it and the table where each axis of a turn moves at its own speed.
+
+    box   : (2, 3) float64, mm, setup frame, round part, blank and fixtures
+    level : mm, Z that no tool may come down to;  leans : rad, the largest tilt of a tool
+
+    Notes
+    -----
+    A block turns each axis by w at most. It moves no place of the box by more than w (r1 + r2), nor the linear joints,
+    which follow the centre of the ball, by more than w (c1 + c2): r and c are their distances from the axes. The lowest
+    place of a tool is no farther from the tilting axis than c1, the radius of the ball, and its length
+    (``verify.checks.dogleg_turns``). A lift changes c1 and the radius, so the room is computed until it stays.
+    """
+    centre, radius, pivots = clamping.centre, clamping.radius, clamping.machine.pivots
+    if pivots is None:
+        raise InternalError("a plan for doglegs has no pivots")
+    tilting, turning = np.array(pivots)
+
+    def distances(low: F64, high: F64) -> float:
+        """Of places between two corners, mm: from the tilting axis and from the turning one, together."""
+        spin = float(np.hypot(*np.maximum(np.abs(low - turning), np.abs(high - turning))[:2]))
+        up = float(np.abs(np.array([low[2], high[2]]) - tilting[2]).max())
+        return spin + math.hypot(math.hypot(*(tilting - turning)[:2]) + spin, up)
+
+    long = max(t.stickout + sum(h.length for h in t.holder) + (0.0 if t.holder else NO_HOLDER) + _widest(t)
+               for t in tools)
+    grown, lift = radius, 0.0
+    for _ in range(ROUNDS):
+        there = centre + [0.0, 0.0, lift]
+        joints = distances(there, there)
+        drop, wide = DOGLEG_STEP * (2.0 * joints + grown + long), radius + DOGLEG_STEP * (joints + distances(*box))
+        lift = room_to_turn(float(centre[2]), wide, leans, tools, level + drop)
+        grown = wide + lift
+    return replace(clamping, centre=centre + [0.0, 0.0, lift], radius=grown, step=DOGLEG_STEP)
+
+
+def _widest(tool: ToolBody) -> float:
+    """mm, largest radius of an assembly."""
+    return max([tool.radius, 0.5 * tool.shank_diameter, *(0.5 * max(h.diameter, h.diameter_top) for h in tool.holder)])
 
 
 def turning_of(ready: Prepared, view: View) -> RotaryAxes | None:

@@ -115,3 +115,16 @@ def test_programs_of_joints_are_proved_like_those_with_tool_centre_point_control
     elsewhere = {**MACHINE, "tcp": False, "pivots_mm": [[0, 0, -59], [0, 0, 0]]}
     moved = parse_setup(json.dumps({**SETUP, "machine": elsewhere}))
     assert pipeline.verify_program(part, moved, text, quiet)["finding_counts"].get("gouge", 0) > 0
+
+
+@pytest.mark.slow
+def test_turns_stay_clear_where_each_axis_moves_at_its_own_speed(part: Path) -> None:
+    """The ball of the turns grows by what the joints may stray; that of straight rapids does not hold."""
+    pivots = [[0, 0, -60], [0, 0, 0]]
+    _, setup, report = planned(part, "dogleg", rapid_motion="dogleg", pivots_mm=pivots)
+    assert report["state"] == "proved" and "rapid_path" not in {a["what"] for a in report["proof"]["assumed"]}
+    straight, _, other = planned(part, "linear", rapid_motion="linear", pivots_mm=pivots)
+    assert report["machining_time_s"] < 1.05 * other["machining_time_s"]
+    text = (straight / "program.linuxcnc.ngc").read_text()
+    again = pipeline.verify_program(part, setup, text, quiet)
+    assert set(again["finding_counts"]) == {"rapid"} and max(f["limit"] for f in again["findings"]) > 2.0

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from verify.checks.clear_height import UP, Z_AXIS, _top_along, top_of_all
+from verify.checks.dogleg_turns import bounded
 from verify.checks.table_clearance import UPRIGHT, lowest_places
 from verify.gcode.dialects import LINUXCNC
 from verify.model import Finding, FindingKind, ProofSetup
@@ -73,11 +74,12 @@ def _blind(p: Program, bounds: F64, top: float, low: F64, setup: ProofSetup) -> 
 def _doglegs(p: Program, top: float, low: F64, setup: ProofSetup) -> Iterator[Finding]:
     """Rapids that turn an axis while another moves.
 
-    Rapids of linear axes alone are simulated (``verify.material.dogleg_rapids``).
+    Rapids of linear axes alone are simulated (``verify.material.dogleg_rapids``). So are turns whose ways are bounded
+    (``verify.checks.dogleg_turns``).
 
     low : (m,) float64, mm, lowest place of the tool on each move
     """
-    if not setup.dogleg or p.poses is None:
+    if not setup.dogleg or p.poses is None or bounded(p, setup):
         return
     clear = top + setup.clearance_rapid - 1e-6
     start, end = joints_of(p, setup) or (p.start, p.end)
@@ -88,7 +90,8 @@ def _doglegs(p: Program, top: float, low: F64, setup: ProofSetup) -> Iterator[Fi
         m = int(bad[0])
         yield _finding(FindingKind.RAPID, p, m, float(clear - low[bad].min()), float(clear),
                        f"a rapid below Z{clear:.3f} turns a rotary axis while another axis moves. Its path is unknown "
-                       "on this machine (rapid_motion dogleg): turn above that height, or move one axis at a time",
+                       "on this machine (rapid_motion dogleg, no machine.pivots_mm): turn above that height, or move "
+                       "one axis at a time",
                        len(bad))
 
 

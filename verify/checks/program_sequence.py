@@ -17,6 +17,7 @@ from geometry.part import Part
 from geometry.tool_body import ToolBody
 from verify.blank.blank import stock_bounds
 from verify.checks.clear_height import from_above, top_of_all
+from verify.checks.dogleg_turns import strays
 from verify.checks.machine_limits import limit_findings, notes_on, way_findings
 from verify.findings import Source
 from verify.model import Finding, NcProgram, ProofSetup, StockKind
@@ -150,6 +151,17 @@ def moves_of(read: Sequence[FramedProgram], tools: Sequence[ToolBody]) -> tuple[
                                 np.concatenate([_axes(r, False) for r in read])[known])
     return (Moves(np.ascontiguousarray(start), np.ascontiguousarray(end), (kind == FEED) & (number > 0), tool, axes),
             Source(tuple(p.name for p in programs), which, line, number))
+
+
+def strays_of(read: Sequence[FramedProgram], tools: Sequence[ToolBody], setup: ProofSetup) -> F64 | None:
+    """How far each move of ``moves_of`` may leave its straight way.
+
+    Returns (m,) float64, mm, or None where rapids are straight or no axis turns.
+    """
+    if not setup.dogleg or all(r.program.poses is None for r in read):
+        return None
+    out = np.concatenate([strays(r.program, r.bounds, tools, r.setup) for r in read])
+    return np.asarray(out[counted(read, [t.number for t in tools])])
 
 
 def slides_of(read: Sequence[FramedProgram], tools: Sequence[ToolBody], setup: ProofSetup) -> F64 | None:

@@ -16,6 +16,7 @@ import numpy as np
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
+from verify.checks.dogleg_turns import drops
 from verify.kernels.clash import ASIDE
 from verify.model import Finding, FindingKind, ProofSetup
 from verify.program.move_kinds import FEED
@@ -41,7 +42,7 @@ def table_findings(read: Sequence[Program], tools: Sequence[ToolBody], setup: Pr
 def _of(p: Program, tools: Sequence[ToolBody], setup: ProofSetup, table: float) -> Iterator[Finding]:
     if p.poses is None and not setup.table_known:
         return
-    low = lowest_places(p, tools, setup, leaning=not setup.table_known)
+    low = lowest_places(p, tools, setup, leaning=not setup.table_known) - drops(p, tools, setup)
     way = p.end - p.start
     lifts = (way[:, 2] > 0.0) & (np.hypot(way[:, 0], way[:, 1]) <= ASIDE)  # it leaves where it stands
     room = np.where(((p.kind == FEED) | lifts) & (setup.kinematics is None), 0.0, setup.clearance_rapid)

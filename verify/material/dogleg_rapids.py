@@ -59,7 +59,7 @@ def spread(moves: Moves, slides: F64 | None, radius: F64, clear: float) -> tuple
     if axes is not None:
         axes = ToolAxes(axes.axis[rows], axes.about[rows], axes.angle[rows])
     return Moves(np.concatenate([moves.start[rest], *starts])[order], np.concatenate([moves.end[rest], *ends])[order],
-                 moves.feed[rows], moves.tool[rows], axes), rows
+                 moves.feed[rows], moves.tool[rows], axes, None if moves.stray is None else moves.stray[rows]), rows
 
 
 def box_findings(moves: Moves, slides: F64 | None, radius: F64, clear: float, source: Source) -> list[Finding]:

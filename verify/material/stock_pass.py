@@ -236,13 +236,17 @@ def free_rapids(moves: Moves) -> NDArray[np.bool_]:
 
 
 def rapid_arrays(moves: Moves, setup: ProofSetup) -> RapidArrays:
-    """The distances that rapids keep: ``clearance_approach`` straight down before a cut, else ``clearance_rapid``."""
+    """The distances that rapids keep: ``clearance_approach`` straight down before a cut, else ``clearance_rapid``.
+
+    A rapid that may leave its straight way keeps as much more.
+    """
     free, (rise, straight, linked) = free_rapids(moves), _along_axis(moves)
     down = ~moves.feed & straight & (rise <= 0.0)
     onto = np.zeros(len(free), np.bool_)  # a move straight down that a feed move follows, or another such move
     for m in np.flatnonzero(down)[::-1].tolist():
         onto[m] = m + 1 < len(free) and linked[m + 1] and (moves.feed[m + 1] or onto[m + 1])
     room = np.where(onto, min(setup.clearance_approach, setup.clearance_rapid), setup.clearance_rapid)
+    room = room if moves.stray is None else room + moves.stray
     return RapidArrays(free, np.where(moves.feed | free, 0.0, room))
 
 

@@ -151,6 +151,8 @@ def test_a_machine_of_five_axes_in_the_words_of_proof_and_writers():
     assert rotary_machine(plain.machine) is None
     check_plannable(given_setup)
     check_plannable(plain)
+    check_plannable(parse_setup(setup(machine={**FIVE, "rapid_motion": "dogleg",
+                                               "pivots_mm": [[0, 0, -50], [0, 0, -20]]})))
 
 
 @pytest.mark.parametrize(("machine", "access", "code", "subject"), [
@@ -158,7 +160,9 @@ def test_a_machine_of_five_axes_in_the_words_of_proof_and_writers():
     ({}, [{}, {"id": "A2", "direction": [1, 0, 1], "work_offset": "G55"}], "two_clampings", "A2"),
     ({"rotary_deg": [[10, 60], [-360, 360]]}, [{}], "no_rotary_zero", "machine.rotary_deg"),
     ({}, [{}, {"id": "A2", "direction": [0, 0.3, -1]}], "access_from_below", "A2"),
-    ({"rapid_motion": "dogleg"}, [{}], "dogleg_rapids", "machine.rapid_motion"),
+    ({"rapid_motion": "dogleg"}, [{}], "dogleg_rapids", "machine.pivots_mm"),
+    ({"rapid_motion": "dogleg", "kinematics": "head-head-BC", "pivots_mm": [[0, 0, 90]]}, [{}], "dogleg_rapids",
+     "machine.rapid_motion"),
     ({"kinematics": "head-head-BC", "tcp": False, "pivots_mm": [[0, 0, 90]]}, [{}], "no_gauge_length", "T1"),
     ({"tcp": False}, [{}], "no_pivots", "machine.pivots_mm")])
 def test_what_a_machine_of_five_axes_cannot_do_is_said(machine, access, code, subject):
