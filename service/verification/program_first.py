@@ -14,7 +14,7 @@ from schemas.setup import Setup
 from service.from_wire import check_spindle_tool, gauge_lengths, gauges_given, machine_kinematics, tool_bodies
 from service.verification.rotary_sense import assumed_sense, check_gauges, check_sense, sense_in_header
 from verify.assumptions import Assumed, AssumedKind
-from verify.gcode.dialects import dialect_of, dialects_left
+from verify.gcode.dialects import candidates, likeliest, others
 from verify.kinematics import Kinematics
 from verify.model import NcProgram
 from verify.program.move_kinds import FEED
@@ -64,7 +64,8 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
                          subjects=(access,), remedy="name one of them, or leave it out for the first")
     check_spindle_tool(setup, spindle_tool)
     own = known[access] if access is not None else setup.access[0]
-    nc = NcProgram("program", text, dialect=dialect or dialect_of(text, ending, setup.machine.dialects))
+    may = candidates(text, ending) if dialect is None else [dialect]
+    nc = NcProgram("program", text, dialect=dialect or likeliest(may, setup.machine.dialects))
     tools, machine = tool_bodies(setup), machine_kinematics(setup.machine)
     gauges, assumed = gauge_lengths(setup.tools, tools), list[Assumed]()
 
@@ -74,7 +75,7 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
                         change=setup.machine.change_position, gauge_given=gauges_given(setup.tools))
 
     if dialect is None and not is_exchange_file(text):
-        assumed.extend(_assumed_dialect(nc.dialect, dialects_left(text, ending, _stated_dialects(setup))))
+        assumed.extend(_assumed_dialect(nc.dialect, others(may, _stated_dialects(setup))))
     turned = machine if setup.machine.iso_axes is None and not is_exchange_file(text) else None
     stated = None if turned is None else sense_in_header(text, turned)
     read = reading(stated or machine)

@@ -45,6 +45,7 @@ from verify.surface.removal import residual_on_normals
 from verify.surface.sample_scores import RAY_ERROR
 
 MIN_REACH = 1.0
+RAY_BATCH = 400_000  # rays at a time from places under paths
 SEED_BATCH = 4000  # places that are looked at more closely at a time
 
 
@@ -105,10 +106,11 @@ class _Shooting:
     threads: int
     reach: float
 
-    def rays(self, points: F64, normals: F64, face: I32, area: F64, report: Report, *, full: bool = False) -> _Table:
-        """Rays cut by all moves; full : whether stock stands on them as far as they are followed."""
-        first = np.full(len(points), self.reach) if full else stock_on_normals(points, normals, self.bounds, self.setup,
-                                                                               self.reach)
+    def rays(self, points: F64, normals: F64, face: I32, area: F64, report: Report, *,
+             stock: float | None = None) -> _Table:
+        """Rays cut by all moves; stock : mm that stands on all of them, None: as much as the blank has."""
+        first = np.full(len(points), stock) if stock is not None else stock_on_normals(
+            points, normals, self.bounds, self.setup, self.reach)
         left, by = residual_on_normals(points, normals, first, self.moves, self.tools, threads=self.threads,
                                        progress=report)
         return _Table(points, normals, face, area, left, by)
@@ -149,7 +151,7 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
     feet, wide = turning_feet(tree, moves, tools, setup.gouge_tolerance)
     if len(feet.triangle):
         table += shot.rays(feet.points, feet.normals, part.mesh.face_ids[feet.triangle], np.zeros(len(feet.triangle)),
-                           lambda f: tell(0.8 + 0.05 * f), full=True)
+                           lambda f: tell(0.8 + 0.05 * f), stock=shot.reach)
     table += _followed(tree, shot)
     table = _at_ends(_deepened(table, even, tree, shot, lambda f: tell(0.85 + 0.15 * f)), tree, shot)
     gouged = np.flatnonzero((table.residual < -setup.gouge_tolerance - RAY_ERROR) & (table.mover >= 0))
@@ -180,10 +182,24 @@ def _thread_notes(cutting: Sequence[int], tools: Sequence[ToolBody]) -> list[str
 
 
 def _followed(tree: TriangleTree, shot: _Shooting) -> _Table:
-    """Rays from places under the paths of fine tools, those of them that are cut."""
-    kept = [_none()]
-    for points, row in path_points(tree, shot.moves, shot.tools, shot.setup.gouge_tolerance):
-        kept.append(_cut(_close_rays(tree, shot, points, tree.mesh.normals[row], row), shot))
+    """Rays from places under the paths of fine tools, those of them that are cut.
+
+    All moves cut each batch of rays, so places are gathered to batches of ``RAY_BATCH`` before. Only cuts into the part
+    count, so no stock stands on these rays: moves that touch the surface do not come near.
+    """
+    kept, points, rows = [_none()], [np.zeros((0, 3))], [np.zeros(0, np.int64)]
+
+    def shoot() -> None:
+        row = np.concatenate(rows)
+        kept.append(_cut(_close_rays(tree, shot, np.concatenate(points), tree.mesh.normals[row], row, 0.0), shot))
+        points[1:], rows[1:] = [], []
+
+    for more, row in path_points(tree, shot.moves, shot.tools, shot.setup.gouge_tolerance):
+        points.append(more)
+        rows.append(row)
+        if sum(map(len, rows)) >= RAY_BATCH:
+            shoot()
+    shoot()
     return sum(kept[1:], kept[0])
 
 
@@ -192,9 +208,14 @@ def _none() -> _Table:
     return _Table(none, none, rows, np.zeros(0), np.zeros(0), rows)
 
 
-def _close_rays(tree: TriangleTree, shot: _Shooting, points: F64, normals: F64, row: NDArray[np.int64]) -> _Table:
-    """Rays from places close together, which stand for no area, of triangles ``row`` (n,)."""
-    return shot.rays(points, normals, tree.mesh.face_ids[row], np.zeros(len(row)), silent, full=True)
+def _close_rays(tree: TriangleTree, shot: _Shooting, points: F64, normals: F64, row: NDArray[np.int64],
+                stock: float | None = None) -> _Table:
+    """Rays from places close together, which stand for no area, of triangles ``row`` (n,).
+
+    stock : mm on them; None: as far as they are followed
+    """
+    return shot.rays(points, normals, tree.mesh.face_ids[row], np.zeros(len(row)), silent,
+                     stock=shot.reach if stock is None else stock)
 
 
 def _cut(table: _Table, shot: _Shooting) -> _Table:

@@ -89,27 +89,29 @@ def dialect_of(text: str, ending: str = "", wanted: Collection[str] = ()) -> str
     >>> dialect_of("G21 G90", "nc", ["haas"]), dialect_of("G21 G90", "nc", ["linuxcnc"])
     ('haas', 'linuxcnc')
     """
-    may = _candidates(text, ending)
+    return likeliest(candidates(text, ending), wanted)
+
+
+def likeliest(may: Sequence[str], wanted: Collection[str]) -> str:
+    """The dialect to read a text in that ``candidates`` leaves these for; ``wanted`` as for ``dialect_of``."""
     named = [d for d in wanted if d in may]
     return named[0] if named else may[0] if len(may) == 1 else LINUXCNC
 
 
-def dialects_left(text: str, ending: str = "", wanted: Collection[str] = ()) -> tuple[str, ...]:
-    """The other dialects that a text may be in, where nothing decides for that of ``dialect_of``; arguments as there.
+def others(may: Sequence[str], wanted: Collection[str]) -> tuple[str, ...]:
+    """The dialects besides ``likeliest`` that nothing decides against; arguments as there.
 
-    >>> dialects_left("G21 G90", "nc", ["haas"]), dialects_left("G21 G90", "ngc")
+    >>> others(candidates("G21 G90", "nc"), ["haas"]), others(candidates("G21 G90", "ngc"), [])
     ((), ())
-    >>> dialects_left("G21 G90", "nc"), dialects_left("G21 G90", "nc", ["fanuc", "haas"])
+    >>> others(candidates("G21 G90", "nc"), []), others(candidates("G21 G90", "nc"), ["fanuc", "haas"])
     (('fanuc', 'haas'), ('haas',))
     """
-    may = _candidates(text, ending)
-    named = [d for d in wanted if d in may]
-    left = may if not named else named
-    return () if len(left) == 1 else tuple(d for d in left if d != dialect_of(text, ending, wanted))
+    left = [d for d in wanted if d in may] or may
+    return () if len(left) == 1 else tuple(d for d in left if d != likeliest(may, wanted))
 
 
-def _candidates(text: str, ending: str) -> list[str]:
-    """The dialects that marks and file name leave, the likeliest first."""
+def candidates(text: str, ending: str) -> list[str]:
+    """The dialects that marks and file name leave, the likeliest first; one search of the whole text."""
     text = text.removeprefix("\ufeff")
     if is_conversational(text):
         return ["heidenhain"]
@@ -120,5 +122,5 @@ def _candidates(text: str, ending: str) -> list[str]:
     return [d for d in may if len(may) == 1 or d not in ("siemens", "heidenhain")]
 
 
-__all__ = ["CONTROLS", "DIALECTS", "ENDINGS", "LINUXCNC", "OWN_SPEED_RAPIDS", "dialect_of", "dialects_left",
-           "translated_blocks"]
+__all__ = ["CONTROLS", "DIALECTS", "ENDINGS", "LINUXCNC", "OWN_SPEED_RAPIDS", "candidates", "dialect_of", "likeliest",
+           "others", "translated_blocks"]
