@@ -6,11 +6,12 @@ the setup frame, lengths in mm.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from verify.findings import Source
 from verify.model import Finding, FindingKind
@@ -40,17 +41,9 @@ def sideways_findings(moves: Moves, cut: NDArray[np.bool_], tools: Sequence[Tool
     way = np.where(cuts[:, None], moves.end - moves.start[first], way)
     aside = np.linalg.norm(way - np.einsum("ij,ij->i", way, up)[:, None] * up, axis=1)
     bad = np.flatnonzero(cuts & ((aside > ASIDE) | (axes.angle > 0.0)))
-    out, seen = [], set[tuple[int, int]]()
-    for m in bad.tolist():
-        key = (int(source.program[m]), int(source.line[m]))
-        if key in seen:
-            continue
-        seen.add(key)
-        x, y, z = (round(float(v), 6) for v in moves.end[m])
-        out.append(Finding(FindingKind.PROGRAM, source.names[key[0]], key[1], None, None, (x, y, z), float(aside[m]),
-                           0.0, f"T{source.tool[m]} is a {tools[moves.tool[m]].kind} and cuts {aside[m]:.3f} mm "
-                           "sideways; it cuts along its axis only", tip=(x, y, z)))
-    return out
+    return _one_a_line(bad, aside, moves.end, source, lambda m: (
+        f"T{source.tool[m]} is a {tools[moves.tool[m]].kind} and cuts {aside[m]:.3f} mm sideways; it cuts along its "
+        "axis only"))
 
 
 def torn_threads(moves: Moves, cut: NDArray[np.bool_], tools: Sequence[ToolBody], source: Source) -> list[Finding]:
@@ -67,16 +60,22 @@ def torn_threads(moves: Moves, cut: NDArray[np.bool_], tools: Sequence[ToolBody]
     same = (moves.tool[1:] == moves.tool[:-1]) & (source.program[1:] == source.program[:-1])
     bad = 1 + np.flatnonzero(taps[moves.tool[:-1]] & same & moves.feed[:-1] & cut[:-1] & ~moves.feed[1:]
                              & (way[1:] > ASIDE))
+    return _one_a_line(bad, way, moves.start, source, lambda m: (
+        f"T{source.tool[m]} is a tap and leaves its thread at rapid; it feeds out as it fed in"))
+
+
+def _one_a_line(bad: NDArray[np.intp], depth: F64, at: F64, source: Source,
+                words: Callable[[int], str]) -> list[Finding]:
+    """A finding for the first of the moves ``bad`` in each line, at its place ``at`` (m, 3), mm."""
     out, seen = [], set[tuple[int, int]]()
     for m in bad.tolist():
         key = (int(source.program[m]), int(source.line[m]))
         if key in seen:
             continue
         seen.add(key)
-        x, y, z = (round(float(v), 6) for v in moves.start[m])
-        out.append(Finding(FindingKind.PROGRAM, source.names[key[0]], key[1], None, None, (x, y, z), float(way[m]), 0.0,
-                           f"T{source.tool[m]} is a tap and leaves its thread at rapid; it feeds out as it fed in",
-                           tip=(x, y, z)))
+        x, y, z = (round(float(v), 6) for v in at[m])
+        out.append(Finding(FindingKind.PROGRAM, source.names[key[0]], key[1], None, None, (x, y, z), float(depth[m]),
+                           0.0, words(m), tip=(x, y, z)))
     return out
 
 
