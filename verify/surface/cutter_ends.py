@@ -37,6 +37,7 @@ LIFT, LIFT_SHARE = 0.05, 0.25  # mm, and of the radius: a second rim over the sh
 TOLD = 0.5  # mm: a wider step along the ways is a note
 THIN = 0.05  # mm
 BATCH = 4096  # poses
+SPARE = 1e-6  # mm
 INT = NDArray[np.int64]
 
 
@@ -148,7 +149,15 @@ def _placed(moves: Moves, row: INT, share: F64, tool: ToolBody, bounds: F64) -> 
 
 
 def _pressed(tree: TriangleTree, tip: F64, axis: F64, tool: ToolBody, lift: float, least: float) -> Feet:
-    """The deepest place of each pose (n, 3) that presses in by more than ``least`` mm, on a rim ``lift`` mm up."""
+    """The deepest place of each pose (n, 3) that presses in by more than ``least`` mm, on a rim ``lift`` mm up.
+
+    An end presses in nowhere where its middle is in air and no surface comes as near to it as its rim does.
+    """
+    middle = tip + (tool.corner_radius + lift) * axis
+    alone = np.flatnonzero(nearest(tree, middle, tool.radius + SPARE)[1] < 0)
+    may = np.ones(len(tip), np.bool_)
+    may[alone] = inside_part(tree, middle[alone])
+    tip, axis = tip[may], axis[may]
     return _joined([_deepest(tree, tip[i:i + BATCH], axis[i:i + BATCH], tool, lift, least)
                     for i in range(0, len(tip), BATCH)])
 
