@@ -114,6 +114,19 @@ class ToolLean:
     walls: float | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class LeftAlone:
+    """Places of faces that are not to be machined, access frame.
+
+    points, normals : (n, 3) float64, mm and unit, out of the material
+    spacing         : mm between them
+    """
+
+    points: F64
+    normals: F64
+    spacing: float
+
+
 @dataclass(frozen=True)
 class PlanSettings:
     """Tolerances and heights of a plan; mm and rad.
@@ -125,6 +138,7 @@ class PlanSettings:
     pattern         : of passes over shallow area
     turning         : RotaryAxes; None on a machine without
     leaned          : requested tilt on faces; None where the plan chooses
+    left_alone      : LeftAlone, places of faces that the setup does not let machine; None: there are none
     found           : findings of proofs of earlier plans, in the frame of this one
     rates           : speeds and accelerations of the machine, for times
     planes          : heights of contact, descending: all above one is finished before any tool goes below it
@@ -149,6 +163,7 @@ class PlanSettings:
     planes: tuple[float, ...] = ()
     semi_finishing: bool = False
     leaned: ToolLean | None = None
+    left_alone: LeftAlone | None = None
 
     @property
     def budget(self) -> ScallopBudget:

@@ -9,6 +9,8 @@ import math
 
 import numpy as np
 
+from geometry.mesh import TriangleMesh
+from geometry.sampling import lattice_samples
 from schemas.setup import Lean
 from service.from_wire import face_numbers, gauges_given
 from service.setup_assumptions import planned_sense, setup_assumptions
@@ -18,7 +20,7 @@ from service.stages.job_part import JobPart
 from service.stages.preparation import Prepared, table_height
 from service.stages.programs import access_of, fixture_boxes, turning_of
 from service.stages.wall_support import FREE_RATIO, in_turn
-from toolpath.plan_settings import Pattern, PlanSettings, ToolLean
+from toolpath.plan_settings import LeftAlone, Pattern, PlanSettings, ToolLean
 from toolpath.scallop_budget import ARC_SHARE
 from toolpath.stock.stock_map import StockMap
 from toolpath.workingsteps import CutDirection
@@ -30,6 +32,7 @@ from zones.reach.access_view import View
 
 STOCK_STEP = 0.08  # mm, the planner's stock lattice; wider where that would take more than STOCK_CELLS
 STOCK_CELLS = 4e6
+ALONE_SPACING, MAX_ALONE = 0.3, 200_000  # mm between places of faces left alone, and how many there are at most
 ABOVE = 1.0  # mm between the height rapids may go down to and the clearance plane
 
 
@@ -52,7 +55,19 @@ def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
     return PlanSettings(q.scallop_height_mm, chord, q.stock_allowance_mm, ready.lift, floor + ABOVE,
                         floor, ramp, ops.roughing, ops.finishing, CutDirection(ops.cut_direction),
                         Pattern(ops.pattern), turning_of(ready, view), rates=inputs.rates,
-                        semi_finishing=ops.semi_finishing, leaned=leaned(ops.lean))
+                        semi_finishing=ops.semi_finishing, leaned=leaned(ops.lean),
+                        left_alone=_places_left_alone(ready, view) if ops.roughing else None)
+
+
+def _places_left_alone(ready: Prepared, view: View) -> LeftAlone | None:
+    """Places of the faces that the setup does not let machine, in the frame of the access."""
+    mesh = view.part.mesh
+    chosen = np.isin(mesh.face_ids, list(left_alone(ready)))
+    if not chosen.any():
+        return None
+    spacing = max(ALONE_SPACING, float(np.sqrt(mesh.areas[chosen].sum() / MAX_ALONE)))
+    places = lattice_samples(TriangleMesh(mesh.vertices, mesh.faces[chosen], mesh.face_ids[chosen]), spacing)
+    return LeftAlone(places.points, places.normals, spacing)
 
 
 def leaned(lean: Lean) -> ToolLean | None:

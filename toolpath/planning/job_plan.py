@@ -14,6 +14,7 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from geometry.cutting_mechanics import effective_diameter
 from geometry.mesh import F64
@@ -32,7 +33,7 @@ from toolpath.plan_checkpoint import (
     PlanSnapshot,
     ToolSnapshot,
 )
-from toolpath.plan_settings import CutData, PlanSettings
+from toolpath.plan_settings import CutData, LeftAlone, PlanSettings
 from toolpath.planning.depth_bands import largest_corner
 from toolpath.planning.layouts_ahead import computed_ahead
 from toolpath.planning.zone_finishing import Finish, ZonePlan, motions_of, step_of, turned
@@ -44,9 +45,10 @@ from toolpath.stock.stock_map import SURE_RIM, StockMap
 from toolpath.strategies import depth_layers
 from toolpath.workingsteps import Workingstep
 from zones.machinable_area import AreaForm
-from zones.reach.tip_field import TipField
+from zones.reach.tip_field import TipField, contact_tips
 from zones.zoning.zones import ZoneArea
 
+WALL = 0.9  # part of a unit normal along the access: faces with more are no walls
 AGAIN_SHARE = 0.95  # of the progress, before zones are finished again
 THIN = 2.0  # scallops: thickness on a wall that a finish leaves
 # A ring is exact to one lattice step; the rest keeps it off the part after thinning to a tenth of a step.
@@ -263,6 +265,7 @@ class _Layers:
         # without a finish, rims take every wall to size layer by layer, while the stock below still supports it
         steep = [z.tips for z in zones if z.form is AreaForm.STEEP and settings.finishing]
         self.walls = np.vstack([np.zeros((0, 3)), *steep])
+        self.alone, self.alone_wide = _left_alone(settings.left_alone, field, tips)
         self.bounded = cut.engaged < UNBOUNDED
         # the finish of a floor has the whole front of the cutter in the allowance
         low = min(self.allowance, 0.5 * SKIN_SHARE * tool.radius) if self.bounded else self.allowance
@@ -303,8 +306,10 @@ class _Layers:
             finished = lat.mask(self.walls[np.abs(self.walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
             unseen = z <= self.swept - FLUTE_SHARE * tool.flute_length
             self.swept = z if unseen else self.swept
+            alone = lat.mask(self.alone[np.abs(self.alone[:, 2] - z) <= 2.0 * cut.step_down, :2])
             rims = depth_layers.rim(field, self.stock, z, below, finished, self.allowance, chord, unseen,
-                              min(THIN * settings.scallop_height, 0.5 * self.allowance) if settings.finishing else 0.0)
+                              min(THIN * settings.scallop_height, 0.5 * self.allowance) if settings.finishing else 0.0,
+                              dilated(alone, self.alone_wide / lat.step))
             deep = FLUTE_SHARE * tool.flute_length if unseen else cut.step_down
             usual, linker.pace = linker.pace, self._rim_pace(deep)
             for line in nearest_order(rims, linker.at, False):
@@ -366,6 +371,22 @@ class _Layers:
         kind, cut = ("depth_layers", self.cut) if operation == "roughing" else ("between layers", self._thinner())
         return [step_of(step_id, f"{step_id} {kind} {tool.id} {ids}", None, self.zones, operation, "depth_layers", tool,
                         cut, 0.8 * tool.radius, linker.finish(), self.settings)]
+
+
+def _left_alone(faces: LeftAlone | None, field: TipField, tips: F64) -> tuple[F64, float]:
+    """Tips that touch walls the setup does not let machine, (n, 3) float64, mm, and mm that a mask of them is grown by.
+
+    tips : (k, 3) float64, mm, of the samples to finish
+
+    Not those from which the tool finishes a floor or another wall: there a thin rim would stand in its way.
+    """
+    if faces is None:
+        return np.zeros((0, 3)), 0.0
+    walls = np.abs(faces.normals[:, 2]) < WALL
+    touching = contact_tips(field.tool, faces.points[walls], faces.normals[walls], field.allowance)
+    wide = faces.spacing + 1.5 * field.lattice.step
+    near = cKDTree(tips[:, :2]).query(touching[:, :2], distance_upper_bound=wide)[0]
+    return touching[~np.isfinite(near)], wide
 
 
 def _own(field: TipField, tips: F64, z: float) -> NDArray[np.bool_]:

@@ -72,7 +72,8 @@ def layer(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], a
 
 
 def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], finished: NDArray[np.bool_],
-        allowance: float, tolerance: float, unseen: bool, thin: float = 0.0) -> list[Line]:
+        allowance: float, tolerance: float, unseen: bool, thin: float = 0.0,
+        alone: NDArray[np.bool_] | None = None) -> list[Line]:
     """Lines that remove the allowance from walls which no finishing pass of this tool will follow at this height.
 
     Without them an undercut wall, or one that this tool does not finish, keeps a thin rim. The rim stands higher than
@@ -84,11 +85,14 @@ def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], fin
     unseen    : follow every wall, finished here or not, also where the stock map, coarser than a thin rim, shows none;
                 done once a flute length on the way down
     thin      : mm, residual of a finish on the wall: on a steep wall that is high over the cutter and no rim
+    alone     : (ny, nx) bool on the lattice, where the tool would touch walls that are not to be machined; None: none
     """
     lat, tool = field.lattice, field.tool
     skip = dilated(finished, 3.0 * allowance / lat.step + 2.0) & ~_slots(field, z, allowance)
     if unseen:
         skip = np.zeros_like(skip)
+    if alone is not None:
+        skip = skip | alone
     out: list[Line] = []
     for line in contours(field, z, dilated(area, tool.radius / lat.step) & ~skip, tolerance):
         off = SURE_RIM if unseen else -thin / stock.lattice.step

@@ -2,7 +2,8 @@
 
 A feed move brings a place to size where it takes off more than the gouge tolerance and leaves no more than a
 finished face may have. A tool that finishes the face beside it cannot help that: it runs along a wall while it finishes
-the floor. So a place does not count where the same tool touches it from a position in which it finishes another face.
+the floor. So a place does not count where the same tool touches it from a position in which it finishes another face,
+nor within the distance of two places from one of another face that is brought to size: a pass rolls over the edge.
 Coordinates are float64, mm, in the frame of the proof.
 """
 
@@ -78,6 +79,8 @@ def excluded_cuts(places: CutPlaces, mesh: TriangleMesh, moves: Moves, tools: Se
             tips, slack = _tips(places, with_it, moves), SLACK * tools[k].radius + spacing
             touched = _touched if moves.axes is None else _near
             own[mine] = ~touched(places, rows[mine], tips, moves, tools[k], slack)
+    if len(others):
+        own &= ~np.isfinite(cKDTree(places.points[others]).query(places.points[rows], distance_upper_bound=spacing)[0])
     rows, taken = rows[own], taken[own]
     return excluded_findings(places.points[rows], places.face[rows], taken, places.area[rows], places.mover[rows],
                              source, setup.left_alone, setup.gouge_tolerance)

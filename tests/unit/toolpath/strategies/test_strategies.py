@@ -432,6 +432,9 @@ def test_the_rim_pass_is_for_walls_nobody_finishes_or_for_all_once_a_flute():
     assert depth_layers.rim(field, stock, z, area, np.ones_like(area), 0.3, CHORD, False) == []
     unseen = depth_layers.rim(field, stock, z, area, np.ones_like(area), 0.3, CHORD, True)
     assert sum(q.length for q in unseen) >= 0.99 * sum(q.length for q in everything)
+    for always in (False, True):  # the wall at x = 5..7 is left alone, once a flute too
+        kept = depth_layers.rim(field, stock, z, area, np.zeros_like(area), 0.3, CHORD, always, 0.0, one)
+        assert kept and min(line.points[:, 0].min() for line in kept) > 10.0
     stock.top[:] = -5.0
     assert depth_layers.rim(field, stock, z, area, np.zeros_like(area), 0.3, CHORD, False) == []
 
