@@ -74,7 +74,7 @@ def program(tree: TriangleTree, points: int) -> str:
     z: F64 = drop_cutter(tree, Cutter.ball(diameter=TOOL.diameter, length=12.0), xy)
     lines = [f"X{a:.4f}Y{b:.4f}Z{c:.4f}" for (a, b), c in zip(xy.tolist(), z.tolist(), strict=True)]
     a, b = xy[0].tolist()
-    return "\n".join(["G21 G90 G94 G17 G54", "T1 M6", "S12000 M3", "G43 H1", "G0 Z30", f"G0 X{a:.4f} Y{b:.4f}",
+    return "\n".join(["G21 G90 G94 G17 G54 G61", "T1 M6", "S12000 M3", "G43 H1", "G0 Z30", f"G0 X{a:.4f} Y{b:.4f}",
                       "G1 F2000", *lines, "G0 Z30", "M5", "M30", ""])
 
 
@@ -89,7 +89,7 @@ def leaning(tree: TriangleTree, points: int) -> str:
     lines = [f"X{x:.4f}Y{y:.4f}Z{z:.4f}A{a:.4f}C{c:.4f}"
              for (x, y, z), (a, c) in zip((tips + away).tolist(), turn.tolist(), strict=True)]
     place, lean = lines[0].split("Z")[0], "A" + lines[0].split("A")[1]
-    return "\n".join(["G21 G90 G94 G17 G54", "T1 M6", "S12000 M3", "G43.4 H1", "G0 A0 C0", "G0 X0 Y0", "G0 Z30",
+    return "\n".join(["G21 G90 G94 G17 G54 G61", "T1 M6", "S12000 M3", "G43.4 H1", "G0 A0 C0", "G0 X0 Y0", "G0 Z30",
                       f"G0 {lean}", f"G0 {place}", "G1 F2000", *lines, "G0 Z30", "M5", "M30", ""])
 
 
