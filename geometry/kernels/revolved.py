@@ -204,6 +204,23 @@ def triangle_tip(shape, v, facet, x, y, best):
     return tip, a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
 
 
+@njit(**KERNEL, inline="always")
+def triangle_at(corners, i):
+    """The corners of triangle i of the leaf order.
+
+    Numbers, since a row of an array is an object: all threads would count up and down its uses in one place.
+    """
+    return ((corners[i, 0, 0], corners[i, 0, 1], corners[i, 0, 2]),
+            (corners[i, 1, 0], corners[i, 1, 1], corners[i, 1, 2]),
+            (corners[i, 2, 0], corners[i, 2, 1], corners[i, 2, 2]))
+
+
+@njit(**KERNEL, inline="always")
+def facet_at(facets, i):
+    """``facet_row`` of triangle i of the leaf order, as numbers."""
+    return facets[i, 0], facets[i, 1], facets[i, 2], facets[i, 3], facets[i, 4]
+
+
 @njit(**KERNEL)
 def walk(tree: TreeArrays, shape, x, y, start, first_only):
     """Highest lift above ``start``: lift, place in leaf order (-1: nothing lifts) and contact point.
@@ -212,7 +229,7 @@ def walk(tree: TreeArrays, shape, x, y, start, first_only):
     level in a 64-bit trail marks the siblings left to visit, so that no stack is needed.
     """
     best, slot, cx, cy, cz = start, -1, np.nan, np.nan, np.nan
-    column, child, parent = tree.column, tree.child, tree.parent
+    column, child, parent, corners, facets = tree.column, tree.child, tree.parent, tree.corners, tree.facets
     node = 0
     trail = np.uint64(0)
     one = np.uint64(1)
@@ -231,7 +248,7 @@ def walk(tree: TreeArrays, shape, x, y, start, first_only):
                 continue
         else:
             for i in range(tree.first[node], tree.first[node] + tree.size[node]):
-                lift, px, py, pz = lift_of(shape, tree.corners[i], tree.facets[i], x, y, best)
+                lift, px, py, pz = lift_of(shape, triangle_at(corners, i), facet_at(facets, i), x, y, best)
                 if lift > best:
                     best, slot, cx, cy, cz = lift, i, px, py, pz
                     if first_only:
