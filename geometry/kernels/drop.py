@@ -11,6 +11,14 @@ and lifts nothing. At R = 0 the tip is the height of the mesh. The loops are tho
 
 Bound: a node cannot lift the tip above the maximum over its box of its covering plane (or top z) less a paraboloid that
 lies below h.
+
+Over places close together the triangles that can hold the cutter up are found once, the list ``near``:
+    floor    a height that the tip is nowhere below over these places
+    slot     a triangle, by its place in the leaf order; -1: none
+    lift     tip height that one triangle requires
+The lift of a triangle is concave over places of the axis: h is convex, and the lift is a maximum over the points of the
+triangle. So between two places it is nowhere less than at the lower one, which gives the floor. Within a of a place no
+triangle lifts the cutter (R, r) more than it lifts, over that place, the one with a flat wider by a, (R + a, r).
 """
 
 from __future__ import annotations
@@ -24,9 +32,23 @@ from numba import njit, prange
 from geometry.kernels import revolved
 from geometry.kernels.bvh import TreeArrays
 from geometry.kernels.options import KERNEL
-from geometry.kernels.revolved import NOTHING, arc_angle, for_shape, triangle_tip, walk
+from geometry.kernels.revolved import (
+    NOTHING,
+    arc_angle,
+    facet_at,
+    for_shape,
+    lift_of,
+    node_bound,
+    triangle_at,
+    triangle_tip,
+    walk,
+)
 
 BLOCK_TOLERANCE = 1e-9  # mm: a lift below this does not block
+MOST = 96  # triangles near some places: where there are more, each place is looked up alone
+SLACK = 1e-7  # mm: a lift at the rim of the cutter may err by this
+WIDE = 0.25  # of the radius: places this close together are looked up at once
+FEW = 3  # places that pay for a search
 RIM = 0.98  # tangents of h are taken no farther out than this part of the corner radius
 
 
@@ -288,3 +310,127 @@ def grid_parallel(tree, x0, y0, step, radius, corner_radius, out):
     """``grid_rows`` over all rows, on the threads numba has."""
     for j in prange(out.shape[0]):
         grid_rows(tree, x0, y0, step, radius, corner_radius, j, j + 1, out)
+
+
+# ======================================================================================================================
+
+
+@njit(**KERNEL)
+def lift_at(shape, corners, facets, slot, x, y):
+    """Lift of one triangle; -inf where it is none or too far away."""
+    if slot < 0:
+        return NOTHING
+    return lift_of(shape, triangle_at(corners, slot), facet_at(facets, slot), x, y, NOTHING)[0]
+
+
+@njit(**KERNEL)
+def find_near(tree, shape, x, y, off, floor, near):
+    """Triangles that lift the tip above ``floor`` somewhere within ``off`` of (x, y), into near; their count, -1 where
+    near has no room for them."""
+    off = off * (1.0 + 1e-9) + 1e-9
+    wide = Bull(shape.radius + off, shape.corner, shape.flat + off)
+    floor -= SLACK
+    reach2 = wide.radius * wide.radius
+    column, child, parent, corners = tree.column, tree.child, tree.parent, tree.corners
+    node, count = 0, 0
+    trail = np.uint64(0)
+    one = np.uint64(1)
+    if node_bound(wide, column[0], x, y, floor) <= floor:
+        return 0
+    while True:
+        inner = child[node]
+        if inner >= 0:
+            left = node_bound(wide, column[inner], x, y, floor) > floor
+            right = node_bound(wide, column[inner + 1], x, y, floor) > floor
+            if left or right:
+                trail <<= one
+                if left and right:
+                    trail |= one
+                node = inner if left else inner + 1
+                continue
+        else:
+            for i in range(tree.first[node], tree.first[node] + tree.size[node]):
+                p, q, s = triangle_at(corners, i)
+                u = max(min(p[0], q[0], s[0]) - x, x - max(p[0], q[0], s[0]), 0.0)
+                v = max(min(p[1], q[1], s[1]) - y, y - max(p[1], q[1], s[1]), 0.0)
+                if max(p[2], q[2], s[2]) > floor and u * u + v * v < reach2:
+                    if count == near.shape[0]:
+                        return -1
+                    near[count] = i
+                    count += 1
+        while True:
+            if trail == 0:
+                return count
+            while trail & one == 0:
+                trail >>= one
+                node = parent[node]
+            trail ^= one
+            node = ((node - 1) ^ 1) + 1
+            if node_bound(wide, column[node], x, y, floor) > floor:
+                break
+
+
+@njit(**KERNEL)
+def highest_near(shape, corners, facets, near, count, x, y, best, held):
+    """Tip over (x, y) and the triangle that holds it up, of the first ``count`` of near; best is the lift of held."""
+    for k in range(count):
+        i = near[k]
+        lift = lift_of(shape, triangle_at(corners, i), facet_at(facets, i), x, y, best)[0]
+        if lift > best:
+            best, held = lift, i
+    return best, held
+
+
+@njit(**KERNEL, inline="always")
+def tip_near(tree, shape, x, y, near, count, guess):
+    """Tip over (x, y) and the triangle that holds it up: of the first ``count`` of near, or of all where count < 0.
+
+    guess : a triangle that probably holds it, or -1; it is looked at first
+    """
+    tip = lift_at(shape, tree.corners, tree.facets, guess, x, y)
+    held = guess if tip > NOTHING else -1
+    if count >= 0:
+        tip, held = highest_near(shape, tree.corners, tree.facets, near, count, x, y, tip, held)
+    else:
+        found = walk(tree, shape, x, y, tip, False)
+        tip = found[0]
+        if found[1] >= 0:
+            held = found[1]
+    return tip, held
+
+
+@njit(**KERNEL)
+def drop_along(tree, xy, radius, corner_radius, out):
+    """Tips over places xy (n, 2) that follow each other, into out (n,)."""
+    shape = bull_of(radius, corner_radius)
+    near = np.empty(MOST, np.int64)
+    widest = WIDE * shape.radius
+    most, slot, i, hi = widest, -1, 0, xy.shape[0]
+    while i < hi:
+        x, y = xy[i, 0], xy[i, 1]
+        tip, slot = tip_near(tree, shape, x, y, near, -1, slot)
+        out[i] = tip
+        i += 1
+        floor, end = tip, i
+        x_lo, x_hi, y_lo, y_hi = x, x, y, y
+        while end < hi:
+            u, v = xy[end, 0], xy[end, 1]
+            a, b, c, d = min(x_lo, u), max(x_hi, u), min(y_lo, v), max(y_hi, v)
+            if max(b - a, d - c) > most:
+                break
+            lift = lift_at(shape, tree.corners, tree.facets, slot, u, v)
+            if not lift > tip - most:
+                break
+            x_lo, x_hi, y_lo, y_hi, floor = a, b, c, d, min(floor, lift)
+            end += 1
+        if end - i < FEW:
+            continue
+        off = 0.5 * math.sqrt((x_hi - x_lo) ** 2 + (y_hi - y_lo) ** 2)
+        count = find_near(tree, shape, 0.5 * (x_lo + x_hi), 0.5 * (y_lo + y_hi), off, floor, near)
+        if count < 0:
+            most *= 0.5
+            continue
+        most = min(2.0 * most, widest)
+        while i < end:
+            out[i], slot = tip_near(tree, shape, xy[i, 0], xy[i, 1], near, count, slot)
+            i += 1

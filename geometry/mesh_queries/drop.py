@@ -78,6 +78,28 @@ def drop_tips(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: f
     return result
 
 
+def drop_along(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: float) -> F64:
+    """``drop_tips`` over places that follow each other as on a path, with less work the closer they are.
+
+    xy : (n, 2) float64, mm, places of the axis in the frame of the mesh; other parameters as there
+
+    Returns
+    -------
+    (n,) float64, mm
+        As ``drop_tips``, to rounding.
+
+    Raises
+    ------
+    GeometryError
+        As ``drop_tips``.
+    """
+    points = finite_points(xy, 2, "xy")
+    _check_radii(radius, corner_radius)
+    out = np.empty(len(points))
+    kernels.drop_along(tree.arrays, points, float(radius), float(corner_radius), out)
+    return out
+
+
 def drop_contacts(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: float) -> DropContacts:
     """``drop_tips`` with the triangle and the point that hold each tip up; parameters as there.
 

@@ -6,7 +6,7 @@ import pytest
 from geometry.kernels.drop import drop_tip_below
 from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
-from geometry.mesh_queries.drop import blocked_many, drop_contacts, drop_grid, drop_tips
+from geometry.mesh_queries.drop import blocked_many, drop_along, drop_contacts, drop_grid, drop_tips
 from geometry.sampling import sample_surface
 from tests.oracle.drop_shapes import CUTTERS, SHAPES, smooth, soup
 from tests.oracle.naive_drop import drop, lift_of_points
@@ -141,3 +141,15 @@ def peer_tips(ocl, mesh, radius, corner, xy):
         batch.appendPoint(ocl.CLPoint(x, y, -1000.0))
     batch.run()
     return np.array([p.z for p in batch.getCLPoints()])
+
+
+@pytest.mark.parametrize("cutter", CUTTERS)
+@pytest.mark.parametrize("shape", SHAPES)
+def test_tips_along_a_way_are_those_of_its_places(shape, cutter):
+    mesh, (radius, corner) = SHAPES[shape](), CUTTERS[cutter]
+    tree, ends = TriangleTree(mesh), _points(mesh, 12, seed=3)
+    for step in (0.02 * radius, 0.1 * radius):
+        way = np.vstack([a + np.linspace(0.0, 1.0, 40)[:, None] * 39.0 * step * (b - a) / np.linalg.norm(b - a)
+                         for a, b in zip(ends[:-1], ends[1:], strict=True)])
+        np.testing.assert_allclose(drop_along(tree, way, radius, corner), drop_tips(tree, way, radius, corner), rtol=0,
+                                   atol=1e-10)

@@ -3,9 +3,11 @@
 Notation
     limit    lowest tip height over a place: that of the cutting part, or of shank and holder where that is higher
     s, z     length along the way, and limit there
+    tip      limit of the cutting part without the allowance; held : the triangle that holds it up
     corners  (m,) lengths of the corners of the way
     piece    from one place to the next; its quarters are looked at, and it is cut there where they leave its chord
-Pieces are independent: they are cut depth first, and the places are those of any other order.
+Pieces are independent: they are cut depth first, and the places are those of any other order. The triangles that can
+hold the tool up over a piece, or over a few short ones, are found once (``geometry.kernels.drop``).
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from geometry.kernels.bvh import TreeArrays
-from geometry.kernels.drop import drop_tip
+from geometry.kernels.drop import MOST, WIDE, bull_of, find_near, lift_at, tip_near
 from geometry.kernels.options import KERNEL
 from zones.kernels.lattice import LatticeFrame, noncut_at
 
@@ -53,12 +55,44 @@ def place_on(way, corners, s):
     return way[k, 0] + share * (way[k + 1, 0] - way[k, 0]), way[k, 1] + share * (way[k + 1, 1] - way[k, 1])
 
 
-@njit(**KERNEL)
-def limit_on(limit, way, corners, s):
-    """Limit at length s along a way."""
+@njit(**KERNEL, inline="always")
+def _look(limit, shape, way, corners, s, near, count, held):
+    """Tip at length s along a way, what holds it up, and the limit; near and count as of ``tip_near``, held a guess."""
     x, y = place_on(way, corners, s)
-    tip = drop_tip(limit.tree, x, y, limit.radius, limit.corner) + limit.allowance
-    return max(tip, noncut_at(limit.noncut, limit.frame, x, y))
+    tip, held = tip_near(limit.tree, shape, x, y, near, count, held)
+    return tip, held, max(tip + limit.allowance, noncut_at(limit.noncut, limit.frame, x, y))
+
+
+@njit(**KERNEL)
+def _ahead(limit, shape, way, corners, s, tip, held, at, k, near):
+    """Triangles near the way from s to at[k], and on while it stays within a disc: their count and how far on; -1
+    where that is not known from what holds the tip at s."""
+    x, y = place_on(way, corners, s)
+    x_lo, x_hi, y_lo, y_hi, floor, end = x, x, y, y, tip, s
+    most = WIDE * shape.radius
+    for j in range(k, at.shape[0]):
+        x, y = place_on(way, corners, at[j])
+        lift = lift_at(shape, limit.tree.corners, limit.tree.facets, held, x, y)
+        if not lift > tip - (at[j] - s) or (j > k and at[j] - s > most):
+            break
+        x_lo, x_hi, y_lo, y_hi = min(x_lo, x), max(x_hi, x), min(y_lo, y), max(y_hi, y)
+        floor, end = min(floor, lift), at[j]
+    if end == s:
+        return -1, s
+    off = 0.5 * math.sqrt((x_hi - x_lo) ** 2 + (y_hi - y_lo) ** 2)
+    count = find_near(limit.tree, shape, 0.5 * (x_lo + x_hi), 0.5 * (y_lo + y_hi), off, floor, near)
+    return count, end
+
+
+@njit(**KERNEL)
+def _between(limit, shape, way, corners, s0, tip0, held0, s1, tip1, held1, near):
+    """Count of the triangles near a piece from s0 to s1, given the tips at its ends and what holds them up."""
+    ax, ay = place_on(way, corners, s0)
+    bx, by = place_on(way, corners, s1)
+    floor = max(min(tip0, lift_at(shape, limit.tree.corners, limit.tree.facets, held0, bx, by)),
+                min(tip1, lift_at(shape, limit.tree.corners, limit.tree.facets, held1, ax, ay)))
+    off = 0.5 * math.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
+    return find_near(limit.tree, shape, 0.5 * (ax + bx), 0.5 * (ay + by), off, floor, near)
 
 
 @njit(**KERNEL)
@@ -74,29 +108,45 @@ def _leaves(s0, z0, s1, z1, high, tolerance, steepest):
 
 @njit(**KERNEL)
 def dragged(limit, way, corners, at, tolerance, smallest, steepest):
-    """Places along a way (m, 2) and the limit at each, two arrays (n,); ``at`` (k,) are the places to start from.
+    """Places along a way (m, 2) and the limit at each, two arrays (n,); ``at`` (k,) are the places to start from, the
+    corners of the way among them.
 
     tolerance : mm, the path keeps to its chords; smallest : mm, no shorter piece is cut
     steepest  : mm of rise for each mm of way; a piece that rises more is cut too
     """
+    shape = bull_of(limit.radius, limit.corner)
+    near, known, upto = np.empty(MOST, np.int64), -1, -np.inf  # the list holds from the last place to ``upto``
     count, room = 1, max(2 * at.shape[0], 16)
     places, heights = np.empty(room), np.empty(room)
-    places[0], heights[0] = at[0], limit_on(limit, way, corners, at[0])
-    ends, tops, high = np.empty(4 * DEEP), np.empty(4 * DEEP), np.empty(3)
+    tip, held, z = _look(limit, shape, way, corners, at[0], near, -1, -1)
+    places[0], heights[0] = at[0], z
+    # ends of the pieces that wait, the nearest on top
+    ends, tops, tips, holds = np.empty(4 * DEEP), np.empty(4 * DEEP), np.empty(4 * DEEP), np.empty(4 * DEEP, np.int64)
+    high, lows, by = np.empty(3), np.empty(3), np.empty(3, np.int64)
     for k in range(1, at.shape[0]):
-        ends[0], tops[0] = at[k], limit_on(limit, way, corners, at[k])
+        if at[k] > upto:
+            known, upto = _ahead(limit, shape, way, corners, places[count - 1], tip, held, at, k, near)
+        ends[0] = at[k]
+        tips[0], holds[0], tops[0] = _look(limit, shape, way, corners, at[k], near, known, held)
         depth = 1
         while depth > 0:
             s0, z0, s1, z1 = places[count - 1], heights[count - 1], ends[depth - 1], tops[depth - 1]
             run = s1 - s0
             cut = False
             if run > smallest and depth < 4 * DEEP - 3:
+                if known < 0 or s1 > upto:
+                    known, upto = _between(limit, shape, way, corners, s0, tip, held, s1, tips[depth - 1],
+                                           holds[depth - 1], near), s1
+                guess = held
                 for q in range(3):
-                    high[q] = limit_on(limit, way, corners, s0 + run * (0.25 * (q + 1)))
+                    s = s0 + run * (0.25 * (q + 1))
+                    lows[q], guess, high[q] = _look(limit, shape, way, corners, s, near, known, guess)
+                    by[q] = guess
                 cut = _leaves(s0, z0, s1, z1, high, tolerance, steepest)
-            if cut:  # the quarters go on the pile, the nearest on top
+            if cut:
                 for q in (2, 1, 0):
-                    ends[depth], tops[depth] = s0 + run * (0.25 * (q + 1)), high[q]
+                    ends[depth], tops[depth], tips[depth] = s0 + run * (0.25 * (q + 1)), high[q], lows[q]
+                    holds[depth] = by[q]
                     depth += 1
                 continue
             if count == room:
@@ -106,6 +156,7 @@ def dragged(limit, way, corners, at, tolerance, smallest, steepest):
                     more[j], rise[j] = places[j], heights[j]
                 places, heights = more, rise
             places[count], heights[count] = s1, z1
+            tip, held = tips[depth - 1], holds[depth - 1]
             count += 1
             depth -= 1
     return places[:count].copy(), heights[:count].copy()

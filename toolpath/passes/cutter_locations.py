@@ -152,36 +152,45 @@ def lifted(profile: PassProfile, ends: F64, tool: ToolBody, limit: Limit, tolera
     more = [np.linspace(a, b, int(np.ceil((b - a) / FINE)) + 1)
             for a, b, both in zip(way[:-1], way[1:], over[:-1] & over[1:], strict=True) if both]
     # a tip that is not raised keeps its own place
-    way = np.unique(np.concatenate([way[np.isin(way, ends) | over], *more]))
-    made, rise = _raised(profile, way, tool, limit, off)
+    kept = np.isin(way, ends) | over
+    fresh = np.setdiff1d(np.concatenate([*more, way[:0]]), way[kept])
+    tip, up = _raised(*_against(profile, fresh, tool, limit, off))
+    made, rise = _raised(made[kept], high[kept])
+    way, made, rise = _together(way[kept], made, rise, fresh, tip, up)
+    under = _under(made, rise, limit, TIPS_SHARE * tolerance, np.ones(len(way) - 1, np.bool_))
     for _ in range(ROUNDS):
-        under = _under(made, rise, limit, TIPS_SHARE * tolerance)
         if not under.any():
             break
         between = 0.5 * (way[1:] + way[:-1])[under]
-        tip, up = _raised(profile, between, tool, limit, off)
-        order = np.argsort(np.concatenate([way, between]), kind="stable")
-        way, rise = np.concatenate([way, between])[order], np.concatenate([rise, up])[order]
-        made = np.concatenate([made, tip])[order]
+        tip, up = _raised(*_against(profile, between, tool, limit, off))
+        way, made, rise = _together(way, made, rise, between, tip, up)
+        # only the halves of the moves that were under have to be looked at
+        under = _under(made, rise, limit, TIPS_SHARE * tolerance, np.repeat(under, under + 1))
     whole = (rise <= (tool.radius if max_rise is None else max_rise)) & np.isfinite(rise)
     steep = np.abs(np.diff(rise)) > STEEPEST * np.diff(way)  # the pass itself may be as steep as it is
-    runs = true_runs(whole[1:] & whole[:-1] & ~steep & ~_under(made, rise, limit, TIPS_SHARE * tolerance))
+    runs = true_runs(whole[1:] & whole[:-1] & ~steep & ~under)
     return [thinned(made[i:j + 1], TIPS_SHARE * tolerance) for i, j in runs], True
 
 
-def _raised(profile: PassProfile, way: F64, tool: ToolBody, limit: Limit, off: float) -> tuple[F64, F64]:
-    """Tips (n, 3) at ways (n,), raised to the limit, and by how much (n,); mm."""
-    made, high = _against(profile, way, tool, limit, off)
+def _raised(made: F64, high: F64) -> tuple[F64, F64]:
+    """Tips (n, 3) raised to the limit ``high`` (n,), and by how much (n,); mm."""
     rise = np.where(high > made[:, 2] + FREE, high - made[:, 2], 0.0)
     return made + rise[:, None] * np.array([0.0, 0.0, 1.0]), rise
 
 
-def _under(made: F64, rise: F64, limit: Limit, tolerance: float) -> NDArray[np.bool_]:
-    """(n - 1,) bool: moves beside a raised place whose middle is under the limit by more than the tolerance."""
-    middle = 0.5 * (made[1:] + made[:-1])
-    look = (rise[1:] > 0.0) | (rise[:-1] > 0.0)
-    out = np.zeros(len(middle), np.bool_)
-    out[look] = limit(np.ascontiguousarray(middle[look, :2])) > middle[look, 2] + tolerance
+def _together(way: F64, made: F64, rise: F64, ways: F64, tips: F64, rises: F64) -> tuple[F64, F64, F64]:
+    """Places of a pass and others between them, in their order: ways, tips and by how much they are raised, mm."""
+    at = np.searchsorted(way, ways)
+    return np.insert(way, at, ways), np.insert(made, at, tips, axis=0), np.insert(rise, at, rises)
+
+
+def _under(made: F64, rise: F64, limit: Limit, tolerance: float, asked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(n - 1,) bool: moves that are asked for, beside a raised place, and in their middle under the limit by more than
+    the tolerance."""
+    look = asked & ((rise[1:] > 0.0) | (rise[:-1] > 0.0))
+    middle = 0.5 * (made[1:][look] + made[:-1][look])
+    out = np.zeros(len(look), np.bool_)
+    out[look] = limit(np.ascontiguousarray(middle[:, :2])) > middle[:, 2] + tolerance
     return out
 
 

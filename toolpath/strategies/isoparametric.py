@@ -167,6 +167,10 @@ def laid(planned: FacePasses, field: TipField, scallop: float, chord: float,
     tool, spare = field.tool, field.allowance
     grown = replace(tool, diameter=tool.diameter + 2.0 * spare, corner_radius=tool.corner_radius + spare)
     out, refused, max_rise = [], [], 0.0 if planned.steep else None
+
+    def limit(xy: F64) -> F64:
+        return field.tips_along(xy) - spare
+
     for group in planned.groups:
         lines: list[Line] = []
         for s in group:
@@ -176,7 +180,7 @@ def laid(planned: FacePasses, field: TipField, scallop: float, chord: float,
                 refused.append(refusal.message)
                 continue
             made = [Line(p + [0.0, 0.0, spare], False)
-                    for p in lifted(profile, ends, grown, lambda xy: field.tips(xy) - spare, chord, lift, max_rise)[0]
+                    for p in lifted(profile, ends, grown, limit, chord, lift, max_rise)[0]
                     if len(p) > 1]
             lines += [line.reversed() for line in reversed(made)] if s.turned else made
         out.append(lines)
