@@ -11,7 +11,7 @@ gets a piece of a pass of its own, if that makes the way shorter.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -58,10 +58,14 @@ def lay_out(family: Family, subdivide: bool = True) -> list[Pass]:
     list of Pass
         The residual between them keeps the tolerance wherever ``FLOOR`` allows it.
     """
+    return list(one_by_one(family, subdivide))
+
+
+def one_by_one(family: Family, subdivide: bool = True) -> Iterator[Pass]:
+    """``lay_out`` pass by pass, each computed when it is asked for."""
     if not len(family.t):
-        return []
+        return
     first, last = float(family.t[0]), float(family.t[-1])
-    out: list[Pass] = []
     before: _Trial | None = None
     guess = family.guess
     while True:
@@ -69,7 +73,7 @@ def lay_out(family: Family, subdivide: bool = True) -> list[Pass]:
         if before is not None:
             rest = family.between(at, math.inf)
             if rest.start == rest.stop or (last - at < 2.0 * guess and _kept(family, rest, before.envelope)):
-                return out
+                return
         base = before.envelope if before is not None else None
         least = 0.0 if before is None else min(FLOOR, last - at)
         nearest = float(family.t[min(family.between(at, math.inf).start, len(family.t) - 1)])
@@ -89,8 +93,8 @@ def lay_out(family: Family, subdivide: bool = True) -> list[Pass]:
         extra: list[Pass] = []
         if subdivide and base is not None:
             best, extra = _wider(family, attempt, best, at, base, last - at)
-        out.append(best.made)
-        out.extend(extra)
+        yield best.made
+        yield from extra
         if before is not None and best.step > FLOOR:
             guess = best.step
         before = best
