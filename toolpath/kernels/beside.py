@@ -75,6 +75,12 @@ def _band(p, n, size, k, centres, axes, radius, height, far):
     return t if 0.0 <= up <= height else far
 
 
+@njit(**KERNEL, inline="always")
+def _at(line, k):
+    """Place k of a line (n, 3), as numbers: a row of an array is an object, whose uses are counted."""
+    return line[k, 0], line[k, 1], line[k, 2]
+
+
 @njit(**KERNEL)
 def left_beside(points, normals, centres, axes, radius, flank, height, steep, out):
     """t at points (m, n, 3) with normals, the second index along the pass, into out (m, n).
@@ -87,12 +93,13 @@ def left_beside(points, normals, centres, axes, radius, flank, height, steep, ou
     far = FAR * radius
     for j in range(points.shape[1]):
         for i in range(points.shape[0]):
-            p, n = points[i, j], normals[i, j]
+            p = points[i, j, 0], points[i, j, 1], points[i, j, 2]
+            n = normals[i, j, 0], normals[i, j, 1], normals[i, j, 2]
             k = _nearest(centres, int(j * share), p[0] + radius * n[0], p[1] + radius * n[1], p[2] + radius * n[2], 3)
             best = far
             for a in (k - 1, k):
                 if 0 <= a < last:
-                    best = min(best, _ball(p, n, centres[a], centres[a + 1], radius, far))
+                    best = min(best, _ball(p, n, _at(centres, a), _at(centres, a + 1), radius, far))
             size = math.sqrt(n[0] * n[0] + n[1] * n[1])
             if flank > 0.0 and size > steep:
                 k = _nearest(axes, k, p[0] + flank / size * n[0], p[1] + flank / size * n[1], 0.0, 2)
