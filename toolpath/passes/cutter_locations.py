@@ -149,11 +149,9 @@ def lifted(profile: PassProfile, ends: F64, tool: ToolBody, limit: Limit, tolera
     over = _ended(high > made[:, 2] + FREE)
     if not over.any():
         return [made[np.isin(way, ends)]], False
-    more = [np.linspace(a, b, int(np.ceil((b - a) / FINE)) + 1)
-            for a, b, both in zip(way[:-1], way[1:], over[:-1] & over[1:], strict=True) if both]
     # a tip that is not raised keeps its own place
     kept = np.isin(way, ends) | over
-    fresh = np.setdiff1d(np.concatenate([*more, way[:0]]), way[kept])
+    fresh = _between(way, over[:-1] & over[1:])
     tip, up = _raised(*_against(profile, fresh, tool, limit, off))
     made, rise = _raised(made[kept], high[kept])
     way, made, rise = _together(way[kept], made, rise, fresh, tip, up)
@@ -170,6 +168,14 @@ def lifted(profile: PassProfile, ends: F64, tool: ToolBody, limit: Limit, tolera
     steep = np.abs(np.diff(rise)) > STEEPEST * np.diff(way)  # the pass itself may be as steep as it is
     runs = true_runs(whole[1:] & whole[:-1] & ~steep & ~under)
     return [thinned(made[i:j + 1], TIPS_SHARE * tolerance) for i, j in runs], True
+
+
+def _between(way: F64, parted: NDArray[np.bool_]) -> F64:
+    """Distances along a pass between those of way (n,) mm, at most FINE apart where a move (n - 1,) is parted."""
+    low, run = way[:-1][parted], np.diff(way)[parted]
+    count = np.ceil(run / FINE).astype(np.int64)
+    k = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    return (np.repeat(low, count) + k * np.repeat(run / count, count))[k > 0]
 
 
 def _raised(made: F64, high: F64) -> tuple[F64, F64]:

@@ -77,11 +77,12 @@ class PassProfile:
                                 limit=0.0, remedy="leave it out")
         count = FIRST // 4
         ways = np.linspace(0.0, way[-1], count + 1)
-        t = _even(way, t, ways)
+        even = _even(way, t)
+        t = even(ways)
         contact, normal = curve(t)
         while True:
             middle = 0.5 * (ways[1:] + ways[:-1])
-            between = _even(way, np.linspace(0.0, 1.0, FIRST + 1), middle)
+            between = even(middle)
             more, lean = curve(between)
             if not (np.isfinite(contact).all() and np.isfinite(normal).all() and np.isfinite(lean).all()):
                 raise GeometryError("a pass crosses a place without a normal", code="bad_pass",
@@ -142,15 +143,20 @@ def _way(points: F64) -> F64:
     return np.asarray(np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))]))
 
 
-def _even(way: F64, t: F64, wanted: F64) -> F64:
+def _even(way: F64, t: F64) -> Callable[[F64], F64]:
     """Parameters at ways: smooth, so that a smooth pass stays one, and growing."""
     keep = np.concatenate([[True], np.diff(way) > 1e-12 * way[-1]])
     way, t = way[keep], t[keep]
     t[-1] = 1.0
-    smooth = CubicSpline(way, t)(wanted)
-    if (np.diff(smooth) <= 0.0).any():
-        smooth = PchipInterpolator(way, t)(wanted)
-    return np.clip(smooth, 0.0, 1.0)
+    smooth = CubicSpline(way, t)
+
+    def at(wanted: F64) -> F64:
+        out = smooth(wanted)
+        if (np.diff(out) <= 0.0).any():
+            out = PchipInterpolator(way, t)(wanted)
+        return np.clip(out, 0.0, 1.0)
+
+    return at
 
 
 def _merged(a: F64, b: F64) -> F64:
