@@ -375,9 +375,10 @@ def highest_near(shape, corners, facets, near, count, x, y, best, held):
     """Tip over (x, y) and the triangle that holds it up, of the first ``count`` of near; best is the lift of held."""
     for k in range(count):
         i = near[k]
-        lift = lift_of(shape, triangle_at(corners, i), facet_at(facets, i), x, y, best)[0]
-        if lift > best:
-            best, held = lift, i
+        if max(corners[i, 0, 2], corners[i, 1, 2], corners[i, 2, 2]) > best:
+            lift = lift_of(shape, triangle_at(corners, i), facet_at(facets, i), x, y, best)[0]
+            if lift > best:
+                best, held = lift, i
     return best, held
 
 

@@ -160,3 +160,45 @@ def dragged(limit, way, corners, at, tolerance, smallest, steepest):
             count += 1
             depth -= 1
     return places[:count].copy(), heights[:count].copy()
+
+
+@njit(**KERNEL)
+def _begun(way, step):
+    """Lengths of the corners of a way (m, 2), and those to start from: the corners and even pieces of ``step`` at most,
+    ascending."""
+    m = way.shape[0]
+    corners = np.empty(m)
+    corners[0] = 0.0
+    for k in range(1, m):
+        dx, dy = way[k, 0] - way[k - 1, 0], way[k, 1] - way[k - 1, 1]
+        corners[k] = corners[k - 1] + math.sqrt(dx * dx + dy * dy)
+    total = corners[m - 1]
+    more = max(1, int(math.ceil(total / step)))
+    at = np.empty(m + more + 1)
+    for k in range(m):
+        at[k] = corners[k]
+    for k in range(more):
+        at[m + k] = k * (total / more)
+    at[m + more] = total
+    at.sort()
+    count = 1
+    for k in range(1, m + more + 1):
+        if at[k] != at[count - 1]:
+            at[count] = at[k]
+            count += 1
+    return corners, at[:count]
+
+
+@njit(**KERNEL)
+def followed(limit, way, step, tolerance, smallest, steepest):
+    """The tip path along a way (m, 2), cut from pieces of ``step`` at most: points (n, 3), and whether no move may join
+    points k and k + 1, (n - 1,). The rest as in ``dragged``."""
+    corners, begun = _begun(way, step)
+    at, z = dragged(limit, way, corners, begun, tolerance, smallest, steepest)
+    points, broken = np.empty((at.shape[0], 3)), np.empty(at.shape[0] - 1, np.bool_)
+    for k in range(at.shape[0]):
+        points[k, 0], points[k, 1] = place_on(way, corners, at[k])
+        points[k, 2] = z[k]
+        if k:
+            broken[k - 1] = not abs(z[k] - z[k - 1]) <= steepest * (at[k] - at[k - 1])
+    return points, broken

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from toolpath.kernels.drag import TipLimit, dragged
+from toolpath.kernels.drag import TipLimit, followed
 from toolpath.lines import thinned, true_runs
 from toolpath.scallop_budget import TIPS_SHARE
 from zones.reach.tip_field import TipField
@@ -42,13 +42,12 @@ def follow(limit: Limit | TipLimit, way: F64, step: float, tolerance: float) -> 
     points : (n, 3) float64, mm, access frame, on the limit, the corners of the way among them
     broken : (n - 1,) bool: no move from point k to k + 1
     """
+    if isinstance(limit, TipLimit):
+        return followed(limit, np.ascontiguousarray(way), step, tolerance, SMALLEST, STEEPEST)
     corners = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
     more = max(1, int(np.ceil(corners[-1] / step)))
     at = np.unique(np.concatenate([corners, np.linspace(0.0, corners[-1], more + 1)]))
-    if isinstance(limit, TipLimit):
-        at, z = dragged(limit, np.ascontiguousarray(way), corners, at, tolerance, SMALLEST, STEEPEST)
-    else:
-        at, z = _cut(limit, way, corners, at, tolerance)
+    at, z = _cut(limit, way, corners, at, tolerance)
     with np.errstate(invalid="ignore"):
         broken = ~(np.abs(np.diff(z)) <= STEEPEST * np.diff(at))
     return np.column_stack([_places(way, corners, at), z]), broken
@@ -61,7 +60,7 @@ def limit_of(field: TipField) -> TipLimit:
 
 
 def _cut(limit: Limit, way: F64, corners: F64, at: F64, tolerance: float) -> tuple[F64, F64]:
-    """``dragged`` for a limit of any kind: all pieces of a round at once.
+    """``toolpath.kernels.drag.dragged`` for a limit of any kind: all pieces of a round at once.
 
     way : (m, 2) float64, mm; corners : (m,) and at : (k,) float64, mm along it
 
