@@ -7,6 +7,7 @@ whole group, signals. Whatever happens, nothing of it is left running when ``run
 from __future__ import annotations
 
 import ctypes
+import gc
 import json
 import os
 import resource
@@ -25,6 +26,7 @@ from geometry.errors import ResourceError, error_from_dict
 
 POLL = 0.02
 _PR_SET_PDEATHSIG = 1
+GARBAGE = 100_000, 20, 20  # new containers between two searches for garbage, and searches of each age between the next
 RESULT_VARIABLE = "ZONEMILL_CHILD_RESULT"
 MEMORY_VARIABLE = "ZONEMILL_CHILD_MEMORY"
 PARENT_VARIABLE = "ZONEMILL_CHILD_PARENT"
@@ -72,8 +74,14 @@ def run_limited(command: Sequence[str], request: bytes, *, time_limit: float, me
         return _outcome(child.returncode, result, log, memory_limit, name)
 
 
+def collect_rarely() -> None:
+    """Let Python look for cyclic garbage rarely: a process that computes one result makes much data and few cycles."""
+    gc.set_threshold(*GARBAGE)
+
+
 def guard_child() -> Path:
     """Path of the result file. Call this first in the child: it sets the limits and ends the child with its parent."""
+    collect_rarely()
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     parent = os.environ.get(PARENT_VARIABLE)
     if parent and os.getppid() != int(parent):

@@ -269,10 +269,12 @@ def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress, Path | None],
           as_json: bool) -> None:
     """Run a command on part and setup, print its result and exit with its exit code."""
     with error_reporting(as_json):
+        from geometry.child_process import collect_rarely
         from geometry.step_import.text_checks import check_text
         from service.console import Progress, print_json
         from service.from_wire import read_setup
 
+        collect_rarely()
         given = read_setup(setup)
         check_text(part)
         blank = blank_file(setup, given)

@@ -29,6 +29,8 @@ from numba import types
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
 
+from geometry.child_process import collect_rarely
+
 LIST = Path(__file__).with_name("kernel_signatures.json")
 MAX_PROCESSES = 8
 """More would wait for the longest chain of kernels that call one another."""
@@ -213,7 +215,7 @@ class _Order:
 def _prepare() -> None:
     """In a new process: numba makes garbage by the million, and to look for it takes a tenth of the time."""
     gc.freeze()
-    gc.set_threshold(100_000, 20, 20)
+    collect_rarely()
 
 
 def _compile(listed: Listed) -> None:

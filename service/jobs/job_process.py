@@ -52,10 +52,12 @@ def compute(request, progress, resumed):
     import json
     from pathlib import Path
 
+    from geometry.child_process import collect_rarely
     from service.checkpoint_store import Kept
     from service.from_wire import parse_setup
     from verify.gcode.program_text import cleaned, decoded
 
+    collect_rarely()
     chain = importlib.import_module(request["chain"])
     part, out = Path(request["part"]), Path(request["out"])
     setup = parse_setup(request["setup"])
