@@ -88,8 +88,11 @@ class To(AttributeKind):
     def problem(self, value: Value, file: Part21File) -> str | None:
         if isinstance(value, Ref) and file.has(value):
             names = file.names(value)
-            if not self.entities or any(name in self.entities for name in names):
+            if not self.entities:
                 return None
+            for name in names:
+                if name in self.entities:
+                    return None
         wanted = " or ".join(self.entities) or "an instance"
         if not isinstance(value, Ref):
             return f"a reference to {wanted} expected, not {shown(value)}"
@@ -112,7 +115,11 @@ class Many(AttributeKind):
         if len(value) < self.min_count or (self.max_count is not None and len(value) > self.max_count):
             return f"a list of {self.min_count} or more expected, not of {len(value)}" if self.max_count is None else \
                 f"a list of {self.min_count} to {self.max_count} expected, not of {len(value)}"
-        return next((p for v in value if (p := self.of.problem(v, file)) is not None), None)
+        for v in value:
+            problem = self.of.problem(v, file)
+            if problem is not None:
+                return problem
+        return None
 
 
 @dataclass(frozen=True)
@@ -184,6 +191,7 @@ class Checked:
         self._columns = {many: {entity: {name: k for k, (name, _) in enumerate(kinds)}
                                   for entity, kinds in these.items()}
                            for many, these in ((False, self._table), (True, self._records))}
+        self._rows: dict[int, NDArray[np.int64]] = {}  # of the plain points of polylines
         for entity, numbers in sorted(file.entities().items()):
             if entity in self._table or entity in self._records:
                 for number in numbers:
@@ -304,6 +312,12 @@ class Checked:
 
         Returns (n, 3) float64, mm, frame of the file, and (n,) float64, index, 1-based lines.
         """
+        if number in self._rows:
+            points, lines = self.file.of_rows(self._rows[number])
+            with np.errstate(over="ignore"):
+                points = points * scale
+            if np.abs(points).max() <= FARTHEST:  # the others are named below
+                return points, lines.astype(np.float64)
         numbers = self.file.plain_polyline(number)
         if numbers is None:
             self._check(number, "POLYLINE")
@@ -329,8 +343,12 @@ class Checked:
         return points
 
     def _check_points(self, number: int, numbers: NDArray[np.int64]) -> None:
-        """Refuse a polyline that refers to an instance that is not a point."""
-        for target in numbers[self.file.rows(numbers) < 0].tolist():
+        """Refuse a polyline that refers to an instance that is not a point; keep where its points are, if all plain."""
+        rows = self.file.rows(numbers)
+        if (rows >= 0).all():
+            self._rows[number] = rows
+            return
+        for target in numbers[rows < 0].tolist():
             problem = To(("CARTESIAN_POINT",)).problem(Ref(target), self.file)
             if problem is not None:
                 raise self.file.error(number, f", points: {problem}")

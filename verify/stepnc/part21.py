@@ -14,6 +14,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ _SKIP = re.compile(_BLANKS, _FLAGS)
 _BODY = r"(?:[^';/]++|'[^']*+'|/\*.*?\*/|/(?!\*))*+"
 _INSTANCE = re.compile(
     rf"{_BLANKS}\#([0-9]{{1,18}}+)\s*+=\s*+(?:CARTESIAN_POINT\s*+\(\s*+'[^'\\]*+'\s*+,\s*+\(\s*+({_NUMBER})\s*+,\s*+"
-    rf"({_NUMBER})\s*+,\s*+({_NUMBER})\s*+\)\s*+\)\s*+;|({_BODY});)", _FLAGS)
+    rf"({_NUMBER})\s*+,\s*+({_NUMBER})\s*+\)\s*+\)\s*+;|(([A-Z][A-Z0-9_]*+)?+{_BODY};))", _FLAGS)
 _STATEMENT = re.compile(rf"({_BODY});", _FLAGS)
 _ASIDE = re.compile(r"'[^']*+'|/\*.*?\*/", _FLAGS)
 _ENDING = re.compile(rf"ENDSEC\s*+;{_BLANKS}(END-ISO-10303-21\s*+;)?", _FLAGS)
@@ -159,11 +160,27 @@ class Part21File:
         Returns (n,) int32, index, 1-based lines; 0 where there is no such instance.
         """
         row = self.rows(numbers)
+        if (row >= 0).all():
+            return self._point_lines[row]
         at = np.where(row >= 0, self._point_at[row], -1) if len(self._point_at) else np.full(len(numbers), -1)
         for k in np.flatnonzero(row < 0).tolist():
             span = self._spans.get(int(numbers[k]))
             at[k] = -1 if span is None else span[0]
         return np.where(at < 0, 0, np.searchsorted(self._breaks, at) + 1).astype(np.int32)
+
+    @cached_property
+    def _point_lines(self) -> I32:
+        """(n,) int32, index: lines of the plain points, from 1."""
+        return (np.searchsorted(self._breaks, self._point_at) + 1).astype(np.int32)
+
+    def of_rows(self, rows: NDArray[np.int64]) -> tuple[F64, I32]:
+        """Coordinates and lines of plain points.
+
+        rows : (n,) int64, index, as ``rows`` gives them, none of them -1
+
+        Returns (n, 3) float64, mm or the unit of the file, its frame, and (n,) int32, index, 1-based lines.
+        """
+        return self._points[rows], self._point_lines[rows]
 
     def points(self, numbers: NDArray[np.int64]) -> F64:
         """Coordinates of points.
@@ -272,7 +289,7 @@ class Part21File:
                 if number in self._spans:
                     raise self._broken(found.start(1), f"#{number} appears twice")
                 self._spans[number] = found.start(1), found.start(5)
-                names = _entity_names(body)
+                names = [found.group(6)] if found.group(6) else _entity_names(body)
                 for name in names:
                     if len(name) > LONGEST:
                         raise self.error(number, _too_long(name))
@@ -286,7 +303,8 @@ class Part21File:
         order = np.argsort(ids, kind="stable")
         self._point_ids, self._point_at, self._points = ids[order], places_[order], self._points[order]
         twice = self._point_ids[1:][self._point_ids[1:] == self._point_ids[:-1]].tolist()
-        twice += [n for n in self._spans if self._point(n) >= 0]
+        other = np.fromiter(self._spans, np.int64, len(self._spans))
+        twice += other[np.isin(other, self._point_ids)].tolist()
         if twice:
             raise self._broken(self._spans.get(twice[0], (0, 0))[0], f"#{twice[0]} appears twice")
         self._end(at)
@@ -345,7 +363,7 @@ def _entity_names(body: str) -> list[str]:
 def _plain_values(text: str) -> list[Value]:
     """The values of a simple statement."""
     if "(" not in text:
-        return [_plain(word) for word in text.split(",")]
+        return [Ref(word[1:]) if word[0] == "#" else _plain(word) for word in text.split(",")]
     return [[_plain(word) for word in inner.split(",") if word] if word == "" else _plain(word)
             for inner, word in _PLAIN.findall(text)]
 

@@ -176,8 +176,8 @@ class MotionRecorder:
 
         Raises VerificationError and ProgramError as ``take``.
         """
-        stood = np.tile(UP, (len(tips), 1)) if axes is None else axes
-        there = np.hstack([tips, stood])
+        there = np.empty((len(tips), 6))
+        there[:, :3], there[:, 3:] = tips, UP if axes is None else axes
         self._line = int(lines[0])
         self._arrive(there[0], speed, float(lines[0]))
         row = (rapid, math.nan if rapid else feed, speed, float(self._tool if self._tool is not None else -1))
@@ -293,6 +293,20 @@ class MotionRecorder:
 
     def _add(self, start: F64, end: F64, row: tuple[bool, float, float, float], lines: F64, arrival: bool) -> None:
         """Write moves (n, 6); large turns are split into pieces."""
+        upright = bool((start[:, 3:] == UP).all() and (end[:, 3:] == UP).all())
+        if not upright:
+            start, end, lines = self._in_pieces(start, end, lines)
+        self._count += len(start)
+        if self._count > MAX_MOVES:
+            raise VerificationError(f"{self.name} makes too many moves ({MAX_MOVES} allowed)",
+                                    code="program_too_long", measured=self._count, limit=MAX_MOVES,
+                                    remedy="split the job")
+        axes = None if upright else (start[:, 3:].copy(), end[:, 3:].copy())
+        shared = (*(float(v) for v in row), float(arrival), float(self.coolant))
+        self._chunks.append(_Chunk(start[:, :3].copy(), end[:, :3].copy(), axes, shared, lines.astype(np.int32)))
+
+    def _in_pieces(self, start: F64, end: F64, lines: F64) -> tuple[F64, F64, F64]:
+        """Moves (n, 6) with their lines (n,), in pieces where the tool axis turns far."""
         angle = np.arccos(np.clip((start[:, 3:] * end[:, 3:]).sum(axis=1), -1.0, 1.0))
         if (over := np.flatnonzero(angle > HALF_TURN)).size:
             at = int(lines[over[0]])
@@ -305,15 +319,7 @@ class MotionRecorder:
             step = np.arange(len(which)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
             start, end = (_between(start[which], end[which], (step + k) / pieces[which]) for k in (0, 1))
             lines = lines[which]
-        self._count += len(start)
-        if self._count > MAX_MOVES:
-            raise VerificationError(f"{self.name} makes too many moves ({MAX_MOVES} allowed)",
-                                    code="program_too_long", measured=self._count, limit=MAX_MOVES,
-                                    remedy="split the job")
-        upright = (start[:, 3:] == UP).all() and (end[:, 3:] == UP).all()
-        axes = None if upright else (start[:, 3:].copy(), end[:, 3:].copy())
-        shared = (*(float(v) for v in row), float(arrival), float(self.coolant))
-        self._chunks.append(_Chunk(start[:, :3].copy(), end[:, :3].copy(), axes, shared, lines.astype(np.int32)))
+        return start, end, lines
 
 
 def _between(start: F64, end: F64, share: F64) -> F64:
