@@ -144,7 +144,9 @@ def _placed(moves: Moves, row: INT, share: F64, tool: ToolBody, bounds: F64) -> 
         axis = np.cos(turn) * moves.axes.axis[row] + np.sin(turn) * np.cross(moves.axes.about[row],
                                                                               moves.axes.axis[row])
     near = ((tip > bounds[0] - 2.0 * tool.radius) & (tip < bounds[1] + 2.0 * tool.radius)).all(axis=1)
-    both = np.unique(np.round(np.column_stack([tip, axis])[near], 7), axis=0)
+    both = np.round(np.column_stack([tip, axis])[near], 7)
+    both = both[np.lexsort(both.T[::-1] if moves.axes is not None else both.T[2::-1])]
+    both = both[np.append(True, (both[1:] != both[:-1]).any(axis=1))] if len(both) else both
     return both[:, :3], both[:, 3:]
 
 
@@ -156,10 +158,30 @@ def _pressed(tree: TriangleTree, tip: F64, axis: F64, tool: ToolBody, lift: floa
     middle = tip + (tool.corner_radius + lift) * axis
     alone = np.flatnonzero(nearest(tree, middle, tool.radius + SPARE)[1] < 0)
     may = np.ones(len(tip), np.bool_)
-    may[alone] = inside_part(tree, middle[alone])
+    may[alone] = _inside_alone(tree, middle[alone], tool.radius)
     tip, axis = tip[may], axis[may]
     return _joined([_deepest(tree, tip[i:i + BATCH], axis[i:i + BATCH], tool, lift, least)
                     for i in range(0, len(tip), BATCH)])
+
+
+def _inside_alone(tree: TriangleTree, points: F64, radius: float) -> NDArray[np.bool_]:
+    """Whether points (n, 3), mm, are in the part, where no surface comes as near to any of them as ``radius``, mm.
+
+    No surface passes between two of them that are nearer to each other. So only two of a cell of that diagonal are
+    asked, and where either is in the part, all of the cell are.
+    """
+    if not len(points):
+        return np.zeros(0, np.bool_)
+    cell = np.floor((points - points.min(axis=0)) * (math.sqrt(3.0) / radius)).astype(np.int64)
+    span = cell.max(axis=0) + 1
+    key = (cell[:, 0] * span[1] + cell[:, 1]) * span[2] + cell[:, 2]
+    order = np.argsort(key, kind="stable")
+    begins = np.flatnonzero(np.diff(key[order], prepend=-1))
+    ends = np.append(begins[1:], len(order)) - 1
+    asked = inside_part(tree, points[order[np.concatenate([begins, ends])]])
+    out = np.empty(len(points), np.bool_)
+    out[order] = np.repeat(asked[:len(begins)] | asked[len(begins):], ends - begins + 1)
+    return out
 
 
 def _lifts(tool: ToolBody) -> tuple[float, ...]:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
 from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
@@ -30,6 +31,7 @@ WHOLE = 0.99  # of the way along a ray: a gouge that deep is measured by its ray
 BATCH = 64  # places of one call: near each other, so that few moves have to be looked through
 CELL = 5.0  # mm: of the places in such a cell only those are measured that may be the farthest
 APART = 0.05  # mm
+NEAR, MANY = 2.0, 256  # mm, and of them along the places: what cells of that size do not hold is looked for among all
 
 
 class Remains:
@@ -119,20 +121,6 @@ class Remains:
         return np.minimum(bound, most[group])
 
 
-def bounds(points: F64, left: F64, largest: float) -> F64:
-    """Distances of places to the nearest of places that are left of the part: what ``Remains.depths`` starts from.
-
-    points  : (n, 3) float64, mm, setup frame
-    left    : (m, 3) float64, mm, setup frame; m may be 0
-    largest : mm, returned where m is 0
-
-    Returns (n,) float64, mm.
-    """
-    if len(left) == 0:
-        return np.full(len(points), largest)
-    return np.minimum(np.asarray(cKDTree(left).query(points)[0], dtype=np.float64), largest)
-
-
 class Rays(NamedTuple):
     """Places of the surface and what the program left on their normals, setup frame.
 
@@ -145,13 +133,47 @@ class Rays(NamedTuple):
     residual: F64
 
 
-def _ends(tree: TriangleTree, rays: Rays, rows: NDArray[np.int64]) -> F64:
-    """(m, 3) places where rays (k,) meet what is left; without rays whose cut goes out at the far side of an edge."""
-    there = rays.points[rows] + np.minimum(rays.residual[rows], 0.0)[:, None] * rays.normals[rows]
-    cut = np.flatnonzero(rays.residual[rows] < -CLOSE)
-    kept = np.ones(len(rows), np.bool_)
-    kept[cut] = inside_part(tree, there[cut])
-    return there[kept]
+class LeftOnRays:
+    """Places where rays meet what is left: what ``Remains.depths`` starts from.
+
+    tree    : TriangleTree of the part, setup frame
+    rays    : Rays
+    rows    : (k,) int64, index, the rays that count; those whose cut goes out at the far side of an edge do not
+    largest : mm, returned where no ray counts
+    """
+
+    def __init__(self, tree: TriangleTree, rays: Rays, rows: NDArray[np.int64], largest: float) -> None:
+        self.tree, self.largest = tree, largest
+        self.ends = rays.points[rows] + np.minimum(rays.residual[rows], 0.0)[:, None] * rays.normals[rows]
+        self.doubtful = rays.residual[rows] < -CLOSE
+
+    def bounds(self, points: F64) -> F64:
+        """Distances of places (n, 3), mm, to the nearest of these, (n,) float64, mm."""
+        out = np.full(len(points), np.inf)
+        if not len(points):
+            return out
+        near = max(NEAR, float(np.ptp(points, axis=0).max()) / MANY)
+        asked = np.floor(points / near).astype(np.int64)
+        low, high = asked.min(axis=0) - 1, asked.max(axis=0) + 2
+        marked = np.zeros(high - low, np.uint8)
+        marked[tuple((asked - low).T)] = 1
+        beside = np.flatnonzero(((self.ends >= low * near) & (self.ends < high * near)).all(axis=1))
+        cell = np.clip(np.floor(self.ends[beside] / near).astype(np.int64), low, high - 1) - low
+        beside = beside[maximum_filter(marked, 3)[tuple(cell.T)] > 0]
+        out = self._nearest(points, beside)
+        far = np.flatnonzero(out > near)  # all that is nearer lies in the cells beside
+        if len(far):
+            out[far] = self._nearest(points[far], np.arange(len(self.ends)))
+        return np.minimum(out, self.largest)
+
+    def _nearest(self, points: F64, rows: NDArray[np.int64]) -> F64:
+        """Distances to the ends of rows (k,), inf where none counts."""
+        cut = np.flatnonzero(self.doubtful[rows])
+        kept = np.ones(len(rows), np.bool_)
+        kept[cut] = inside_part(self.tree, self.ends[rows[cut]])
+        if not kept.any():
+            return np.full(len(points), np.inf)
+        return np.asarray(cKDTree(self.ends[rows[kept]]).query(points)[0], dtype=np.float64)
 
 
 def depths_both_ways(left: Remains, rays: Rays, deep: NDArray[np.int64], even: int, tolerance: float,
@@ -175,11 +197,11 @@ def depths_both_ways(left: Remains, rays: Rays, deep: NDArray[np.int64], even: i
         return depth
     ends = np.ones(len(rays.points), np.bool_)
     ends[deep[~whole]] = False
-    there = _ends(left.tree, rays, np.flatnonzero(ends))
     size = float(np.linalg.norm(np.diff(left.tree.mesh.bounds, axis=0)))
+    there = LeftOnRays(left.tree, rays, np.flatnonzero(ends), size)
 
     def second(rows: NDArray[np.int64], first: float, last: float) -> NDArray[np.int64]:
-        bound = bounds(points[rows], there, size)
+        bound = there.bounds(points[rows])
         rows, bound = rows[bound > tolerance], bound[bound > tolerance]
         gone = left.gone(points[rows], tolerance, lambda f: tell(first + 0.5 * (last - first) * f))
         rows, bound = rows[gone], bound[gone]
