@@ -28,6 +28,7 @@ from service.version import VERSION
 if TYPE_CHECKING:
     from schemas.setup import Setup
     from service.console import Progress
+    from service.part_reading import PartReading
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
                   help="Turns a STEP file and a list of tools into G-code and STEP-NC that a simulator has verified.")
@@ -68,11 +69,12 @@ def plan(part: Part, setup: SetupPath,
          mesh_box: MeshBox = None, as_json: AsJson = False) -> None:
     """Plan and prove a part; write report, zones, programs and STEP-NC into DIR, and the report to stdout."""
 
-    def run(given: Setup, progress: Progress, blank: Path | None) -> tuple[Any, int]:
+    def run(given: Setup, progress: Progress, blank: Path | None, reading: PartReading) -> tuple[Any, int]:
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
         from service.pipeline import plan as plan_job
 
-        report = plan_job(part, given, out, progress, requested_mesh(mesh_step, mesh_box), blank_path=blank)
+        report = plan_job(part, given, out, progress, requested_mesh(mesh_step, mesh_box), blank_path=blank,
+                          reading=reading)
         return report, EXIT_PROVED if report["state"] == "proved" else EXIT_UNPROVED
 
     with error_reporting(as_json):
@@ -84,10 +86,10 @@ def plan(part: Part, setup: SetupPath,
 def zones(part: Part, setup: SetupPath, as_json: AsJson = False) -> None:
     """Print zones.json: walls, connections, channels, zones, remainder."""
 
-    def run(given: Setup, progress: Progress, blank: Path | None) -> tuple[Any, int]:
+    def run(given: Setup, progress: Progress, blank: Path | None, reading: PartReading) -> tuple[Any, int]:
         from service.pipeline import zones_only
 
-        return zones_only(part, given, progress, blank_path=blank), 0
+        return zones_only(part, given, progress, blank_path=blank, reading=reading), 0
 
     _exit(part, setup, run, as_json)
 
@@ -114,7 +116,7 @@ def verify(part: Part, setup: SetupPath,
     Exit code 0: proved. 3: clean (no harm, but work is left undone) or unproved.
     """
 
-    def run(given: Setup, progress: Progress, blank: Path | None) -> tuple[Any, int]:
+    def run(given: Setup, progress: Progress, blank: Path | None, reading: PartReading) -> tuple[Any, int]:
         from service.verification.program_first import read_first
 
         started, text = time.monotonic(), read_program(program)
@@ -127,7 +129,7 @@ def verify(part: Part, setup: SetupPath,
 
         wish = requested_mesh(mesh_step or None, mesh_box) if out is not None else None
         result = verify_program(part, given, text, progress, access, out, wish, spindle_tool, blank,
-                                known_dialect(dialect), program.suffix, first)
+                                known_dialect(dialect), program.suffix, first, reading)
         progress.close()
         say(verification_summary(result, time.monotonic() - started))
         return result, EXIT_PROVED if result["state"] == "proved" else EXIT_UNPROVED
@@ -265,14 +267,18 @@ def write_family_part(recipe: str, seed: int, out: Path, wanted: dict[str, int],
                          remedy="use another seed, or fewer walls and connections") from None
 
 
-def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress, Path | None], tuple[Any, int]],
+def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress, Path | None, PartReading], tuple[Any, int]],
           as_json: bool) -> None:
-    """Run a command on part and setup, print its result and exit with its exit code."""
+    """Run a command on part and setup, print its result and exit with its exit code.
+
+    The part is read by another process while the command imports what it needs.
+    """
     with error_reporting(as_json):
         from geometry.child_process import collect_rarely
         from geometry.step_import.text_checks import check_text
         from service.console import Progress, print_json
         from service.from_wire import read_setup
+        from service.part_reading import PartReading
 
         collect_rarely()
         given = read_setup(setup)
@@ -280,7 +286,8 @@ def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress, Path | None],
         blank = blank_file(setup, given)
         progress = Progress()
         try:
-            result, code = run(given, progress, blank)
+            with PartReading(part, given) as reading:
+                result, code = run(given, progress, blank, reading)
         finally:
             progress.close()
         print_json(result)

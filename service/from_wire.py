@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from geometry.errors import CamError, OutputError, SetupError
+from geometry.setup_frame import SetupFrame
 from geometry.tool_body import HolderFrustum, ToolBody
 from output.inverse_kinematics import RotaryMachine, program_limits
 from schemas.machine import Machine
-from schemas.setup import Setup
+from schemas.setup import Quality, Setup
 from schemas.tools import BUILT_KINDS, VERIFIED_KINDS, Tool
 from verify.kinematics import Kinematics
 
@@ -344,3 +345,14 @@ def face_numbers(ids: list[str]) -> tuple[int, ...]:
 def material_name(setup: Setup) -> str:
     """Name of the material of a setup."""
     return str(getattr(setup.material, "name", None) or getattr(setup.material, "id", None) or "material")
+
+
+def mesh_chord(quality: Quality) -> float:
+    """Chord of the mesh, mm: its share of the scallop and of the gouge tolerance."""
+    return float(np.clip(0.15 * quality.scallop_height_mm, 0.001, min(0.005, 0.4 * quality.gouge_tolerance_mm)))
+
+
+def placement_of(setup: Setup) -> SetupFrame:
+    """The setup frame in the coordinates of the file."""
+    p = setup.placement
+    return SetupFrame(origin=tuple(p.origin_mm), z_axis=tuple(p.z_axis), x_axis=tuple(p.x_axis))

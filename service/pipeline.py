@@ -21,6 +21,7 @@ from service.delivery.machined_mesh import MESH_NAME, MeshWish, machined_part
 from service.delivery.result_files import Files, clear_results, deliver
 from service.delivery.stepnc_files import StepncUnderWay
 from service.from_wire import check_plannable
+from service.part_reading import PartReading
 from service.pictures.proof_picture import MAP_NAME
 from service.report import report as reporting
 from service.stages.access_plan import WrittenProgram
@@ -42,7 +43,8 @@ from verify.model import Proof
 
 
 def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: MeshWish | None = None,
-         planner: Planner = plan_job, blank_path: Path | None = None, kept: Kept | None = None) -> dict[str, Any]:
+         planner: Planner = plan_job, blank_path: Path | None = None, kept: Kept | None = None,
+         reading: PartReading | None = None) -> dict[str, Any]:
     """Plan and prove a job and write its files into ``out``, from which those of an earlier job are removed.
 
     mesh       : also write the machined part as a mesh, in the frame of the proof
@@ -51,6 +53,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     blank_path : STEP file of the blank where ``stock.kind`` is 'step'; ``stock.step_file`` is not read
     kept       : plans and proofs that an earlier attempt at this job kept, and where this attempt keeps its own
                  (``service.stages.resume``); None: nothing is kept
+    reading    : the reading of this part, where it has begun already
 
     Returns
     -------
@@ -66,7 +69,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     check_plannable(setup)
     out.mkdir(parents=True, exist_ok=True)
     clear_results(out)
-    ready = prepare(part_path, setup, progress, blank_path=blank_path)
+    ready = prepare(part_path, setup, progress, blank_path=blank_path, reading=reading)
     cautions = cautions_before_planning(ready)
     with StepncUnderWay(out) as stepnc:
         job = _proved_plan(part_path, warned(ready, sentences(cautions)), kept or Kept(), planner, progress, stepnc)
@@ -117,10 +120,11 @@ def _trimmed_and_scored(part_path: Path, ready: Prepared) -> tuple[Prepared, Map
         return warned(ready, [f"no passes along the borders of faces: {refusal.message}"]), {}, scored
 
 
-def zones_only(part_path: Path, setup: Setup, progress: Progress, blank_path: Path | None = None) -> dict[str, Any]:
+def zones_only(part_path: Path, setup: Setup, progress: Progress, blank_path: Path | None = None,
+               reading: PartReading | None = None) -> dict[str, Any]:
     """The dry check: walls, connections, channels, zones with their tools, and the remainder.
 
-    blank_path : as in ``plan``
+    blank_path, reading : as in ``plan``
 
     Raises
     ------
@@ -128,7 +132,7 @@ def zones_only(part_path: Path, setup: Setup, progress: Progress, blank_path: Pa
         As ``plan``.
     """
     check_plannable(setup)
-    ready = prepare(part_path, setup, progress, blank_path=blank_path)
+    ready = prepare(part_path, setup, progress, blank_path=blank_path, reading=reading)
     ready = warned(ready, sentences(cautions_before_planning(ready)))
     out = reporting.dry_report(ready)
     progress("done", 1.0)
@@ -138,7 +142,8 @@ def zones_only(part_path: Path, setup: Setup, progress: Progress, blank_path: Pa
 def verify_program(part_path: Path, setup: Setup, program_text: str, progress: Progress,
                    access: str | None = None, out: Path | None = None, mesh: MeshWish | None = None,
                    spindle_tool: int = 0, blank_path: Path | None = None, dialect: str | None = None,
-                   ending: str = "", program: ProgramFirst | None = None) -> dict[str, Any]:
+                   ending: str = "", program: ProgramFirst | None = None,
+                   reading: PartReading | None = None) -> dict[str, Any]:
     """Prove any program, NC code or STEP-NC, against the part: harm that it does, and work that it leaves undone.
 
     The program is read before the part. The part is not decomposed: no zone answers for a sample here. Stock that is
@@ -154,6 +159,7 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
     dialect      : of the program; None: found by marks in its text, by ``ending`` of its file name, or by the dialects
                    of the machine (``verify.gcode.dialects.dialect_of``)
     program      : the same program, already read by ``service.verification.program_first.read_first``
+    reading      : as in ``plan``
 
     Returns
     -------
@@ -168,7 +174,7 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
     """
     first = program or read_first(setup, program_text, access=access, spindle_tool=spindle_tool, dialect=dialect,
                                   ending=ending)
-    job = read_job_part(part_path, setup, progress, blank_path)
+    job = read_job_part(part_path, setup, progress, blank_path, reading)
     made = proved_program(job, first, lambda f: progress("prove", 0.2 + 0.6 * f))
     frame, report, conditions, tools = made.frame, made.report, made.conditions, job.inputs.bodies
     if out is not None:

@@ -29,10 +29,11 @@ from benchmarks.adversary.mechanisms import GOOD, HARMFUL  # noqa: E402
 from geometry.errors import CamError  # noqa: E402
 from geometry.part import Part  # noqa: E402
 from schemas.setup import Setup  # noqa: E402
-from service.from_wire import parse_setup  # noqa: E402
+from service.from_wire import mesh_chord, parse_setup  # noqa: E402
+from service.part_reading import load  # noqa: E402
 from service.stages.blank_model import blank_of  # noqa: E402
-from service.stages.job_inputs import JobInputs, mesh_chord  # noqa: E402
-from service.stages.job_part import ReadPart, load  # noqa: E402
+from service.stages.job_inputs import JobInputs  # noqa: E402
+from service.stages.job_part import ReadPart  # noqa: E402
 from service.verification.program_first import read_first  # noqa: E402
 from service.verification.program_proof import proved_program  # noqa: E402
 from tests.step_files import write_step  # noqa: E402

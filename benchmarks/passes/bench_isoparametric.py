@@ -35,8 +35,8 @@ from geometry.step_import.face_surfaces import read_patches  # noqa: E402
 from geometry.surfaces.foot_points import foot_points  # noqa: E402
 from geometry.surfaces.nurbs import NurbsSurface  # noqa: E402
 from geometry.trimming.trim import trim_faces  # noqa: E402
-from service.from_wire import parse_setup, tool_bodies  # noqa: E402
-from service.stages.job_inputs import JobInputs, placement_of  # noqa: E402
+from service.from_wire import parse_setup, placement_of, tool_bodies  # noqa: E402
+from service.stages.job_inputs import JobInputs  # noqa: E402
 from service.stages.preparation import prepare  # noqa: E402
 from toolpath.cutter.cutter import Cutter  # noqa: E402
 from toolpath.drop_cutter import drop_cutter  # noqa: E402

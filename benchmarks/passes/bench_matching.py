@@ -38,8 +38,7 @@ from geometry.surfaces.foot_points import foot_points  # noqa: E402
 from geometry.surfaces.nurbs import NurbsSurface  # noqa: E402
 from geometry.tool_body import ToolBody  # noqa: E402
 from geometry.trimming.trim import trim_faces  # noqa: E402
-from service.from_wire import parse_setup  # noqa: E402
-from service.stages.job_inputs import placement_of  # noqa: E402
+from service.from_wire import parse_setup, placement_of  # noqa: E402
 from toolpath.five_axis.curvature_matching import matching_tilt, strip_width  # noqa: E402
 from toolpath.five_axis.matched_passes import MatchedPasses, MatchTolerances  # noqa: E402
 from toolpath.five_axis.surface_partition import SurfacePiece, parted  # noqa: E402

@@ -434,7 +434,7 @@ def reach_of_files(part_path: Path, setup_path: Path, step: float | None = None)
         Either file is wrong.
     """
     from service.from_wire import read_setup
-    from service.stages.job_part import load
+    from service.part_reading import load
 
     setup = read_setup(setup_path)
     part = load(part_path, setup)

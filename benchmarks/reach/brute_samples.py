@@ -417,8 +417,8 @@ def examine(path: Path, setup_path: Path, count: int = SAMPLES) -> dict[str, Any
     """Figures of one part: by tool and for the union of the tools, shares of the machinable area."""
     from geometry.mesh_queries.bvh import TriangleTree
     from service.from_wire import read_setup, tool_bodies
+    from service.part_reading import load
     from service.stages.job_inputs import JobInputs
-    from service.stages.job_part import load
 
     setup = read_setup(setup_path)
     part = load(path, setup)

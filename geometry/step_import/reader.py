@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+import threading
 from typing import Any
 
 from geometry.child_process import run_limited
@@ -23,7 +24,7 @@ READER_MODULE = "geometry.step_import.reader_process"
 
 def read_part(path: str | os.PathLike[str], *, placement: SetupFrame | None = None, solid: int | None = None,
               fuse: bool = False, chord: float = 0.002, angle: float = 0.2, time_limit: float = 120.0,
-              memory_limit: float = 6e9) -> Part:
+              memory_limit: float = 6e9, stop: threading.Event | None = None) -> Part:
     """Read one solid from a STEP file [ISO10303-21], heal it where that is safe, and mesh it.
 
     path         : STEP file in clear text; mm, cm, m, inch ... are converted to mm
@@ -34,6 +35,7 @@ def read_part(path: str | os.PathLike[str], *, placement: SetupFrame | None = No
     angle        : float, rad, requested limit of the turn of the normal between neighbouring mesh points
     time_limit   : float, s of wall time
     memory_limit : float, bytes of resident memory
+    stop         : once set, the reading ends as if its time were over
 
     Returns Part in the setup frame; ``part.deviation`` is the distance measured against the exact surface.
     Raises StepError (``no_file``, ``empty_file``, ``not_step``, ``truncated_step``, ``dangling_reference``,
@@ -46,11 +48,12 @@ def read_part(path: str | os.PathLike[str], *, placement: SetupFrame | None = No
     check_tolerances(chord, angle)
     request: dict[str, Any] = {"path": os.path.abspath(path), "solid": solid, "fuse": fuse, "chord": chord,
                                "angle": angle, "placement": placement.as_dict() if placement else None}
-    return Part.from_bytes(ask_reader(request, time_limit, memory_limit))
+    return Part.from_bytes(ask_reader(request, time_limit, memory_limit, stop))
 
 
-def ask_reader(request: dict[str, Any], time_limit: float, memory_limit: float) -> bytes:
-    """Answer of ``geometry.step_import.reader_process``; limits in s and bytes.
+def ask_reader(request: dict[str, Any], time_limit: float, memory_limit: float,
+               stop: threading.Event | None = None) -> bytes:
+    """Answer of ``geometry.step_import.reader_process``; limits in s and bytes, ``stop`` as in ``read_part``.
 
     Raises
     ------
@@ -63,7 +66,8 @@ def ask_reader(request: dict[str, Any], time_limit: float, memory_limit: float) 
     """
     command = [sys.executable, "-m", READER_MODULE]
     try:
-        return run_limited(command, json.dumps(request).encode(), time_limit=time_limit, memory_limit=memory_limit)
+        return run_limited(command, json.dumps(request).encode(), time_limit=time_limit, memory_limit=memory_limit,
+                           stop=stop)
     except ResourceError as error:
         raise _by_the_part(error) from None
 

@@ -48,31 +48,43 @@ def compute(request, progress, resumed):
 
     resumed : called with the number of checkpoints used, by kind
     """
+    import contextlib
     import importlib
-    import json
     from pathlib import Path
 
     from geometry.child_process import collect_rarely
-    from service.checkpoint_store import Kept
     from service.from_wire import parse_setup
-    from verify.gcode.program_text import cleaned, decoded
+    from service.part_reading import PartReading
 
     collect_rarely()
-    chain = importlib.import_module(request["chain"])
     part, out = Path(request["part"]), Path(request["out"])
     setup = parse_setup(request["setup"])
-    blank = {"blank_path": Path(request["stock"])} if request.get("stock") else {}
+    more: dict[str, object] = {"blank_path": Path(request["stock"])} if request.get("stock") else {}
+    with contextlib.ExitStack() as stack:
+        if request["chain"] == "service.pipeline":  # the part is read while the chain is imported
+            more["reading"] = stack.enter_context(PartReading(part, setup))
+        return _computed(importlib.import_module(request["chain"]), request, part, setup, out, progress, resumed, more)
+
+
+def _computed(chain, request, part, setup, out, progress, resumed, more):
+    """Ask the chain for the result of the request; returns the final state."""
+    import json
+    from pathlib import Path
+
+    from service.checkpoint_store import Kept
+    from verify.gcode.program_text import cleaned, decoded
+
     if request["kind"] == "plan":
         kept = Kept(Path(request["kept"]), resumed)
-        result, name = chain.plan(part, setup, out, progress, kept=kept, **blank), "report.json"
+        result, name = chain.plan(part, setup, out, progress, kept=kept, **more), "report.json"
         state = result["state"]
     elif request["kind"] == "zones":
-        result, name = chain.zones_only(part, setup, progress, **blank), "zones.json"
+        result, name = chain.zones_only(part, setup, progress, **more), "zones.json"
         state = "done"
     else:
         text = cleaned(decoded(Path(request["program"]).read_bytes()))
         result = chain.verify_program(part, setup, text, progress, out=out, spindle_tool=request["spindle_tool"],
-                                      **blank)
+                                      **more)
         name = "report.json"
         state = result["state"]
     if not (out / name).exists():

@@ -29,6 +29,8 @@ from service.from_wire import (
     gauge_lengths,
     machine_kinematics,
     material_name,
+    mesh_chord,
+    placement_of,
     rotary_limits,
     rotary_machine,
     tool_bodies,
@@ -183,17 +185,6 @@ class JobInputs:
                     if (t.max_engagement_deg or SLOT_DEG) < SLOT_DEG), default=math.inf)
 
 
-def mesh_chord(quality: Quality) -> float:
-    """Chord of the mesh, mm: its share of the scallop and of the gouge tolerance."""
-    return float(np.clip(0.15 * quality.scallop_height_mm, 0.001, min(0.005, 0.4 * quality.gouge_tolerance_mm)))
-
-
-def placement_of(setup: Setup) -> SetupFrame:
-    """The setup frame in the coordinates of the file."""
-    p = setup.placement
-    return SetupFrame(origin=tuple(p.origin_mm), z_axis=tuple(p.z_axis), x_axis=tuple(p.x_axis))
-
-
 def _cut_table(setup: Setup, bodies: Sequence[ToolBody]) -> dict[str, CutData]:
     """Speeds, feeds and layer depths by tool id; layers are slots, as far as the engaged angle is not bounded."""
     out = {}
@@ -211,4 +202,4 @@ def _cut_table(setup: Setup, bodies: Sequence[ToolBody]) -> dict[str, CutData]:
     return out
 
 
-__all__ = ["JobInputs", "mesh_chord", "placement_of"]
+__all__ = ["JobInputs"]

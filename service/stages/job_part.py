@@ -11,10 +11,11 @@ from geometry.errors import CamError
 from geometry.part import Part
 from geometry.step_import.reader import read_part
 from schemas.setup import Access, Setup
-from service.from_wire import blank_error, no_stock_file
+from service.from_wire import blank_error, mesh_chord, no_stock_file, placement_of
+from service.part_reading import PartReading, load
 from service.stages.blank_checks import check_against_part
 from service.stages.blank_model import Blank, blank_of
-from service.stages.job_inputs import JobInputs, mesh_chord, placement_of
+from service.stages.job_inputs import JobInputs
 
 Progress = Callable[[str, float], None]
 
@@ -59,12 +60,6 @@ class ReadPart:
     warnings: tuple[str, ...]
 
 
-def load(path: Path, setup: Setup) -> Part:
-    """The part of a STEP file in the setup frame."""
-    return read_part(path, placement=placement_of(setup), solid=setup.part.solid, fuse=setup.part.fuse,
-                     chord=mesh_chord(setup.quality))
-
-
 def load_blank(path: Path, setup: Setup) -> Part:
     """The solid of a blank's STEP file in the setup frame, which is that of the part.
 
@@ -79,10 +74,12 @@ def load_blank(path: Path, setup: Setup) -> Part:
         raise blank_error(error) from None
 
 
-def read_job_part(path: Path, setup: Setup, progress: Progress, blank_path: Path | None = None) -> ReadPart:
+def read_job_part(path: Path, setup: Setup, progress: Progress, blank_path: Path | None = None,
+                  reading: PartReading | None = None) -> ReadPart:
     """Read part and blank of a job, and check them against each other.
 
     blank_path : STEP file of a blank of kind 'step'
+    reading    : the reading of this part, where it has begun already
 
     Raises
     ------
@@ -94,7 +91,7 @@ def read_job_part(path: Path, setup: Setup, progress: Progress, blank_path: Path
     progress("read", 0.0)
     if setup.stock.kind == "step" and blank_path is None:
         raise no_stock_file()
-    part = load(path, setup)
+    part = load(path, setup) if reading is None else reading.part()
     blank = blank_of(setup, part, None if blank_path is None else load_blank(blank_path, setup))
     check_against_part(setup, part, blank)
     inputs = JobInputs.of(setup)
@@ -102,4 +99,4 @@ def read_job_part(path: Path, setup: Setup, progress: Progress, blank_path: Path
     return ReadPart(inputs, part, blank, inputs.accesses, (*part.warnings, *solid_warnings))
 
 
-__all__ = ["JobPart", "Progress", "ReadPart", "load", "load_blank", "read_job_part"]
+__all__ = ["JobPart", "Progress", "ReadPart", "load_blank", "read_job_part"]

@@ -19,6 +19,7 @@ from geometry.tool_body import ToolBody
 from geometry.trimming.trim import FacePatch
 from schemas.setup import Access, Setup
 from service.from_wire import face_numbers
+from service.part_reading import PartReading
 from service.stages.blank_model import Blank
 from service.stages.job_inputs import JobInputs
 from service.stages.job_part import Progress, read_job_part
@@ -146,18 +147,19 @@ def _room(body: ToolBody, bounds: F64, blank: Blank, rotation: F64) -> float:
 
 
 def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True,
-            blank_path: Path | None = None) -> Prepared:
+            blank_path: Path | None = None, reading: PartReading | None = None) -> Prepared:
     """Read the part, decompose it, measure the reach of the tools and build zones.
 
     search     : look for further tool axes on a machine with rotary axes; False: the accesses of the setup only
     blank_path : STEP file of a blank of kind 'step'
+    reading    : the reading of this part, where it has begun already
 
     Raises
     ------
     CamError
         The part or the setup is wrong, or the reader exceeds its limits.
     """
-    read = read_job_part(path, setup, progress, blank_path)
+    read = read_job_part(path, setup, progress, blank_path, reading)
     inputs, part, blank = read.inputs, read.part, read.blank
     progress("zones", 0.12)
     accesses = list(inputs.accesses)

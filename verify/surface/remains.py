@@ -148,10 +148,14 @@ class LeftOnRays:
         self.doubtful = rays.residual[rows] < -CLOSE
 
     def bounds(self, points: F64) -> F64:
-        """Distances of places (n, 3), mm, to the nearest of these, (n,) float64, mm."""
-        out = np.full(len(points), np.inf)
+        """Distances of places to the nearest of these.
+
+        points : (n, 3) float64, mm, setup frame
+
+        Returns (n,) float64, mm.
+        """
         if not len(points):
-            return out
+            return np.zeros(0)
         near = max(NEAR, float(np.ptp(points, axis=0).max()) / MANY)
         asked = np.floor(points / near).astype(np.int64)
         low, high = asked.min(axis=0) - 1, asked.max(axis=0) + 2

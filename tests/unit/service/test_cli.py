@@ -29,15 +29,15 @@ class FakeChain(types.ModuleType):
             raise self.answer
         return self.answer
 
-    def plan(self, part_path, setup, out, progress, mesh=None, blank_path=None):
+    def plan(self, part_path, setup, out, progress, mesh=None, blank_path=None, reading=None):
         self.mesh = mesh
         return self._say(progress)
 
-    def zones_only(self, part_path, setup, progress, blank_path=None):
+    def zones_only(self, part_path, setup, progress, blank_path=None, reading=None):
         return self._say(progress)
 
     def verify_program(self, part_path, setup, program_text, progress, access=None, out=None, mesh=None,
-                       spindle_tool=0, blank_path=None, dialect=None, ending="", program=None):
+                       spindle_tool=0, blank_path=None, dialect=None, ending="", program=None, reading=None):
         assert program_text.strip() and program.nc.text == program_text and program.spindle_tool == spindle_tool
         self.out, self.mesh, self.spindle_tool = out, mesh, spindle_tool
         return self._say(progress)
