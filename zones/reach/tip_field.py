@@ -38,6 +38,7 @@ BELOW = 1.0  # mm: no query has a tip farther under the obstacles than this plus
 AIMED = 12  # free nodes towards which a flat bottom is tried over a level place
 BEYOND = 3.0  # lattice steps: largest distance of these nodes outside the flat
 INSIDE = 1.5e-3  # mm: a flat bottom need not reach nearer than this to its own rim, because of the error of lines
+SQUARE = 5  # nodes along a square of them that is asked as a whole
 PLAY_STEPS = 1.42  # lattice steps: least sideways play of a tool beside a wall, for it to be planned there
 
 
@@ -189,9 +190,7 @@ class TipField:
         if self._cut is not None:
             free = self._cut[i0:i1, j0:j1] <= z
         else:
-            rows, cols = np.nonzero(near)
-            free = np.zeros_like(near)
-            free[near] = ~self.blocked_by_cutter(lat.nodes(rows + i0, cols + j0, z))
+            free = self._free(near, i0, j0, z)
         blocked = near & ~free
         beside = np.zeros_like(near)
         for a, b in ((beside[1:], blocked[:-1]), (beside[:-1], blocked[1:]),
@@ -199,6 +198,31 @@ class TipField:
             a |= b
         rows, cols = np.nonzero(near & free & beside)
         return rows + i0, cols + j0
+
+    def _free(self, near: NDArray[np.bool_], i0: int, j0: int, z: float) -> NDArray[np.bool_]:
+        """Those of the nodes ``near`` (k, l), the first in row i0 and column j0, where the cutting part is free.
+
+        A square of nodes is free where a cutting part wider by its half diagonal is free over its middle, and blocked
+        where a thinner one is blocked there. So single nodes are asked only in squares that have both, or might have.
+        """
+        lat, free, open_ = self.lattice, np.zeros_like(near), near.copy()
+        rows, cols = (np.arange(0, n, SQUARE) for n in near.shape)
+        some = np.logical_or.reduceat(np.logical_or.reduceat(near, rows, axis=0), cols, axis=1)
+        if near.sum() > 2 * some.size:
+            a, b = np.nonzero(some)
+            middle = lat.nodes(i0 + SQUARE * a + 0.5 * (SQUARE - 1), j0 + SQUARE * b + 0.5 * (SQUARE - 1), z)
+            around = (0.5 * (SQUARE - 1) * math.sqrt(2.0) + 1e-3) * lat.step
+            empty, full = some.copy(), np.zeros_like(some)
+            empty[a, b] = ~self.blocked_by_cutter(middle, around)
+            if self.grown_radius - around > self.grown_corner:
+                left = np.flatnonzero(~empty[a, b])
+                full[a[left], b[left]] = self.blocked_by_cutter(middle[left], -around)
+            spread = (np.arange(near.shape[0])[:, None] // SQUARE, np.arange(near.shape[1])[None] // SQUARE)
+            free = near & empty[spread]
+            open_ &= ~(empty | full)[spread]
+        rows, cols = np.nonzero(open_)
+        free[open_] = ~self.blocked_by_cutter(lat.nodes(rows + i0, cols + j0, z))
+        return free
 
     def off_blocked(self, z: float) -> F64 | None:
         """(ny, nx) float64, mm: distance of each node from the nearest one that is blocked at tip height z, mm.
@@ -232,14 +256,15 @@ class TipField:
         out = drop_along(self.tree, xy, self.grown_radius, self.grown_corner) + self.allowance
         return np.asarray(np.maximum(out, noncut_lookup(self.noncut, self.coarse.frame, xy)))
 
-    def blocked_by_cutter(self, tips: F64) -> NDArray[np.bool_]:
+    def blocked_by_cutter(self, tips: F64, wider: float = 0.0) -> NDArray[np.bool_]:
         """(n,) bool: the cutting part enters the obstacles at tips.
 
-        tips : (n, 3) float64, mm, access frame
+        tips  : (n, 3) float64, mm, access frame
+        wider : mm, by which the radius of the cutting part is larger than it is
         """
         lowered = np.array(tips, dtype=np.float64)
         lowered[:, 2] -= self.allowance
-        return blocked_many(self.tree, lowered, self.grown_radius, self.grown_corner)
+        return blocked_many(self.tree, lowered, self.grown_radius + wider, self.grown_corner)
 
     def blocked_by_body(self, tips: F64) -> NDArray[np.bool_]:
         """(n,) bool: shank or holder come nearer than their clearance at tips.

@@ -112,6 +112,21 @@ def test_the_rim_near_places_far_apart_is_that_of_one_search(known, monkeypatch)
         assert (len(groups) > 1) == (reach < 1.0)
 
 
+@pytest.mark.parametrize(("corner", "size"), [(0.0, 4.0), (0.5, 4.0), (0.95, 2.0), (0.0, 9.0)])
+def test_nodes_free_by_squares_are_those_free_one_by_one(corner, size):
+    rng = np.random.default_rng(7)
+    field = field_of(walls(), tool(size, corner))
+    lat = field.lattice
+    for z in (0.0, 1.0, 2.999, 3.0, 4.0):
+        near = np.zeros((min(lat.ny, 43), min(lat.nx, 61)), np.bool_)
+        near[:, :50] = rng.random((len(near), 50)) < 0.9
+        i0, j0 = int(rng.integers(lat.ny - near.shape[0] + 1)), int(rng.integers(lat.nx - near.shape[1] + 1))
+        rows, cols = np.nonzero(near)
+        one_by_one = np.zeros_like(near)
+        one_by_one[near] = ~field.blocked_by_cutter(lat.nodes(rows + i0, cols + j0, z))
+        assert np.array_equal(field._free(near, i0, j0, z), one_by_one)
+
+
 def test_a_channel_that_fits_like_a_gauge_is_for_a_thinner_tool():
     mesh = terraces([0, 5, 9.05, 14], [0, 10], [[8, 2, 8]])
     p, n = np.array([[5.0, 5.0, 5.0]]), np.array([[1.0, 0.0, 0.0]])
