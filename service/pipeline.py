@@ -20,11 +20,11 @@ from service.delivery.job_delivery import cautions_before_planning, deliver_job,
 from service.delivery.machined_mesh import MESH_NAME, MeshWish, machined_part
 from service.delivery.result_files import Files, clear_results, deliver
 from service.delivery.stepnc_files import StepncUnderWay
+from service.delivery.written_program import WrittenProgram
 from service.from_wire import check_plannable
 from service.part_reading import PartReading
 from service.pictures.proof_picture import MAP_NAME
 from service.report import report as reporting
-from service.stages.access_plan import WrittenProgram
 from service.stages.access_settings import proof_setup
 from service.stages.cautions import sentences
 from service.stages.job_part import read_job_part

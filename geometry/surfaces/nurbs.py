@@ -16,7 +16,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import BSpline
 
 from geometry.array_checks import finite_points
 from geometry.errors import GeometryError
@@ -233,6 +232,8 @@ class NurbsSurface:
         Returns NurbsSurface with the same parameters inside and new ones outside.
         Raises GeometryError (``bad_surface``): a weight does not stay positive in the extension.
         """
+        from scipy.interpolate import BSpline  # it takes a quarter of a second to import, and few processes come here
+
         net = self._nets[0, 0][0]
         knots = []
         for axis, (t, order) in enumerate(zip((self.knots_u, self.knots_v), self.orders, strict=True)):

@@ -17,10 +17,11 @@ from geometry.sampling import SurfaceSamples
 from service.delivery.machined_mesh import MESH_NAME, MeshWish, machined_part
 from service.delivery.result_files import Files, deliver, json_bytes
 from service.delivery.stepnc_files import StepncUnderWay
+from service.delivery.written_program import WrittenProgram
 from service.pictures.proof_picture import MAP_NAME, draw_proof
 from service.report import report as reporting
 from service.setup_sheet.setup_sheet import sheet_files
-from service.stages.access_plan import ProofFrame, WrittenProgram, in_setup_frame
+from service.stages.access_plan import ProofFrame, in_setup_frame
 from service.stages.access_settings import leaned
 from service.stages.cautions import (
     JobCaution,

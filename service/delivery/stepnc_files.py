@@ -25,7 +25,7 @@ from output.stepnc.iso14649 import stream_stepnc_arm
 from output.stepnc.part21 import with_proof
 from output.workplan import Workplan
 from service.delivery.result_files import Files
-from service.stages.access_plan import WrittenProgram
+from service.delivery.written_program import WrittenProgram
 from verify.checks.program_sequence import read_all
 from verify.comparison.stepnc_agreement import check_agreement
 from verify.model import NcProgram, ProofSetup

@@ -23,6 +23,7 @@ from output.gcode.dialects import DIALECTS, Switches
 from output.gcode.program_writer import label_number, lowest_tip
 from output.workplan import Workplan
 from service.delivery.result_files import Files, listed
+from service.delivery.written_program import WrittenProgram
 from service.pictures.clamping_picture import Clamped, bar_mesh, box_mesh, clamp_picture, corners_of
 from service.pictures.tool_drawing import draw_tool, svg_of
 from service.setup_sheet.model import Block, Facts, Lines, Picture, SetupSheet, SheetSection, Table, ToolCard
@@ -41,7 +42,7 @@ from service.setup_sheet.tables import (
     tools_table,
     zones_table,
 )
-from service.stages.access_plan import ProofFrame, WrittenProgram
+from service.stages.access_plan import ProofFrame
 from service.stages.job_inputs import JobInputs
 from service.stages.preparation import Prepared
 from service.stages.programs import access_of, proof_frame

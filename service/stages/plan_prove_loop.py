@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
-from service.stages.access_plan import AccessPlan, ProofFrame, WrittenProgram
+from service.delivery.written_program import WrittenProgram
+from service.stages.access_plan import AccessPlan, ProofFrame
 from service.stages.access_settings import plan_settings, planning_stock
 from service.stages.preparation import Prepared
 from service.stages.programs import programs_of

@@ -22,8 +22,9 @@ from output.gcode.proof_header import AWAITED, filled
 from output.header_text import decimal
 from output.workplan import FIRST_NUMBER, AccessFrame, Ap238, Assembly, Clamping, StockBox, StockCylinder, Workplan
 from schemas.setup import Access
+from service.delivery.written_program import WrittenProgram
 from service.setup_assumptions import setup_assumptions
-from service.stages.access_plan import AccessPlan, ProofFrame, WrittenProgram
+from service.stages.access_plan import AccessPlan, ProofFrame
 from service.stages.blank_model import turned_box
 from service.stages.job_part import JobPart
 from service.stages.preparation import TABLE_SPARE, Prepared, table_height

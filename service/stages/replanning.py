@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from service.stages.access_plan import AccessPlan, ProofFrame, WrittenProgram
+from service.delivery.written_program import WrittenProgram
+from service.stages.access_plan import AccessPlan, ProofFrame
 from toolpath.counterexamples import CLOSER, NONE, Counterexamples, HighWall
 from toolpath.workingsteps import Workingstep
 from verify.model import Finding, FindingKind, Proof

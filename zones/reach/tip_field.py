@@ -210,8 +210,9 @@ class TipField:
         some = np.logical_or.reduceat(np.logical_or.reduceat(near, rows, axis=0), cols, axis=1)
         if near.sum() > 2 * some.size:
             a, b = np.nonzero(some)
-            middle = lat.nodes(i0 + SQUARE * a + 0.5 * (SQUARE - 1), j0 + SQUARE * b + 0.5 * (SQUARE - 1), z)
-            around = (0.5 * (SQUARE - 1) * math.sqrt(2.0) + 1e-3) * lat.step
+            aside = 0.5 * (SQUARE - 1) * lat.step
+            middle = lat.nodes(i0 + SQUARE * a, j0 + SQUARE * b, z) + [aside, aside, 0.0]
+            around = math.sqrt(2.0) * aside + 1e-3 * lat.step
             empty, full = some.copy(), np.zeros_like(some)
             empty[a, b] = ~self.blocked_by_cutter(middle, around)
             if self.grown_radius - around > self.grown_corner:

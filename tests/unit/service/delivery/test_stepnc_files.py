@@ -11,7 +11,7 @@ from output.gcode.proof_header import AWAITED, LINES
 from output.stepnc.part21 import with_proof
 from service.delivery import stepnc_files as stepnc
 from service.delivery.stepnc_files import StepncUnderWay, stepnc_files
-from service.stages.access_plan import WrittenProgram
+from service.delivery.written_program import WrittenProgram
 from tests.pocket_case import SETUP, block
 from tests.synthetic_plan import BALL, line, plan, step, write_linuxcnc
 from toolpath.workingsteps import TrajectoryKind

@@ -16,12 +16,12 @@ import pytest
 from geometry.errors import OutputError
 from geometry.part import FaceInfo, Part
 from service.delivery.result_files import Files
+from service.delivery.written_program import WrittenProgram
 from service.from_wire import parse_setup
 from service.pictures.clamping_picture import box_mesh, corners_of
 from service.setup_sheet.model import Facts, SetupSheet, SheetSection
 from service.setup_sheet.pdf import latin, pdf_of
 from service.setup_sheet.setup_sheet import sheet_files
-from service.stages.access_plan import WrittenProgram
 from service.stages.blank_model import blank_of
 from service.stages.job_inputs import JobInputs
 from tests.synthetic_plan import plan, step
