@@ -25,6 +25,7 @@ from service.from_wire import check_plannable
 from service.part_reading import PartReading
 from service.pictures.proof_picture import MAP_NAME
 from service.report import report as reporting
+from service.report.computed_ahead import ComputedAhead
 from service.stages.access_settings import proof_setup
 from service.stages.cautions import sentences
 from service.stages.job_part import read_job_part
@@ -71,9 +72,10 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     clear_results(out)
     ready = prepare(part_path, setup, progress, blank_path=blank_path, reading=reading)
     cautions = cautions_before_planning(ready)
-    with StepncUnderWay(out) as stepnc:
-        job = _proved_plan(part_path, warned(ready, sentences(cautions)), kept or Kept(), planner, progress, stepnc)
-        report = deliver_job(job, cautions, out, mesh, progress, stepnc)
+    with StepncUnderWay(out) as stepnc, reporting.known_before_planning(ready) as known:
+        job = _proved_plan(part_path, warned(ready, sentences(cautions)), kept or Kept(), planner, progress, stepnc,
+                           known)
+        report = deliver_job(job, cautions, out, mesh, progress, stepnc, known)
     progress("done", 1.0)
     return report
 
@@ -93,8 +95,9 @@ def prove_plan(part_path: Path, setup: Setup, progress: Progress) -> Proof:
 
 
 def _proved_plan(part_path: Path, ready: Prepared, kept: Kept, planner: Planner, progress: Progress,
-                 stepnc: StepncUnderWay | None = None) -> ProvedPlan:
-    """The last plan of a prepared job, with its proof, during which ``stepnc`` begins with the programs."""
+                 stepnc: StepncUnderWay | None = None,
+                 known: ComputedAhead[dict[str, Any]] | None = None) -> ProvedPlan:
+    """The last plan of a prepared job, with its proof, during which ``stepnc`` and ``known`` begin."""
     ready, trimmed, scored = _trimmed_and_scored(part_path, ready)
     frame = proof_frame(ready)
     samples = frame.into(scored.samples, ready.views[0])
@@ -104,6 +107,8 @@ def _proved_plan(part_path: Path, ready: Prepared, kept: Kept, planner: Planner,
     def begin(written: Sequence[WrittenProgram]) -> None:
         if stepnc is not None:
             stepnc.begin(written, frame.part, ready.inputs.bodies, conditions)
+        if known is not None:
+            known.begin()
 
     return plan_and_prove(resumed, scored, trimmed, frame, conditions, planner, progress, begin)
 

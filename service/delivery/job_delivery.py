@@ -20,6 +20,7 @@ from service.delivery.stepnc_files import StepncUnderWay
 from service.delivery.written_program import WrittenProgram
 from service.pictures.proof_picture import MAP_NAME, draw_proof
 from service.report import report as reporting
+from service.report.computed_ahead import ComputedAhead
 from service.setup_sheet.setup_sheet import sheet_files
 from service.stages.access_plan import ProofFrame, in_setup_frame
 from service.stages.access_settings import leaned
@@ -60,19 +61,20 @@ def warned(ready: Prepared, texts: Iterable[str]) -> Prepared:
 
 
 def deliver_job(job: ProvedPlan, cautions: Sequence[JobCaution], out: Path, mesh: MeshWish | None,
-                progress: Progress, stepnc: StepncUnderWay) -> dict[str, Any]:
+                progress: Progress, stepnc: StepncUnderWay, known: ComputedAhead[dict[str, Any]]) -> dict[str, Any]:
     """Write the files of a job into ``out``; returns its report.
 
     cautions : of the job before it was planned; those of the plan are added
     mesh     : also write the machined part as a mesh; None: no mesh
     stepnc   : with the STEP-NC that was begun during the proof
+    known    : what the report says whatever the plan is, of ``service.report.report.known_before_planning``
 
     Raises
     ------
     CamError
         A file cannot be made, or a written file does not read back as the proved program.
     """
-    reported = _report(job, cautions)
+    reported = _report(job, cautions, known)
     report, ready, proved = reported.report, reported.ready, reported.report["state"] == "proved"
     first_access = ready.views[0].id
     tools, programs = ready.inputs.bodies, job.programs
@@ -116,15 +118,16 @@ class _Reported:
     remainder: Sequence[RemainderEntry]
 
 
-def _report(job: ProvedPlan, cautions: Sequence[JobCaution]) -> _Reported:
+def _report(job: ProvedPlan, cautions: Sequence[JobCaution], known: ComputedAhead[dict[str, Any]]) -> _Reported:
     """The report of a job; the programs of a proved one get the figures of their proof in the header."""
     inputs, steps = job.ready.inputs, job.plan.steps
     proof = in_setup_frame(job.frame, job.proof)
     plan_cautions = [*unheld(proof.support), *bent(steps), *lives_ended(inputs, steps), *uncut_centres(inputs, steps),
                      *upright(leaned(inputs.operations.lean), job.plan.zones, steps)]
     ready = warned(job.ready, (*job.notes, *sentences(plan_cautions)))
-    report, uncut, remainder = reporting.job_report(ready, job.plan, proof, job.scored.samples, job.scored.labels,
-                                                    job.zone, job.given_up, [*cautions, *plan_cautions])
+    report, uncut, remainder = reporting.job_report(ready, known, job.plan, proof, job.scored.samples,
+                                                    job.scored.labels, job.zone, job.given_up,
+                                                    [*cautions, *plan_cautions])
     written: Sequence[WrittenProgram] = job.written
     if report["state"] == "proved":
         # the proof simulated one dialect without figures, so the delivered texts of all dialects are compared with it

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
 from service.report import approach_cones, tool_offers
+from service.report.computed_ahead import ComputedAhead
 from service.stages.cautions import MAX_TIMES, JobCaution
 from service.stages.job_part import JobPart
 from service.stages.preparation import Prepared
@@ -27,6 +29,7 @@ from zones.remainder.remainder import RemainderEntry, explain
 from zones.zoning.zones import ZoneArea, is_open
 
 REMAINDER_FLOOR_MM2 = 0.005
+PROPOSAL = ""  # the name of the proposal beside the ids of zones
 ZONES_KEYS = ("part", "walls", "connections", "channels", "accesses", "mcz", "cutting_planes", "machinable_area_mm2",
               "machinable_by_role_mm2", "zones", "remainder", "proposal")
 
@@ -156,6 +159,12 @@ def _proposal(ready: Prepared) -> dict[str, Any]:
     return tool_offers.as_dict(ready.inputs, tool_offers.offers(ready))
 
 
+def known_before_planning(ready: Prepared) -> ComputedAhead[dict[str, Any]]:
+    """The entries of the zones by their ids, and the proposal under ``PROPOSAL``: they depend on no plan."""
+    calls = {PROPOSAL: partial(_proposal, ready), **{z.id: partial(_zone, ready, z) for z in ready.zones}}
+    return ComputedAhead(calls)
+
+
 def dry_report(ready: Prepared) -> dict[str, Any]:
     """zones.json without a plan: the zones that the tools of the setup reach, and the remainder."""
     rest = ~ready.zoning.taken
@@ -166,13 +175,14 @@ def dry_report(ready: Prepared) -> dict[str, Any]:
             "remainder": _remainder(ready, items), "proposal": _proposal(ready)}
 
 
-def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples, labels: Labels,
-               zone: NDArray[np.int32], given_up: NDArray[np.bool_],
+def job_report(ready: Prepared, known: ComputedAhead[dict[str, Any]], made: Plan, proof: Proof, dense: SurfaceSamples,
+               labels: Labels, zone: NDArray[np.int32], given_up: NDArray[np.bool_],
                cautions: Sequence[JobCaution] = ()) -> tuple[dict[str, Any], NDArray[np.bool_], list[RemainderEntry]]:
     """report.json without its files, the samples that stay uncut, and the remainder.
 
     Each sample is proved, or a zone answers for it (then it is a finding), or it stands in the remainder.
 
+    known    : of ``known_before_planning``, for the same zones
     dense    : SurfaceSamples of the proof, n of them, frame of the first view
     labels   : their regions
     zone     : (n,) int32, index: zone that answers for each sample, from 1; 0 for none
@@ -204,9 +214,9 @@ def job_report(ready: Prepared, made: Plan, proof: Proof, dense: SurfaceSamples,
         **_shape(ready), **_areas(ready), "state": "unproved" if findings else "proved", "complete": not remainder,
         "labels": dict(ready.inputs.labels),
         "inputs": inputs_of(ready),
-        "zones": [_planned(ready, z, plans.get(z.id), steps, proof) for z in ready.zones],
+        "zones": [_planned(ready, z, known.value(z.id), plans.get(z.id), steps, proof) for z in ready.zones],
         "steps": [_step(s) for s in made.steps], "remainder": remainder,
-        "proposal": _proposal(ready), "findings": findings,
+        "proposal": known.value(PROPOSAL), "findings": findings,
         "finding_counts": counted(proof, unmet), "coverage": r(coverage, 6),
         "reach_coverage": r(done / reach, 6) if reach > 0 else 0.0,
         "machining_time_s": r(proof.spent.seconds, 1), "time": time_of(proof),
@@ -248,9 +258,10 @@ def of_job(kind: str, message: str, depth: float = 0.0, limit: float = 0.0, **mo
             "face": None, "point": None, "count": 1, "area": 0.0, **more}
 
 
-def _planned(ready: Prepared, zone: ZoneArea, plan: ZonePlan | None, steps: dict[str, Workingstep],
-             proof: Proof) -> dict[str, Any]:
-    out = _zone(ready, zone)
+def _planned(ready: Prepared, zone: ZoneArea, entry: dict[str, Any], plan: ZonePlan | None,
+             steps: dict[str, Workingstep], proof: Proof) -> dict[str, Any]:
+    """The entry of a zone with what plan and proof add to it."""
+    out = dict(entry)
     result = proof.zones.get(zone.id)
     mine = [s for s in steps.values() if s.zone == zone.id]
     out["scallop_mm"] = {"requested": ready.inputs.quality.scallop_height_mm, "p50": None, "p99": None, "max": None}

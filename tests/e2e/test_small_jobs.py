@@ -1,6 +1,9 @@
 """What a job says as a whole, on a block with one step: nothing cut, roughing alone, an earlier job's files."""
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,6 +17,7 @@ from tests.step_files import write_step
 
 cq = pytest.importorskip("cadquery")
 
+ROOT = Path(__file__).parents[2]
 FLAT = {"id": "T1", "kind": "flat", "diameter_mm": 4, "flute_length_mm": 8, "stickout_mm": 20}
 SETUP = {"tools": [FLAT], "quality": {"scallop_height_mm": 0.05}, "stock": {"margin_mm": 0.5, "uncertainty_mm": 0.0}}
 
@@ -76,6 +80,17 @@ def test_roughing_alone_is_proved_and_the_rest_is_named(part, tmp_path):
     left = sum(x["area_mm2"] for x in report["remainder"] if x["reason"] == "pass")
     missing = (1.0 - report["reach_coverage"]) / report["reach_coverage"] * report["coverage"]
     assert left == pytest.approx(missing * report["machinable_area_mm2"], rel=0.02) and left > 100
+
+
+@pytest.mark.slow
+def test_threads_of_a_job_keep_out_of_the_threading_layer_of_numba(part, tmp_path):
+    """The layer that numba has everywhere ends a process that two threads enter at once."""
+    setup = tmp_path / "setup.json"
+    setup.write_text(json.dumps(SETUP))
+    command = [sys.executable, "-m", "service.cli", "plan", str(part), "--setup", str(setup), "--out", str(tmp_path)]
+    env = {**os.environ, "NUMBA_THREADING_LAYER": "workqueue", "NUMBA_NUM_THREADS": "2"}
+    done = subprocess.run(command, env=env, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and json.loads(done.stdout)["proposal"] is not None, done.stderr[-2000:]
 
 
 @pytest.mark.slow

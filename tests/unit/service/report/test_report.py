@@ -18,16 +18,16 @@ def cut(length: float, feed: float) -> tuple[Trajectory, ...]:
 
 
 @pytest.fixture
-def planned(monkeypatch):
+def planned():
     """What the report says of zone Z1 whose workingsteps are given."""
-    monkeypatch.setattr(report, "_zone", lambda _ready, zone: {"id": zone.id, "rejected": []})
     zone = SimpleNamespace(id="Z1")
     ready = SimpleNamespace(inputs=SimpleNamespace(quality=SimpleNamespace(scallop_height_mm=0.01)))
 
     def ask(*steps):
         first = next((s.id for s in steps if s.zone == "Z1"), None)
         plan = ZonePlan(zone, first, "zigzag", 0.3, 5, np.zeros(0, np.int64))
-        return report._planned(ready, zone, plan, {s.id: s for s in steps}, SimpleNamespace(zones={}))
+        entry = {"id": "Z1", "rejected": []}
+        return report._planned(ready, zone, entry, plan, {s.id: s for s in steps}, SimpleNamespace(zones={}))
 
     return ask
 
