@@ -254,6 +254,18 @@ def is_blocked(tree: TreeArrays, x, y, z, radius, corner_radius):
 
 
 @njit(**KERNEL)
+def blocked_by(tree: TreeArrays, x, y, z, radius, corner_radius, guess):
+    """A triangle, by its place in leaf order, that makes ``is_blocked`` true; -1 where none does.
+
+    guess : a triangle to ask first, -1 for none
+    """
+    shape, start = bull_of(radius, corner_radius), z + BLOCK_TOLERANCE
+    if guess >= 0 and lift_of(shape, triangle_at(tree.corners, guess), facet_at(tree.facets, guess), x, y, start)[0] > start:
+        return guess
+    return walk(tree, shape, x, y, start, True)[1]
+
+
+@njit(**KERNEL)
 def drop_tip_contact(tree: TreeArrays, x, y, radius, corner_radius):
     """``drop_tip`` with the triangle of the mesh (-1: none) and the contact point (NaN: none)."""
     tip, slot, cx, cy, cz = walk(tree, bull_of(radius, corner_radius), x, y, NOTHING, False)

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from geometry.kernels import revolved
 from geometry.kernels.options import KERNEL
 from geometry.kernels.outline import ARC, CENTRE, H0, H1, LEVEL, RHO0, RHO1, SIN0, touch
-from geometry.kernels.revolved import NOTHING, for_shape, walk
+from geometry.kernels.revolved import NOTHING, facet_at, for_shape, lift_of, triangle_at, walk
 
 HALVINGS = 50
 THIN = 1e-5  # height over longest side of a triangle below which its normal is rough
@@ -263,6 +263,17 @@ def _bound(shape, node, x, y, best):
     if near >= rho:
         return NOTHING
     return math.sqrt((rho - near) * (rho + near)) - along
+
+
+@njit(**KERNEL)
+def stop_at(tree, slot, rows, x, y, z, dx, dy):
+    """Stop of one body at one triangle, mm; inf where the body passes it.
+
+    slot : place of the triangle in leaf order
+    rows : (k, 9) float64, mm, outline of the body; its tip is at (x, y, z)
+    """
+    shape = Push(rows, z, dx, dy)
+    return -lift_of(shape, triangle_at(tree.corners, slot), facet_at(tree.facets, slot), x, y, NOTHING)[0]
 
 
 @njit(**KERNEL)

@@ -6,10 +6,9 @@ Notation
     segment  inside one lattice cell, from the edge it enters by to the edge it leaves by, with the free
              side on its LEFT; walking a contour that way is climb milling for a right-hand cutter
 
-Marching squares fixes the topology on the nodes; the place of every crossing on its lattice edge is then found
-by bisection against the exact cutter, and chords are refined by the same test until they follow the true
-boundary within the tolerance. At a saddle the blocked corners count as joined, which is the safe reading.
-Every point returned is free.
+Marching squares fixes the topology on the nodes. The place of every crossing on its lattice edge is how far the exact
+cutter gets from the free node, and chords are refined by the same question until they follow the true boundary within
+the tolerance. At a saddle the blocked corners count as joined, which is the safe reading. Every point returned is free.
 """
 
 from __future__ import annotations
@@ -21,7 +20,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from geometry.kernels.bvh import TreeArrays
-from geometry.kernels.drop import is_blocked
+from geometry.kernels.drop import BLOCK_TOLERANCE, blocked_by
+from geometry.kernels.push import stop_at
 from zones.kernels.lattice import LatticeFrame, noncut_at
 
 # For each of the 16 corner patterns (bit 0: (i,j), 1: (i,j+1), 2: (i+1,j+1), 3: (i+1,j) blocked) up to two
@@ -34,6 +34,11 @@ SEGMENTS = np.array([
 ], dtype=np.int64)
 
 HALVINGS = 5  # of a chord
+NOTHING = -1
+NOT_CUTTING = -2
+STOPS = 12  # of one triangle after the other on a way
+BISECTIONS = 9  # of a way that shank or holder end
+OFF = 2e-4  # mm, distance of a place from that where the tool is stopped, so that chords between places are free
 MAX_PER_CHORD = 2 ** HALVINGS
 
 
@@ -45,6 +50,7 @@ class TipLimits(NamedTuple):
     radius       : float, mm, of the cutting part, grown by the allowance
     corner       : float, mm, its corner radius, grown by the allowance
     allowance    : float, mm, material that stays on the part
+    rows         : (k, 9) float64, mm, outline of the cutting part, as in ``geometry.kernels.outline``
     """
 
     noncut: NDArray[np.float64]
@@ -54,6 +60,7 @@ class TipLimits(NamedTuple):
     radius: float
     corner: float
     allowance: float
+    rows: NDArray[np.float64]
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
@@ -117,113 +124,103 @@ def trace(blocked, active, segments):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def stands_blocked(tree: TreeArrays, limits: TipLimits, x, y, z):
-    """Whether the assembly cannot stand with its tip at (x, y, z)."""
+def _blocker(tree, limits, x, y, z, guess):
+    """What keeps the assembly from standing with its tip at (x, y, z): a triangle by its place in leaf order,
+    NOT_CUTTING for shank and holder, NOTHING.
+
+    guess : triangle that is asked first, a negative number for none
+    """
     if noncut_at(limits.noncut, LatticeFrame(limits.x0, limits.y0, limits.step), x, y) > z:
-        return True
-    return is_blocked(tree, x, y, z - limits.allowance, limits.radius, limits.corner)
+        return NOT_CUTTING
+    return blocked_by(tree, x, y, z - limits.allowance, limits.radius, limits.corner, guess)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _bisect(tree, limits, fx, fy, bx, by, z, rounds):
-    """Last free place between a free point f and a blocked point b."""
-    for _ in range(rounds):
-        mx, my = 0.5 * (fx + bx), 0.5 * (fy + by)
-        if stands_blocked(tree, limits, mx, my, z):
-            bx, by = mx, my
+def _free_until(tree, limits, x, y, dx, dy, z, blocked, guess):
+    """How far the assembly gets from a free place along a unit direction towards a blocked place, mm; free there.
+
+    guess : triangle that may stop it, a negative number for none
+
+    Returns the way, and the triangle that stops it or a negative number.
+
+    The triangle that blocks a place stops the tool at another one, nearer, which is the next to look at.
+    """
+    way, level, slot = blocked, z - limits.allowance + BLOCK_TOLERANCE, guess
+    for _ in range(STOPS):
+        if slot >= 0:
+            stop = stop_at(tree, slot, limits.rows, x, y, level, dx, dy)
+            if 0.0 < stop < way:
+                way = max(stop - OFF, 0.5 * stop)
+            elif slot != guess:
+                break
+        last, slot = slot, _blocker(tree, limits, x + way * dx, y + way * dy, z, NOTHING)
+        if slot == NOTHING:
+            return way, last
+        if slot == last or slot == NOT_CUTTING:
+            break
+    free = 0.0
+    for _ in range(BISECTIONS):  # shank or holder end the way, or a touch is a glancing one
+        middle = 0.5 * (free + way)
+        if _blocker(tree, limits, x + middle * dx, y + middle * dy, z, slot) == NOTHING:
+            free = middle
         else:
-            fx, fy = mx, my
-    return fx, fy
+            way = middle
+    return free, NOTHING
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _place(tree, limits, edge, blocked, frame, z, rounds):
-    """Exact place of the crossing on one edge, on its free side."""
+def place_crossings(tree: TreeArrays, limits: TipLimits, ids, blocked, frame: LatticeFrame, z, out):
+    """Place (n, 2) of the crossing on every edge, on its free side: as far as the tool gets from the free node."""
     nx = blocked.shape[1]
     x0, y0, step = frame
-    node = edge // 2
-    i, j = node // nx, node % nx
-    i2, j2 = (i + 1, j) if edge % 2 else (i, j + 1)
-    ax, ay = x0 + step * j, y0 + step * i
-    bx, by = x0 + step * j2, y0 + step * i2
-    if blocked[i, j]:
-        ax, ay, bx, by = bx, by, ax, ay
-    return _bisect(tree, limits, ax, ay, bx, by, z, rounds)
-
-
-@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def place_crossings(tree: TreeArrays, limits: TipLimits, ids, blocked, frame: LatticeFrame, z, rounds, out):
-    """Exact place (n, 2) of every crossing, on its free side."""
+    slot = NOTHING
     for k in range(len(ids)):
-        out[k, 0], out[k, 1] = _place(tree, limits, ids[k], blocked, frame, z, rounds)
+        node, up = ids[k] // 2, ids[k] % 2
+        i, j = node // nx, node % nx
+        forth = 1.0
+        if blocked[i, j]:
+            i, j, forth = i + up, j + 1 - up, -1.0
+        dx, dy = forth * (1 - up), forth * up
+        x, y = x0 + step * j, y0 + step * i
+        way, slot = _free_until(tree, limits, x, y, dx, dy, z, step, slot)
+        out[k, 0], out[k, 1] = x + way * dx, y + way * dy
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _true_place(tree, limits, px, py, qx, qy, z, tol, reach):
-    """Where the boundary really is beside the middle of a chord: (x, y, moved)."""
+def _true_place(tree, limits, px, py, qx, qy, z, tol, reach, guess):
+    """Where the boundary is beside the middle of a chord: (x, y, moved), and what is there, as in ``_blocker``."""
     mx, my = 0.5 * (px + qx), 0.5 * (py + qy)
     dx, dy = qx - px, qy - py
     length = np.sqrt(dx * dx + dy * dy)
     if length < 4.0 * tol:
-        return mx, my, False
+        return mx, my, False, guess
     nx, ny = -dy / length, dx / length
-    if stands_blocked(tree, limits, mx, my, z):
-        d = tol
-        while d <= reach:
-            fx, fy = mx + d * nx, my + d * ny
-            if not stands_blocked(tree, limits, fx, fy, z):
-                bx, by = mx + 0.5 * d * nx, my + 0.5 * d * ny
-                if d <= tol:
-                    bx, by = mx, my
-                fx, fy = _bisect(tree, limits, fx, fy, bx, by, z, 6)
-                return fx, fy, True
-            d *= 2.0
-        return mx, my, False
-    bx, by = mx - tol * nx, my - tol * ny
-    if stands_blocked(tree, limits, bx, by, z):
-        return mx, my, False
-    d = 2.0 * tol
-    fx, fy = bx, by
-    while d <= reach:
-        bx, by = mx - d * nx, my - d * ny
-        if stands_blocked(tree, limits, bx, by, z):
-            fx, fy = _bisect(tree, limits, fx, fy, bx, by, z, 6)
-            return fx, fy, True
-        fx, fy = bx, by
-        d *= 2.0
-    return mx, my, False
-
-
-@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _refine_chord(tree, limits, points, follows, z, tol, reach, out, count, k):
-    """``refine`` for the chord from point k."""
-    out[k, 0, 0], out[k, 0, 1] = points[k, 0], points[k, 1]
-    count[k] = 1
-    if follows[k] < 0:
-        return
-    ends = np.empty((HALVINGS + 1, 4))
-    depth = np.empty(HALVINGS + 1, np.int64)
-    ends[0, 0], ends[0, 1] = points[k, 0], points[k, 1]
-    ends[0, 2], ends[0, 3] = points[follows[k], 0], points[follows[k], 1]
-    depth[0] = 0
-    top, m = 0, 0
-    while top >= 0:
-        px, py, qx, qy = ends[top, 0], ends[top, 1], ends[top, 2], ends[top, 3]
-        level = depth[top]
-        mx, my, moved = px, py, False
-        if level < HALVINGS:
-            mx, my, moved = _true_place(tree, limits, px, py, qx, qy, z, tol, reach)
-        if moved:
-            ends[top, 0], ends[top, 1] = mx, my
-            depth[top] = level + 1
-            top += 1
-            ends[top, 0], ends[top, 1], ends[top, 2], ends[top, 3] = px, py, mx, my
-            depth[top] = level + 1
-            continue
-        top -= 1
-        out[k, m, 0], out[k, m, 1] = px, py
-        m += 1
-    count[k] = m
+    slot = _blocker(tree, limits, mx, my, z, guess)
+    if slot != NOTHING:
+        free = tol
+        while True:
+            last, slot = slot, _blocker(tree, limits, mx + free * nx, my + free * ny, z, slot)
+            if slot == NOTHING:
+                break
+            free *= 2.0
+            if free > reach:
+                return mx, my, False, slot
+        blocked = free
+    else:
+        free, ahead = 0.0, tol
+        while True:
+            last = _blocker(tree, limits, mx - ahead * nx, my - ahead * ny, z, guess)
+            if last != NOTHING:
+                break
+            free, ahead = ahead, 2.0 * ahead
+            if ahead > reach:
+                return mx, my, False, guess
+        if free == 0.0:
+            return mx, my, False, last
+        free, blocked = -free, ahead - free
+    way, last = _free_until(tree, limits, mx + free * nx, my + free * ny, -nx, -ny, z, blocked, last)
+    off = free - way
+    return mx + off * nx, my + off * ny, True, last
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
@@ -233,8 +230,35 @@ def refine(tree: TreeArrays, limits: TipLimits, points, follows, z, tol, reach, 
     points  : (n, 2); follows : (n,) the point each is joined to, -1 for none
     out     : (n, MAX_PER_CHORD, 2), count : (n,): the point itself and those put in behind it, in order
     """
+    ends = np.empty((HALVINGS + 1, 4))
+    depth = np.empty(HALVINGS + 1, np.int64)
+    slot = NOTHING
     for k in range(len(points)):
-        _refine_chord(tree, limits, points, follows, z, tol, reach, out, count, k)
+        out[k, 0, 0], out[k, 0, 1] = points[k, 0], points[k, 1]
+        count[k] = 1
+        if follows[k] < 0:
+            continue
+        ends[0, 0], ends[0, 1] = points[k, 0], points[k, 1]
+        ends[0, 2], ends[0, 3] = points[follows[k], 0], points[follows[k], 1]
+        depth[0] = 0
+        top, m = 0, 0
+        while top >= 0:
+            px, py, qx, qy = ends[top, 0], ends[top, 1], ends[top, 2], ends[top, 3]
+            level = depth[top]
+            mx, my, moved = px, py, False
+            if level < HALVINGS:
+                mx, my, moved, slot = _true_place(tree, limits, px, py, qx, qy, z, tol, reach, slot)
+            if moved:
+                ends[top, 0], ends[top, 1] = mx, my
+                depth[top] = level + 1
+                top += 1
+                ends[top, 0], ends[top, 1], ends[top, 2], ends[top, 3] = px, py, mx, my
+                depth[top] = level + 1
+                continue
+            top -= 1
+            out[k, m, 0], out[k, m, 1] = px, py
+            m += 1
+        count[k] = m
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
@@ -247,7 +271,7 @@ def chords_free(tree: TreeArrays, limits: TipLimits, points, z, spacing, ok):
         ok[k] = True
         for s in range(1, n):
             x, y = points[k, 0] + dx * s / n, points[k, 1] + dy * s / n
-            if stands_blocked(tree, limits, x, y, z):
+            if _blocker(tree, limits, x, y, z, NOTHING) != NOTHING:
                 ok[k] = False
                 break
 

@@ -18,6 +18,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
+from geometry.mesh_queries.revolved_outline import Outline
 from toolpath.kernels.contour import (
     MAX_PER_CHORD,
     SEGMENTS,
@@ -33,7 +34,6 @@ from zones.kernels.lattice import LatticeFrame
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 MIN_APART = 0.6  # lattice steps between successive crossings; less only where a corner is cut
-BISECTIONS = 9  # a crossing is placed to step / 2**9
 
 
 def dilated(mask: NDArray[np.bool_], cells: float) -> NDArray[np.bool_]:
@@ -124,7 +124,7 @@ def _traced(field: TipField, z: float, active: NDArray[np.bool_], tolerance: flo
         xy[~exact] = middle[~exact]
     placed = np.empty((int(exact.sum()), 2))
     place_crossings(field.tree.arrays, limits, ids[exact], blocked, LatticeFrame(x0, y0, lat.step),
-                    z + LEVEL_TOLERANCE, BISECTIONS, placed)
+                    z + LEVEL_TOLERANCE, placed)
     xy[exact] = placed
     both = exact & (follows >= 0)
     both[both] = exact[follows[both]]
@@ -151,7 +151,8 @@ def _traced(field: TipField, z: float, active: NDArray[np.bool_], tolerance: flo
 
 def _limits(field: TipField) -> TipLimits:
     """What keeps the tip of a field's tool up, beside the obstacles, for kernels."""
-    return TipLimits(field.noncut, *field.coarse.frame, field.grown_radius, field.grown_corner, field.allowance)
+    rows = Outline.bull(field.grown_radius, field.grown_corner).stack.rows
+    return TipLimits(field.noncut, *field.coarse.frame, field.grown_radius, field.grown_corner, field.allowance, rows)
 
 
 def _flat(points: F64) -> NDArray[np.complex128]:

@@ -32,6 +32,7 @@ AIR_TOLERANCE = 0.01  # mm
 UPRIGHT = 1e-12  # Z of the normal of an upright face of a block, at most
 LEANS = 1e-9  # tilt of the axis of a bar: with less it stands upright, or lies level
 ON_EDGE = 1e-9  # mm
+NEXT_TO = 2e-3  # mm: a tool that follows the part this near, as lines do, need not clear a cell that holds no part
 APART, MAX_POSED = 2.0, 0.1  # lattice steps, or radii, between poses that are removed
 ROUND = (0.0, 0.25 * np.pi, 0.5 * np.pi)  # how far round the corner a cylinder inside the cutting part touches it
 SKIN = 0.08  # diameters: thickest stock that the end of the tool may take in a descent steeper than the ramp
@@ -393,8 +394,8 @@ def _upper_end(u: F64, length: float, aside: float, up: float) -> F64:
 
 
 def _in_cells(tree: TriangleTree, lat: Lattice) -> F64:
-    """(ny, nx) float64, mm: highest of the part in the disc round each cell."""
-    return drop_over_flats(tree, lat.x0, lat.y0, lat.step, lat.nx, lat.ny, HALF_DIAGONAL * lat.step, 0.0)
+    """(ny, nx) float64, mm: highest of the part in the disc round each cell, and next to it."""
+    return drop_over_flats(tree, lat.x0, lat.y0, lat.step, lat.nx, lat.ny, HALF_DIAGONAL * lat.step + NEXT_TO, 0.0)
 
 
 def _stacked(heights: Sequence[F64]) -> F64:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from geometry.mesh import TriangleMesh
 from tests.hand_parts import ball, box_mesh, field_of, terraces, tool, walls
 from tests.plan_checks import dense
+from toolpath.kernels.contour import OFF
 from toolpath.lines import Line, pieces_where, place_keys, thinned, true_runs
 from toolpath.passes.contours import contour_pieces, contours, dilated, free_pieces, moves_free, rings
 
@@ -113,6 +115,31 @@ def test_contours_walk_with_the_material_on_the_right():
     assert len(inner) == 1
     p = inner[0].points[:, :2]
     assert 0.5 * float(np.sum(p[:-1, 0] * p[1:, 1] - p[1:, 0] * p[:-1, 1])) > 0  # the other way inside a pocket
+
+
+@pytest.mark.parametrize("body", [ball(3.0), tool(3.0, 0.0), tool(3.0, 0.6)], ids=lambda b: b.kind)
+@pytest.mark.parametrize("turn", [0.0, 0.3, 0.7])
+def test_places_of_a_contour_lie_where_the_tool_is_stopped(body, turn):
+    box, (c, s) = box_mesh([-4, -2.5, 0], [4, 2.5, 4]), (np.cos(turn), np.sin(turn))
+    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    field = field_of(TriangleMesh(box.vertices @ rotation.T, box.faces), body)
+    (line,) = contours(field, 1.0, everywhere(field), 0.002)
+    away = np.hypot(*np.maximum(np.abs((line.points @ rotation)[:, :2]) - [4, 2.5], 0).T) - body.radius
+    assert -1e-9 <= away.min() and away.max() <= OFF + 1e-9  # 0 at a node that touches
+    # and so do the chords between them, but for the allowed part of the tolerance
+    middle = 0.5 * (line.points[1:] + line.points[:-1])
+    away = np.hypot(*np.maximum(np.abs((middle @ rotation)[:, :2]) - [4, 2.5], 0).T) - body.radius
+    assert -0.002 < away.min() and away.max() <= 0.002
+
+
+def test_where_the_holder_ends_the_way_the_place_is_found_by_halving():
+    holder = tool(3.0, 0.0, neck=2.0, shank=8.0, stickout=30.0)
+    field = field_of(box_mesh([0.013, 0.027, 0], [8, 5, 4]), holder)  # no node on the border of two cells of the holder
+    (line,) = contours(field, 1.0, everywhere(field), 0.002)
+    at = line.points + [0.0, 0.0, 1e-5]
+    assert not (field.blocked_by_cutter(at) | field.blocked_by_body(at)).any()
+    outside = np.hypot(*(np.maximum(np.maximum([0, 0] - line.points[:, :2], line.points[:, :2] - [8, 5]), 0)).T)
+    assert outside.min() >= 4.0  # the shank's radius
 
 
 def test_a_contour_that_leaves_the_area_is_open():

@@ -49,6 +49,25 @@ def offset_blank(points, offset):
     return out
 
 
+@pytest.mark.parametrize("beside", [0.0, 1e-9, 2e-4, 1e-3])
+def test_nothing_stands_where_a_tool_followed_a_wall_as_near_as_lines_do(beside):
+    """The wall just leaves the disc of a cell, which the tool then does not clear whole."""
+    part = TriangleTree(joined(box_mesh([-12, -12, -2], [12, 12, 0]), box_mesh([-9, -9, 0], [0.0, 9.0, 5.0])))
+    blank = StockMap.around(part, np.array([[-12, -12, -2], [12, 12, 5.0]]), 1.0, STEP)
+    x0 = blank.lattice.x0
+    column = int(np.ceil(-x0 / STEP)) + 1
+    wall = x0 + column * STEP - HALF_DIAGONAL * STEP - beside
+    moved = joined(box_mesh([-12, -12, -2], [12, 12, 0]), box_mesh([-9, -9, 0], [wall, 9.0, 5.0]))
+    stock = StockMap.around(TriangleTree(moved), np.array([[-12, -12, -2], [12, 12, 5.0]]), 1.0, STEP)
+    assert stock.lattice.x0 == x0
+    body = tool(3.0, 0.0)
+    for z in (3.0, 1.0, 0.1):
+        for off in (4.0, 2.0, 0.0):
+            stock.cut(np.array([[wall + body.radius + 2e-4 + off, y, z] for y in (-8.0, 8.0)]), body)
+    there = np.array([[wall + body.radius + 2e-4, y, 0.1] for y in np.linspace(-5.0, 5.0, 41)])
+    assert stock.standing(there, body).max() <= 1e-9
+
+
 @pytest.mark.parametrize("body", BODIES, ids=lambda b: b.kind)
 def test_no_point_of_the_stock_stands_above_its_cell(body):
     stock = StockMap.around(TriangleTree(PART), PART.bounds, 1.0, STEP)
