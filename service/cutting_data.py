@@ -18,6 +18,7 @@ from schemas.setup import Setup
 from schemas.tools import Tool
 from toolpath.scallop_budget import ScallopBudget
 from toolpath.tool_deflection import (
+    BENT_SHARE,
     LAYER_LIMIT,
     MIN_FEED,
     DeflectionModel,
@@ -167,9 +168,9 @@ def bending(setup: Setup, tool: Tool, body: ToolBody, data: CuttingData, depth: 
     body  : the shape of the tool; data : its speeds in this kind of work
     depth : mm, of layers; None: finishing
 
-    A layer may bend the tool by half of the stock it leaves for finishing, at most ``LAYER_LIMIT``. A climbing finish
-    bends
-    it away from the wall, by at most the scallop height. Otherwise it may cut in, by half of the gouge tolerance.
+    A layer may bend the tool by ``BENT_SHARE`` of the stock it leaves for finishing, at most ``LAYER_LIMIT``. A finish
+    that climbs bends it away from the wall, by at most the scallop height. Otherwise it may cut in, by half of the
+    gouge tolerance.
     """
     material = setup.material
     if material.specific_cutting_force_n_mm2 is None or material.chip_thickness_exponent is None:
@@ -177,7 +178,7 @@ def bending(setup: Setup, tool: Tool, body: ToolBody, data: CuttingData, depth: 
     climbs = setup.operations.cut_direction == "climb"
     limit = setup.quality.scallop_height_mm if climbs else 0.5 * setup.quality.gouge_tolerance_mm
     if depth is not None:
-        limit = min(LAYER_LIMIT, 0.5 * left_by_layers(depth, lattice_step(body)))
+        limit = min(LAYER_LIMIT, BENT_SHARE * left_by_layers(depth, lattice_step(body)))
     return DeflectionModel(body, compliance(body), material.specific_cutting_force_n_mm2,
                            material.chip_thickness_exponent, limit, tool.flutes, data.spindle_rpm, depth is None,
                            tool.feed_mm_min is not None, tool.plunge_feed_mm_min is not None)

@@ -23,8 +23,9 @@ from geometry.tool_body import ToolBody
 MIN_SHARE = 0.2
 """Least share to which a feed is reduced: below it, edges rub and the tool wears without cutting."""
 LAYER_LIMIT = 0.05
-"""mm, largest deflection of a tool in layers, unless half of the stock they leave is less."""
-LEFT_SHARE, LEFT_STEPS = 0.1, 1.5
+"""mm, largest deflection of a tool in layers, unless ``BENT_SHARE`` of the stock they leave is less."""
+BENT_SHARE = 0.75
+LEFT_SHARE, LEFT_STEPS = 0.1, 1.0
 """Stock that layers leave for the finish: share of the deepest layer, and lattice steps; the greater counts."""
 MIN_FEED = 0.1
 """mm/min."""
@@ -101,4 +102,5 @@ def left_by_layers(step_down: float, spacing: float) -> float:
     return max(LEFT_SHARE * step_down, LEFT_STEPS * spacing)
 
 
-__all__ = ["LAYER_LIMIT", "MIN_FEED", "MIN_SHARE", "DeflectionEstimate", "DeflectionModel", "left_by_layers"]
+__all__ = ["BENT_SHARE", "LAYER_LIMIT", "MIN_FEED", "MIN_SHARE", "DeflectionEstimate", "DeflectionModel",
+           "left_by_layers"]

@@ -1,8 +1,8 @@
 """Contours of the free region of a tool at one height, such as the waterlines that finish walls.
 
 ``contours`` gives the exact boundary of F(z) inside an active area: places where the tool touches. ``rings`` gives
-lines at a distance from it, for roughing. They come from a distance transform on the lattice, so their distance is
-exact to one lattice step, and every move is tested against the exact cutter.
+lines at a distance from it, for roughing. The distance from the exact boundary is computed at the nodes of the lattice,
+and every move is tested against the exact cutter.
 
 Arrays are float64 unless they are masks; places are tips in mm, access frame.
 """
@@ -10,7 +10,8 @@ Arrays are float64 unless they are masks; places are tips in mm, access frame.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,7 @@ from toolpath.kernels.contour import (
     refine,
     trace,
 )
+from toolpath.kernels.wall_distance import from_boundary
 from toolpath.lines import Line, dense, pieces_where, true_runs
 from zones.kernels.lattice import LatticeFrame
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
@@ -103,50 +105,145 @@ def _traced(field: TipField, z: float, active: NDArray[np.bool_], tolerance: flo
             wanted: NDArray[np.bool_] | None = None, overrun: float = 0.0) -> tuple[list[Line], NDArray[np.complex128]]:
     """``contours``, exact along ``overrun`` mm round wanted cells; (k,) x + iy of points in the rest, or next to it."""
     rough = np.zeros(0, np.complex128)
-    if not active.any():
+    chains = _chains(field, z, active, tolerance, wanted, overrun)
+    if chains is None:
         return [], rough
-    lat = field.lattice
-    rows, cols = _window(active, 1)
-    blocked = np.ascontiguousarray(field.height[rows, cols] > z + LEVEL_TOLERANCE)
-    ids, starts, closed = trace(blocked, np.ascontiguousarray(active[rows, cols]), SEGMENTS)
-    if not len(ids):
-        return [], rough
-    x0, y0 = lat.x0 + cols.start * lat.step, lat.y0 + rows.start * lat.step
-    xy = np.empty((len(ids), 2))
-    limits = _limits(field)
-    follows = np.arange(1, len(ids) + 1)
-    follows[starts[1:] - 1] = np.where(closed, starts[:-1], -1)
-    exact = np.ones(len(ids), np.bool_)
-    if wanted is not None:
-        middle = _middles(ids, blocked.shape[1]) * lat.step + [x0, y0]
-        more = 2 + math.ceil(overrun / (MIN_APART * lat.step))
-        exact = _along_chains(wanted[lat.cells(middle)], starts, closed, more)
-        xy[~exact] = middle[~exact]
-    placed = np.empty((int(exact.sum()), 2))
-    place_crossings(field.tree.arrays, limits, ids[exact], blocked, LatticeFrame(x0, y0, lat.step),
-                    z + LEVEL_TOLERANCE, placed)
-    xy[exact] = placed
-    both = exact & (follows >= 0)
-    both[both] = exact[follows[both]]
-    fine, count = np.empty((len(ids), MAX_PER_CHORD, 2)), np.empty(len(ids), np.int64)
-    refine(field.tree.arrays, limits, xy, np.where(both, follows, -1), z + LEVEL_TOLERANCE, tolerance, lat.step, fine,
-           count)
-    points = fine[np.arange(MAX_PER_CHORD) < count[:, None]]
-    begins = np.concatenate([[0], np.cumsum(count)])[starts]
-    if not exact.all():
-        beside = ~exact
-        beside[follows[(follows >= 0) & ~exact]] = True
-        beside[(follows >= 0) & ~exact[follows]] = True
-        rough = _flat(xy[beside])
+    starts, points, begins = chains.starts, chains.points, chains.begins[chains.starts]
+    if not chains.exact.all():
+        follows, beside = chains.after, ~chains.exact
+        beside[follows[(follows >= 0) & ~chains.exact]] = True
+        beside[(follows >= 0) & ~chains.exact[follows]] = True
+        rough = _flat(points[chains.begins[:-1][beside]])
     out = []
     for k in range(len(starts) - 1):
         way = points[begins[k]:begins[k + 1]]
         if starts[k + 1] - starts[k] < 2:
             continue
-        if closed[k]:
+        if chains.closed[k]:
             way = np.vstack([way, way[:1]])
-        out.append(Line(np.column_stack([way, np.full(len(way), z)]), bool(closed[k])))
+        out.append(Line(np.column_stack([way, np.full(len(way), z)]), bool(chains.closed[k])))
     return out, rough
+
+
+@dataclass(frozen=True, eq=False)
+class _Chains:
+    """Boundary of a free region as chains of places on lattice edges.
+
+    rows, cols : slice, window of the lattice
+    frame      : LatticeFrame of the window
+    ids        : (n,) int64, edge of each place
+    starts     : (c + 1,) int64, first place of each chain
+    closed     : (c,) bool
+    after      : (n,) int64, place that follows each, -1 for none
+    exact      : (n,) bool, places found exactly; others are the middles of their edges
+    points     : (m, 2) float64, mm, places with the points put in behind each
+    begins     : (n + 1,) int64, where the points of each place begin
+    """
+
+    rows: slice
+    cols: slice
+    frame: LatticeFrame
+    ids: NDArray[np.int64]
+    starts: NDArray[np.int64]
+    closed: NDArray[np.bool_]
+    after: NDArray[np.int64]
+    exact: NDArray[np.bool_]
+    points: F64
+    begins: NDArray[np.int64]
+
+
+def _chains(field: TipField, z: float, active: NDArray[np.bool_], tolerance: float = math.inf,
+            wanted: NDArray[np.bool_] | None = None, overrun: float = 0.0) -> _Chains | None:
+    """The boundary in an area, exact along ``overrun`` mm round wanted cells; None where there is none.
+
+    tolerance : mm, of chords; inf puts no points in between
+    """
+    if not active.any():
+        return None
+    lat = field.lattice
+    rows, cols = _window(active, 1)
+    blocked = np.ascontiguousarray(field.height[rows, cols] > z + LEVEL_TOLERANCE)
+    ids, starts, closed = trace(blocked, np.ascontiguousarray(active[rows, cols]), SEGMENTS)
+    if not len(ids):
+        return None
+    frame = LatticeFrame(lat.x0 + cols.start * lat.step, lat.y0 + rows.start * lat.step, lat.step)
+    xy = np.empty((len(ids), 2))
+    limits = _limits(field)
+    after = np.arange(1, len(ids) + 1)
+    after[starts[1:] - 1] = np.where(closed, starts[:-1], -1)
+    exact = np.ones(len(ids), np.bool_)
+    if wanted is not None:
+        middle = _middles(ids, blocked.shape[1]) * lat.step + [frame.x0, frame.y0]
+        more = 2 + math.ceil(overrun / (MIN_APART * lat.step))
+        exact = _along_chains(wanted[lat.cells(middle)], starts, closed, more)
+        xy[~exact] = middle[~exact]
+    placed = np.empty((int(exact.sum()), 2))
+    place_crossings(field.tree.arrays, limits, ids[exact], blocked, frame, z + LEVEL_TOLERANCE, placed)
+    xy[exact] = placed
+    if math.isinf(tolerance):
+        return _Chains(rows, cols, frame, ids, starts, closed, after, exact, xy, np.arange(len(ids) + 1))
+    both = exact & (after >= 0)
+    both[both] = exact[after[both]]
+    fine, count = np.empty((len(ids), MAX_PER_CHORD, 2)), np.empty(len(ids), np.int64)
+    refine(field.tree.arrays, limits, xy, np.where(both, after, -1), z + LEVEL_TOLERANCE, tolerance, lat.step, fine,
+           count)
+    return _Chains(rows, cols, frame, ids, starts, closed, after, exact,
+                   fine[np.arange(MAX_PER_CHORD) < count[:, None]], np.concatenate([[0], np.cumsum(count)]))
+
+
+def wall_distance(field: TipField, z: float, asked: NDArray[np.bool_]) -> F64 | None:
+    """Distance of nodes from the boundary of the free region of a tool at height z, (ny, nx) float64, mm.
+
+    z     : mm, tip height in the access frame
+    asked : (ny, nx) bool on ``field.lattice``
+
+    Returns None where every node is free. At the nodes asked for it is the distance from chords between exact places of
+    the boundary on lattice edges, and less than 0 where they are blocked, next to the boundary. At the rest it is the
+    distance from the nearest blocked node. That stands for it also beside features that the lattice does not see, or
+    sees only the end of. A chord is off a round of radius r by no more than step^2 / (4 r).
+    """
+    blocked = field.nearest_blocked(z)
+    if blocked is None:
+        return None
+    far, nearest = blocked[0].copy(), blocked[1]
+    free = far > 0.0
+    here = asked & free
+    if not here.any():
+        return far
+    i, j = (np.concatenate([k, nearest[c][here]]) for c, k in enumerate(np.nonzero(here)))
+    at, box, chains = field.kept.get("walls", (math.nan, None, None))
+    needed = np.array([i.min(), j.min(), -i.max(), -j.max()])
+    if at != z or (needed < box).any():
+        box = needed if box is None else np.minimum(needed, box)  # layers that follow each other need much the same
+        around = np.zeros_like(free)
+        around[box[0]:1 - box[2], box[1]:1 - box[3]] = True
+        chains = _chains(field, z, around)
+        field.kept["walls"] = z, box, chains
+    if chains is None:
+        return far
+    before = np.full(len(chains.ids), -1)
+    follows = np.flatnonzero(chains.after >= 0)
+    before[chains.after[follows]] = follows
+    rows, cols = chains.rows, chains.cols
+    from_boundary(chains.ids, chains.after, before, chains.points, chains.begins,
+                  (rows.start, cols.start, *free[rows, cols].shape), nearest,
+                  here | ~free & dilated(here, 2.0), field.lattice.frame, far)
+    return far
+
+
+def from_walls(field: TipField, z: float, distance: float) -> NDArray[np.bool_] | None:
+    """Whether nodes are at least a distance from the boundary of the free region of a tool at height z, (ny, nx) bool.
+
+    z, distance : mm
+
+    Returns None where every node is free.
+    """
+    blocked = field.nearest_blocked(z)
+    if blocked is None:
+        return None
+    off = blocked[0]
+    walls = wall_distance(field, z, (off >= distance) & (off < distance + field.lattice.step))  # the rest is certain
+    return None if walls is None else walls >= distance
 
 
 def _limits(field: TipField) -> TipLimits:
@@ -177,38 +274,38 @@ def _along_chains(marked: NDArray[np.bool_], starts: NDArray[np.int64], closed: 
     return out
 
 
-def rings(field: TipField, z: float, active: NDArray[np.bool_], first: float, spacing: float) -> list[list[Line]]:
+def rings(field: TipField, z: float, active: NDArray[np.bool_], firsts: Sequence[float],
+          spacing: float) -> Iterator[list[Line]]:
     """Lines of tip positions at equal distances inside the boundary of the free region at height z.
 
     active  : (ny, nx) bool, cells of the lattice that get lines
-    first   : mm, distance of the lines nearest to the boundary, exact to one lattice step
+    firsts  : (m,) mm, distance of the lines nearest to the boundary; for each there are all lines of an area
     spacing : mm between one list and the next
 
-    Returns
-    -------
-    list of lists of Line
+    Yields
+    ------
+    list of Line
         One list a distance, in the order of stock removal: the farthest from obstacles first. At a height without
         obstacles, distances count from the border of ``active``, and the lines along it come first. A move that the
         exact cutter does not allow is left out, which opens the line there.
     """
     if not active.any():
-        return []
+        return
     lat = field.lattice
-    blocked = field.off_blocked(z)
-    walled = blocked is not None
     rows, cols = _window(active, 1)
-    if blocked is not None:
-        far = blocked[rows, cols]
-    else:
-        far = ndimage.distance_transform_edt(np.pad(active[rows, cols], 1))[1:-1, 1:-1] * lat.step
     inside = np.ascontiguousarray(active[rows, cols])
+    walls = wall_distance(field, z, dilated(active, 1.0))
+    walled = walls is not None
+    if walls is not None:
+        far = np.ascontiguousarray(walls[rows, cols])
+    else:
+        far = ndimage.distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1] * lat.step
     widest = float(far[inside].max())
-    far = np.ascontiguousarray(far)
     corner = lat.x0 + cols.start * lat.step, lat.y0 + rows.start * lat.step
-    out = []
-    for distance in np.arange(min(first, 0.9 * widest), widest, spacing).tolist():
-        out.append(lines_at(field, z, far, distance, inside, corner))
-    return out[::-1] if walled else out
+    for first in firsts:
+        distances = np.arange(min(first, 0.9 * widest), widest, spacing).tolist()
+        for distance in distances[::-1] if walled else distances:
+            yield lines_at(field, z, far, distance, inside, corner)
 
 
 def lines_at(field: TipField, z: float, far: F64, distance: float, inside: NDArray[np.bool_],
@@ -235,14 +332,17 @@ def lines_at(field: TipField, z: float, far: F64, distance: float, inside: NDArr
 
 
 def moves_free(field: TipField, points: F64) -> NDArray[np.bool_]:
-    """Whether each straight level move of a line stays free, (n - 1,) bool, tested every third of a step.
+    """Whether each straight level move of a line stays free, (n - 1,) bool, tested every step of the lattice.
 
     points : (n, 3) float64, mm, access frame, tips
+
+    Between two free places a step apart, a tool of radius r enters no more than step^2 / (8 r), 0.0019 mm for the steps
+    of ``lattice_step``.
     """
     ok = np.ones(max(len(points) - 1, 0), np.bool_)
     if len(points) > 1:
         chords_free(field.tree.arrays, _limits(field), np.ascontiguousarray(points[:, :2]),
-                    float(points[:, 2].max()) + LEVEL_TOLERANCE, field.lattice.step / 3, ok)
+                    float(points[:, 2].max()) + LEVEL_TOLERANCE, field.lattice.step, ok)
     return ok
 
 

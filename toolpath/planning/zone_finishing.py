@@ -291,10 +291,10 @@ class Finish:
     def plan(self) -> ZonePlan:
         """The outcome for the zone."""
         left = np.flatnonzero((self.residual.residual > self._aims(self.settings.scallop_height))[:self.given])
-        name, step = self.begun_with or self.strategy.name, self.step
+        name, step, side_step = self.begun_with or self.strategy.name, self.step, self.strategy.side_step
         if step is None and self.layers is not None and self.given and not len(left):
-            name, step = self.layers.strategy, self.layers.id
-        return ZonePlan(self.zone, step, name, self.strategy.side_step, self.passes, left, self.strategy.rejected)
+            name, step, side_step = self.layers.strategy, self.layers.id, self.layers.side_step
+        return ZonePlan(self.zone, step, name, side_step, self.passes, left, self.strategy.rejected)
 
     def _aims(self, aim: float) -> F64:
         return self.settings.found.aims(self.zone.id, aim, len(self.checks.points))

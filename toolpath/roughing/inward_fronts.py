@@ -24,7 +24,7 @@ from scipy import ndimage
 from geometry.mesh import F64
 from toolpath.kernels.march import march, spread
 from toolpath.lines import Line
-from toolpath.passes.contours import dilated, lines_at
+from toolpath.passes.contours import dilated, from_walls, lines_at
 from toolpath.stock.stock_map import StockMap
 from zones.reach.tip_field import TipField
 
@@ -71,10 +71,10 @@ class Inwards:
             return None
         rows, cols = (slice(int(k[0]), int(k[-1]) + 1) for k in
                       (np.flatnonzero(window.any(axis=1)), np.flatnonzero(window.any(axis=0))))
-        off = field.off_blocked(z)
+        off = from_walls(field, z, allowance)
         free = window[rows, cols]
         if off is not None:
-            free = np.logical_and(free, off[rows, cols] >= allowance)
+            free = np.logical_and(free, off[rows, cols])
         stands = lat.mask(stock.above(z + worth))[rows, cols]
         if not stands.any():
             return None

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolpath.lines import Line, pieces_where
-from toolpath.passes.contours import contours, dilated, rings
+from toolpath.passes.contours import contours, dilated, from_walls, rings
 from toolpath.stock.stock_map import SURE_RIM, StockMap
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
@@ -61,14 +61,13 @@ def layer(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], a
     standing = dilated(lat.mask(stock.above(z + STOCK_WORTH)), 2.0 * tool.radius / lat.step)
     active = dilated(area, tool.radius / lat.step) & standing
     # Where rings turn sharply, islands stay between them; rings half a step off take these.
-    for start in (allowance, allowance + 0.5 * side_step):
-        for lines in rings(field, z, active, start, side_step):
-            kept: list[Line] = []
-            for line in lines:
-                wanted = stock.overlap(line.points, tool, lower_bound=0.0) > STOCK_WORTH
-                kept.extend(pieces_where(line, wanted, 0.6 * tool.radius, 3.0 * tool.radius))
-            if kept:
-                yield kept
+    for lines in rings(field, z, active, (allowance, allowance + 0.5 * side_step), side_step):
+        kept: list[Line] = []
+        for line in lines:
+            wanted = stock.overlap(line.points, tool, lower_bound=0.0) > STOCK_WORTH
+            kept.extend(pieces_where(line, wanted, 0.6 * tool.radius, 3.0 * tool.radius))
+        if kept:
+            yield kept
 
 
 def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], finished: NDArray[np.bool_],
@@ -105,6 +104,6 @@ def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], fin
 def _slots(field: TipField, z: float, allowance: float) -> NDArray[np.bool_]:
     """(ny, nx) bool: free places in strips too narrow for a ring; their walls are all there is to follow."""
     free = field.height <= z + LEVEL_TOLERANCE
-    far = field.off_blocked(z)
-    wide = free if far is None else far >= allowance
+    away = from_walls(field, z, allowance)
+    wide = free if away is None else away
     return np.asarray(free & ~dilated(np.asarray(wide), allowance / field.lattice.step + 1.0))

@@ -15,6 +15,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +75,8 @@ class TipField:
     allowance : mm, material to leave on the part: the cutting part is grown by it on all sides
     cusp   : mm, height that passes may leave above the allowance: shank and holder stay higher by it
     standing : DiscHeights of the same obstacles, shared with other tools
+
+    ``kept`` holds what callers computed last from this field alone, by their names.
     """
 
     def __init__(self, tree: TriangleTree, tool: ToolBody, clear: Clearances, bounds: F64, margin: float,
@@ -86,7 +89,8 @@ class TipField:
         self.noncut = self._noncut(self.discs)
         self._cut: F64 | None = None
         self._height: F64 | None = None
-        self._off: tuple[float, F64 | None] = (math.nan, None)
+        self._off: tuple[float, tuple[F64, NDArray[np.int32]] | None] = (math.nan, None)
+        self.kept: dict[str, Any] = {}
 
     def _noncut(self, discs: tuple[Disc, ...]) -> F64:
         grid = np.full((self.coarse.ny, self.coarse.nx), -np.inf)
@@ -129,7 +133,7 @@ class TipField:
         out = copy.copy(self)
         out.lattice = Lattice.over(np.array([lower, upper]), 0.0, step)
         out._cut = out._height = None
-        out._off = (math.nan, None)
+        out._off, out.kept = (math.nan, None), {}
         return out
 
     @property
@@ -228,12 +232,24 @@ class TipField:
     def off_blocked(self, z: float) -> F64 | None:
         """(ny, nx) float64, mm: distance of each node from the nearest one that is blocked at tip height z, mm.
 
-        None where no node is blocked. The last result is cached, since each layer uses it three times.
+        None where no node is blocked.
+        """
+        near = self.nearest_blocked(z)
+        return None if near is None else near[0]
+
+    def nearest_blocked(self, z: float) -> tuple[F64, NDArray[np.int32]] | None:
+        """Distance of each node, mm, from the nearest one that is blocked at tip height z, mm, and which that is.
+
+        Returns (ny, nx) float64, mm, and (2, ny, nx) int32, rows and columns; None where no node is blocked. The last result
+        is cached, since each layer uses it three times; do not write to it.
         """
         off = self._off  # read and written as a whole: several threads ask a field
         if off[0] != z:
             free = self.height <= z + LEVEL_TOLERANCE
-            off = z, None if free.all() else distance_transform_edt(free) * self.lattice.step
+            off = z, None
+            if not free.all():
+                far, near = distance_transform_edt(free, return_indices=True)
+                off = z, (far * self.lattice.step, near)
             self._off = off
         return off[1]
 

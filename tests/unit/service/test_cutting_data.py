@@ -126,7 +126,7 @@ def test_the_sweep_notices_what_it_should(monkeypatch):
 
 def test_what_layers_leave_is_what_the_planner_leaves():
     """``toolpath.planning.job_plan`` computes it where it plans them."""
-    assert left_by_layers(1.2, 0.08) == max(0.1 * 1.2, LATTICE_CARE * 0.08) == LATTICE_CARE * 0.08
+    assert left_by_layers(0.7, 0.08) == max(0.1 * 0.7, LATTICE_CARE * 0.08) == LATTICE_CARE * 0.08
     assert left_by_layers(2.0, 0.1) == max(0.1 * 2.0, LATTICE_CARE * 0.1) == 0.2
 
 

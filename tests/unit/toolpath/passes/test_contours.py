@@ -177,12 +177,12 @@ def test_pieces_found_exactly_only_where_they_stay_are_those_of_whole_contours(s
 @pytest.mark.parametrize("distance", [0.4, 1.1])
 def test_rings_keep_their_distance(distance):
     field = field_of(box_mesh([0, 0, 0], [8, 5, 4]), tool(3.0, 0.0))
-    lines = rings(field, 1.0, everywhere(field), distance, 100.0)[0]
+    lines = next(rings(field, 1.0, everywhere(field), (distance,), 100.0))
     p = np.vstack([dense(r.points, 0.05) for r in lines])
     outside = np.hypot(*(np.maximum(np.maximum([0, 0] - p[:, :2], p[:, :2] - [8, 5]), 0)).T)
     near = outside < 4.0
-    assert np.abs(outside[near] - 1.5 - distance).max() <= 1.5 * field.lattice.step
-    assert rings(field, 1.0, np.zeros((field.lattice.ny, field.lattice.nx), bool), 1.0, 1.0) == []
+    assert np.abs(outside[near] - 1.5 - distance).max() <= 0.005
+    assert not list(rings(field, 1.0, np.zeros((field.lattice.ny, field.lattice.nx), bool), (1.0,), 1.0))
 
 
 def test_moves_through_a_wall_are_seen_and_cut_out():
