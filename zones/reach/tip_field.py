@@ -240,8 +240,8 @@ class TipField:
     def nearest_blocked(self, z: float) -> tuple[F64, NDArray[np.int32]] | None:
         """Distance of each node, mm, from the nearest one that is blocked at tip height z, mm, and which that is.
 
-        Returns (ny, nx) float64, mm, and (2, ny, nx) int32, rows and columns; None where no node is blocked. The last result
-        is cached, since each layer uses it three times; do not write to it.
+        Returns (ny, nx) float64, mm, and (2, ny, nx) int32, rows and columns; None where no node is blocked. The last
+        result is cached, since each layer uses it three times; do not write to it.
         """
         off = self._off  # read and written as a whole: several threads ask a field
         if off[0] != z:
