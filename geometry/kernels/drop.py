@@ -254,13 +254,21 @@ def is_blocked(tree: TreeArrays, x, y, z, radius, corner_radius):
 
 
 @njit(**KERNEL)
+def lift_at(shape, corners, facets, slot, x, y):
+    """Lift of one triangle; -inf where it is none or too far away."""
+    if slot < 0:
+        return NOTHING
+    return lift_of(shape, triangle_at(corners, slot), facet_at(facets, slot), x, y, NOTHING)[0]
+
+
+@njit(**KERNEL)
 def blocked_by(tree: TreeArrays, x, y, z, radius, corner_radius, guess):
     """A triangle, by its place in leaf order, that makes ``is_blocked`` true; -1 where none does.
 
     guess : a triangle to ask first, -1 for none
     """
     shape, start = bull_of(radius, corner_radius), z + BLOCK_TOLERANCE
-    if guess >= 0 and lift_of(shape, triangle_at(tree.corners, guess), facet_at(tree.facets, guess), x, y, start)[0] > start:
+    if guess >= 0 and lift_at(shape, tree.corners, tree.facets, guess, x, y) > start:
         return guess
     return walk(tree, shape, x, y, start, True)[1]
 
@@ -325,14 +333,6 @@ def grid_parallel(tree, x0, y0, step, radius, corner_radius, out):
 
 
 # ======================================================================================================================
-
-
-@njit(**KERNEL)
-def lift_at(shape, corners, facets, slot, x, y):
-    """Lift of one triangle; -inf where it is none or too far away."""
-    if slot < 0:
-        return NOTHING
-    return lift_of(shape, triangle_at(corners, slot), facet_at(facets, slot), x, y, NOTHING)[0]
 
 
 @njit(**KERNEL)
