@@ -153,7 +153,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     findings = [*as_collisions(met_by, [p.program for p in framed]),
                 *cuts.gouges, *cuts.excluded, *loaded, *_program_findings(framed),
                 *(f for p in framed for f in p.findings(tools)), *_unlisted(run.lost, framed),
-                *table_findings([p.program for p in framed], tools, setup),
+                *(f for p in framed for f in table_findings([p.program], tools, p.setup)),
                 *_idle_findings(framed, run, moves, source, [t for t in fine if t.cone_height <= 0.0], asked),
                 *again, *sideways_findings(moves, run.cut, tools, source),
                 *torn_threads(moves, run.cut, tools, source),

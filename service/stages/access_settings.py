@@ -87,7 +87,8 @@ def proof_setup(job: JobPart, view: View | ProofFrame, *, foreign: bool = False)
     inputs = job.inputs
     c, q, machine = inputs.clearances, inputs.quality, inputs.machine
     # the height of the table is known in the setup frame only, so a proof in an oblique frame leaves the table out
-    tabled = ((inputs.turns or machine.table_z_mm is not None) and np.array_equal(view.rotation, np.eye(3))
+    level = bool(np.array_equal(view.rotation, np.eye(3)))
+    tabled = ((inputs.turns or machine.table_z_mm is not None) and level
               and not (foreign and machine.table_z_mm is None))
     cylinder, upwards = job.blank.proof_cylinder(view.rotation)
     return ProofSetup(
@@ -110,7 +111,7 @@ def proof_setup(job: JobPart, view: View | ProofFrame, *, foreign: bool = False)
         nose_diameter=machine.nose_diameter_mm, dogleg=_own_speeds(inputs, foreign),
         max_feed=machine.max_feed_mm_min, max_engaged=inputs.max_engaged, max_rpm=inputs.max_rpm,
         table=table_height(inputs, job.blank) if tabled else None,
-        table_known=machine.table_z_mm is not None, free_ratio=FREE_RATIO, walls_in_turn=in_turn(job),
+        table_known=level and machine.table_z_mm is not None, free_ratio=FREE_RATIO, walls_in_turn=in_turn(job),
         kinematics=inputs.kinematics, rotary_limits=inputs.rotary_limits,
         rotary_rate=None if machine.rotary_rate_deg_min is None else float(np.radians(machine.rotary_rate_deg_min)),
         left_alone=left_alone(job),

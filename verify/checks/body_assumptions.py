@@ -28,7 +28,7 @@ def body_assumptions(read: Sequence[FramedProgram], part: Part, moves: Moves, so
     part, moves : in the frame of the proof, mm; ``tools`` are those that ``moves`` refers to
     """
     return [*length_assumptions(read, setup), *_holders(part, moves, source, tools, setup, threads),
-            *_above_holders(part, moves, tools, setup), *_table(read, setup), *_changes(read)]
+            *_above_holders(part, moves, tools, setup), *_table(read), *_changes(read)]
 
 
 def length_assumptions(read: Sequence[FramedProgram], setup: ProofSetup) -> Iterator[Assumed]:
@@ -85,12 +85,14 @@ def _above_holders(part: Part, moves: Moves, tools: Sequence[ToolBody], setup: P
                       "a wider nose may enter part, stock or fixtures", NOSE_FIELD)
 
 
-def _table(read: Sequence[FramedProgram], setup: ProofSetup) -> Iterator[Assumed]:
-    if setup.table_known:
+def _table(read: Sequence[FramedProgram]) -> Iterator[Assumed]:
+    unsaid = [r for r in read if not r.setup.table_known]
+    if not unsaid:
         return
     deepest = [(float(r.bounds[0, 2] - r.program.end[m, 2]), r.program.name, int(r.program.line[m]))
-               for r in read if len(r.program) for m in [int(np.nanargmin(r.program.end[:, 2]))]]
-    value = "below everything" if setup.table is None else "at the bottom of the blank, for tilted tools only"
+               for r in unsaid if len(r.program) for m in [int(np.nanargmin(r.program.end[:, 2]))]]
+    value = "below everything" if all(r.setup.table is None for r in unsaid) else \
+        "at the bottom of the blank, for tilted tools only"
     depth, name, line = max(deepest, default=(0.0, "", 0))
     if depth > BELOW:
         value += f"; deepest under the part {depth:.3f} mm ({name}, line {line})"

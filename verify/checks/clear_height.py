@@ -13,6 +13,7 @@ from verify.program.program import Program
 
 UP = np.array([0.0, 0.0, 1.0])
 Z_AXIS = 4
+ROOM = 1.0  # mm: a way home has a length, wherever it begins
 
 
 def top_of_all(bounds: F64, setup: ProofSetup) -> float:
@@ -27,6 +28,31 @@ def _top_along(axis: F64, bounds: F64, setup: ProofSetup) -> float:
     """Largest coordinate along a direction, (3,), of the boxes round part, blank and fixtures, mm."""
     boxes = [bounds, stock_bounds(bounds, setup), *(np.asarray(f, dtype=np.float64) for f in setup.fixtures)]
     return max(float(np.where(axis > 0, b[1] * axis, b[0] * axis).sum()) for b in boxes)
+
+
+def lifted(program: Program, low: F64, bounds: F64, setup: ProofSetup) -> F64:
+    """Where the moves of a program end, with every way home in Z followed until all of the tool is above everything.
+
+    low    : (m,) float64, mm, lowest place of the tool on each move
+    bounds : (2, 3) float64, mm, frame of the program, of the part
+
+    Returns (m, 3) float64, mm, frame of the program.
+
+    Notes
+    -----
+    Z of the machine is that of the setup where the head tilts, and the tool axis where the table does.
+    """
+    if not program.lifts:
+        return program.end
+    end = program.end.copy()
+    heads = setup.kinematics is not None and setup.kinematics.tilts_head
+    for row, along in program.lifts:
+        up = UP if program.poses is None else program.poses.end_axis[row]
+        lowest = float(end[row] @ up)
+        if heads and not along:
+            up, lowest = UP, float(low[row])
+        end[row] += (max(_top_along(up, bounds, setup) - lowest, 0.0) + setup.clearance_rapid + ROOM) * up
+    return end
 
 
 def from_above(program: Program, height: float) -> Program:

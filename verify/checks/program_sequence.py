@@ -16,9 +16,9 @@ from geometry.mesh import F64
 from geometry.part import Part
 from geometry.tool_body import ToolBody
 from verify.blank.blank import stock_bounds
-from verify.checks.clear_height import from_above, top_of_all
+from verify.checks.clear_height import from_above, lifted, top_of_all
 from verify.checks.dogleg_turns import strays
-from verify.checks.machine_limits import limit_findings, notes_on, way_findings
+from verify.checks.machine_limits import limit_findings, low_places, notes_on, way_findings
 from verify.findings import Source
 from verify.model import Finding, NcProgram, ProofSetup, StockKind
 from verify.moves import Moves
@@ -38,7 +38,8 @@ class FramedProgram:
 
     program : as read
     turn    : (3, 3) float64, rotation from the frame of the proof to that of the program; None: the same frame
-    setup   : of the proof; where the frame is turned, boxes round blank and fixtures stand in for them
+    setup   : of the proof; where the frame is turned, boxes round blank and fixtures stand in for them, and the height
+              of the table is not known unless Z stays
     bounds  : (2, 3) float64, mm, of the part
     """
 
@@ -115,7 +116,9 @@ def _own(nc: NcProgram, part: Part, setup: ProofSetup) -> tuple[ProofSetup, F64]
     if nc.turn is None:
         return replace(setup, work_offset=offset), part.mesh.bounds
     there = part.mesh.vertices @ nc.turn.T
+    flat = bool(nc.turn[2, 2] > 1.0 - 1e-9)
     own = replace(setup, work_offset=offset, stock_kind=StockKind.BOX, stock_cylinder=None, stock_mesh=None,
+                  table=setup.table if flat else None, table_known=setup.table_known and flat,
                   stock_box=_box_round(stock_bounds(part.mesh.bounds, setup), nc.turn),
                   fixtures=tuple(_box_round(f, nc.turn) for f in setup.fixtures))
     return own, np.stack([there.min(axis=0), there.max(axis=0)])
@@ -141,7 +144,8 @@ def moves_of(read: Sequence[FramedProgram], tools: Sequence[ToolBody]) -> tuple[
     kind = np.concatenate([np.zeros(0, np.int8), *(p.kind for p in programs)])[known]
     line = np.concatenate([np.zeros(0, np.int32), *(p.line for p in programs)])[known]
     start = np.concatenate([np.zeros((0, 3)), *(r.here(r.program.start) for r in read)])[known]
-    end = np.concatenate([np.zeros((0, 3)), *(r.here(r.program.end) for r in read)])[known]
+    ends = (lifted(r.program, low_places(r.program, tools, r.setup), r.bounds, r.setup) for r in read)
+    end = np.concatenate([np.zeros((0, 3)), *(r.here(e) for r, e in zip(read, ends, strict=True))])[known]
     which = np.repeat(np.arange(len(read), dtype=np.int32), [len(p) for p in programs])[known]
     numbers, place = np.unique(number, return_inverse=True)
     tool = np.array([row[int(n)] for n in numbers], np.int32)[place.reshape(-1)]
@@ -194,6 +198,7 @@ def counted(read: Sequence[FramedProgram], numbers: Collection[int]) -> NDArray[
         if p.poses is not None:
             still &= (p.poses.start_turn == p.poses.end_turn).all(axis=1)
         still[p.unknown[:, 0]] = False
+        still[[row for row, _ in p.lifts]] = False
         out.append(np.isin(p.tool, list(numbers)) & ~still)
     return np.concatenate(out)
 

@@ -146,9 +146,24 @@ class BlockMotion(FrameWords):
                 self.log.remark("machine_turn", "a rotary axis turns during a move to a fixed place of the machine "
                                 f"from Z{s.position[2]:g}; the proof does not know that path: send Z home first",
                                 self.log.line)
+        along, s.along_tool = s.along_tool, False
+        if not (named[0] or named[1]):
+            self._lift(along)
         self._leave(named)
+        if along and s.tilted:
+            s.position = [NAN] * 3
         s.parked |= named[0] or named[1]
         return None if turn is None else self._stand(turn)
+
+    def _lift(self, along: bool) -> None:
+        """Write the way home in Z from a known place as a rapid of no length: only the proof knows how far it goes.
+
+        along : whether it goes along the tool
+        """
+        tip = self._tip()
+        if not any(map(math.isnan, tip)):
+            self.log.lifts.append((self.log.count, along))
+            self.log.move(tip, tip, RAPID, NAN, self.s.tool, 0)
 
     def _feed(self, values: dict[str, float]) -> float | None:
         s = self.s

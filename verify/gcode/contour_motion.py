@@ -29,8 +29,9 @@ from verify.gcode.work_offsets import Origins
 from verify.program.arc_chords import CHORD, PLANE_AXES, swept_points
 from verify.program.move_kinds import FEED, RAPID
 from verify.program.move_log import MAX_MOVES_A_BLOCK
-from verify.program.program import NAN
+from verify.program.program import NAN, StopPoint
 
+UNPLACED = "a rapid in Z alone, before X and Y are stated,"
 _UNSETTLED = "cutter radius compensation is on: end it with G40 first"
 
 
@@ -313,6 +314,9 @@ class ContourMotion(Origins):
         if s.parked and level and not known:
             self.log.remark("parked", "Z comes down at an X or Y of machine coordinates: program X and Y first",
                             self.log.line)
+        elif kind == RAPID and level and not known:
+            x, y, z = target
+            self.log.stops.append(StopPoint(self.log.line, UNPLACED, s.tool, (x, y, z), room=True))
         s.parked &= math.isnan(target[0]) or math.isnan(target[1])
         if known:
             if not self.log.moved:

@@ -89,7 +89,7 @@ class Reader(BlockMotion):
                        dialect, log.unbounded, tuple(log.pauses), log.leaves, tuple(log.places), cut_off,
                        open=() if self.control is None else tuple(self.control.assumed), cools=log.cools,
                        dwells=tuple(log.dwells), swaps=tuple(log.swaps), unplaced=tuple(log.unplaced),
-                       by_joints=frozenset(log.by_joints),
+                       by_joints=frozenset(log.by_joints), lifts=tuple(log.lifts),
                        own_speed=self.control is not None and self.control.own_speed)
 
     def served(self, key: int | str) -> float:

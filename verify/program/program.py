@@ -151,6 +151,8 @@ class Program:
     changes : number of times that a tool left the spindle
     dialect : dialect of the text
     own_speed : whether a word of the program makes each axis go at its own speed in a rapid
+    lifts   : rows of no length that stand for a way home in Z from a known place: row, and whether it goes along the
+              tool, not along Z of the machine
     unbounded : whether, somewhere, no word bounds the deviation from the path: ``leaves`` does not hold there
     pauses  : in order
     """
@@ -190,6 +192,7 @@ class Program:
     unplaced: tuple[int, ...] = ()
     by_joints: frozenset[int] = frozenset()
     own_speed: bool = False
+    lifts: tuple[tuple[int, bool], ...] = ()
 
     def __len__(self) -> int:
         return len(self.start)
@@ -204,6 +207,7 @@ class State:
     turn      : deg, the rotary axes, the tilting one first
     tcp_word, tcp_switch : tool centre point control by G43.4, by M428
     speed     : the S word, nan before the first
+    along_tool : whether the next way home in Z goes along the tool (M140 MB MAX)
     sent      : whether Z was ever sent to a fixed place of the machine
     parked    : whether X or Y stand at a fixed place of the machine (G53, G28, G30)
     cycle     : words of the drilling cycle in force, and the height where its series began
@@ -235,6 +239,7 @@ class State:
     cycle: dict[str, float] = field(default_factory=dict)
     parked: bool = False
     sent: bool = False
+    along_tool: bool = False
     turn: list[float] = field(default_factory=lambda: [0.0, 0.0])
     tcp_word: bool = False
     tcp_switch: bool = False

@@ -209,6 +209,10 @@ class Iso14649Reader:
             self.elements.append((number, place))
             return
         setup = self.data.maybe(number, "WORKPLAN", "its_setup")
+        if setup is not None:
+            plane = self.data.ref(setup, "SETUP", "its_secplane")
+            there = self.data.placement(self.data.ref(plane, "PLANE", "position"))
+            self.recorder.plane("security plane", there[:3, 3], there[:3, 2], self.file.line(setup))
         for element in self.data.refs(number, "WORKPLAN", "its_elements"):
             self._flatten(element, place if setup is None else self._setup(setup))
 
@@ -228,6 +232,7 @@ class Iso14649Reader:
         if entity in ("PROGRAM_STOP", "OPTIONAL_STOP"):
             self.recorder.stop("program stop", line)
         elif entity == "RETURN_HOME":
+            self._along(number, entity, line)
             self.recorder.stop("return to home", line)
         elif entity == "RAPID_MOVEMENT":
             self._rapid(place, number, line)
@@ -239,17 +244,23 @@ class Iso14649Reader:
     def _rapid(self, place: int, number: int, line: int) -> None:
         """Rapid movement; without a path it takes the next tool over the security plane to the next workingstep."""
         entity = "RAPID_MOVEMENT"
-        paths = self.data.maybe(number, entity, "its_toolpath")
-        if paths is not None:
-            self._paths(paths, np.eye(4), self._direction(number, entity), number, None, rapid=True)
-            return
         point, normal = self._plane(self.data.ref(number, entity, "its_secplane"))
+        if self._along(number, entity, line):
+            return
         self.recorder.over(point, normal, line)
         for later, _ in self.elements[place + 1:]:
             if self.data.get(later, *_EXECUTABLES)[0] == "MACHINING_WORKINGSTEP":
                 operation = self.data.ref(later, "MACHINING_WORKINGSTEP", "its_operation")
                 self._take(self.data.ref(operation, "FREEFORM_OPERATION", "its_tool"), line)
                 return
+
+    def _along(self, number: int, entity: str, line: int) -> bool:
+        """The security plane of a rapid movement or a return to home, and its path at rapid; whether it has one."""
+        self.recorder.plane("security plane", *self._plane(self.data.ref(number, entity, "its_secplane")), line)
+        paths = self.data.maybe(number, entity, "its_toolpath")
+        if paths is not None:
+            self._paths(paths, np.eye(4), self._direction(number, entity), number, None, rapid=True)
+        return paths is not None
 
     def _take(self, tool: int, line: int) -> None:
         self.recorder.take(self._cutter(tool), line)

@@ -327,3 +327,31 @@ def test_a_plane_in_the_part_is_a_finding():
     ours = read_stepnc(whole, tools=wanted.tools)
     low = np.array([[-20.0, -20.0, 0.0], [20.0, 20.0, wanted.clearance_plane - 2.0]])
     assert not [f for f in way_findings(ours, low, wanted.tools, setup) if "plane" in f.message]
+
+
+def test_a_way_home_and_its_path_are_followed():
+    """A RETURN_HOME is read like a rapid movement: its path at rapid, its plane, then a stop."""
+    wanted = plan()
+    whole = write_stepnc_arm(wanted)
+    ours = read_stepnc(whole, tools=wanted.tools)
+    lines = whole.split("\n")
+    with_path = [k for k, text in enumerate(lines) if re.search(r"=RAPID_MOVEMENT\('[^']*',#\d+,#\d+,", text)]
+    lines[with_path[-1]] = lines[with_path[-1]].replace("RAPID_MOVEMENT(", "RETURN_HOME(")
+    home = read_stepnc("\n".join(lines), tools=wanted.tools)
+    assert [s.line for s in home.stops if s.event == "return to home"] == [with_path[-1] + 1]
+    assert len(home) >= len(ours) and any((home.end == place).all(axis=1).any() for place in ours.end[-3:])
+
+
+@pytest.mark.parametrize("entity", ["SETUP", "RAPID_MOVEMENT", "RETURN_HOME"])
+def test_every_security_plane_counts(entity):
+    wanted = plan()
+    whole = write_stepnc_arm(wanted)
+    last = max(int(n) for n in re.findall(r"(?m)^#(\d+)=", whole))
+    low = (f"#{last + 1}=CARTESIAN_POINT('',(0.,0.,2.));\n#{last + 2}=AXIS2_PLACEMENT_3D('',#{last + 1},$,$);\n"
+           f"#{last + 3}=PLANE('low',#{last + 2});\nENDSEC;\nEND-ISO")
+    own = {"SETUP": r"(=SETUP\('[^']*',[^,]*,)#\d+", "RAPID_MOVEMENT": r"(=RAPID_MOVEMENT\('[^']*',)#\d+(?=,#)",
+           "RETURN_HOME": r"(=)RAPID_MOVEMENT\('[^']*',#\d+(?=,#)"}[entity]
+    word = "RETURN_HOME('home'," if entity == "RETURN_HOME" else ""
+    lower = re.sub(own, rf"\g<1>{word}#{last + 3}", whole, count=1).replace("ENDSEC;\nEND-ISO", low)
+    planes = {p.point[2] for p in read_stepnc(lower, tools=wanted.tools).planes}
+    assert planes == {2.0, wanted.clearance_plane}

@@ -275,6 +275,7 @@ class HeidenhainFrames(OrientedMoves):
         """
         if far == "MAX":
             self.forget()
+            self.machine.s.along_tool = True
             return ["G0 G53 Z0"]
         distance = self.value(far) * self.unit
         here = self.known("M140")
