@@ -169,6 +169,17 @@ def test_a_plunge_along_a_leaning_axis_is_as_deep_as_it_goes():
     assert len(down.events) == 0
 
 
+@pytest.mark.parametrize("off", [0.0, 1e-16, -1e-16, 1e-8, -1e-8, 0.05])
+def test_a_plunge_that_ends_in_a_layer_of_nodes_is_as_deep_as_any_other(off):
+    """Rounding decided there which nodes the end stood on: a plunge of 2 mm came out as 233 mm."""
+    tool, field = mill(6.0, 0.0), stock_field(MESH, block(), 0.15)
+    layers = field.origin[2] + field.step * np.arange(field.values.shape[2])
+    z = float(layers[np.argmin(np.abs(layers + 2.0))]) + off
+    run = run_field(field, path([[0.0, 0.0, 1.0], [0.0, 0.0, z]]), [tool], block(), bare=True)
+    (row,) = run.events
+    assert row[1] == PLUNGE and row[2] == pytest.approx(-z, rel=0.03)
+
+
 @pytest.mark.parametrize("steps", [20, 80])
 def test_a_way_downhill_is_a_plunge_as_deep_as_the_stock_it_leaves(steps):
     """However many steps it is written in: what was dug where the tool no longer stands is not dug again."""

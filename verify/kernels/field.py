@@ -35,6 +35,7 @@ from verify.kernels.tables import F64, I64, AxisArrays, ContactLimits, MoveArray
 
 LEAST_CUT = 1e-5
 NEAR = 1e-9  # mm, more than rounding of a distance
+ON_NODE = 1e-6  # mm: a layer of nodes in the plane of an end counts whole, whatever the rounding of its distances
 RISE = 0.02  # mm: a tool that goes up goes no further between two looks at its bodies, where they met what stood before
 MAX_LOOKS = 128
 VOLUME_UNITS = 1e9
@@ -172,7 +173,7 @@ def _cut_brick(stock, tile, brick, p, cutter, steep, end_radius, twist, engaged,
                         top = max(top, v)
                         continue
                     d = max(carried(qx, qy, qz, dx, dy, dz, a, r, length, cone), -band)
-                    if steep and 0.0 < d <= h and v > 0.0 and qz - dz <= corner:
+                    if steep and -ON_NODE < d <= h - ON_NODE and v > 0.0 and qz - dz <= corner:
                         off = math.sqrt((qx - dx) ** 2 + (qy - dy) ** 2)
                         totals[4] += h * h * min(max(0.5 + (end_radius - off) / h, 0.0), 1.0)
                     if d < v - LEAST_CUT:
