@@ -38,6 +38,7 @@ class Pace:
     under  : feed for a depth, mm, and an engaged angle, rad; ``feed`` is the minimum
     layer  : mm, depth of a layer
     hidden : where the stock map shows nothing, on passes that remove what the map does not show; None: that is air
+    rim    : lattice steps by which the disc is larger in which the depth is looked for, as in ``StockMap.overlap``
     """
 
     feed: float
@@ -45,6 +46,7 @@ class Pace:
     under: Callable[[float, float], float]
     layer: float
     hidden: float | None = None
+    rim: float = -0.8
 
 
 def paced(points: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> list[tuple[bool, F64, float]]:
@@ -88,7 +90,7 @@ def _in_stock(way: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> NDArray[
     is missed by a row of nodes. It is no thicker than ``SURE_RIM`` of a step. A cutter that breaks through it has it in
     front over at most 2 arccos (1 - thickness / radius).
     """
-    over = stock.overlap(way, tool, lower_bound=0.0)
+    over = stock.overlap(way, tool, pace.rim, lower_bound=0.0)
     depth = np.ceil(over / pace.layer * DEPTHS - 1e-9).astype(np.int64)
     turn = np.ceil(angles(stock, way, tool) / ANGLE - 1e-9).astype(np.int64)
     missed = 2.0 * math.acos(max(1.0 - SURE_RIM * stock.lattice.step / tool.radius, 0.0))

@@ -323,23 +323,24 @@ class _Layers:
             self._walk(linker, z, _own(field, self.tips, z))
         return made + self._step(number + len(made), "semi_finishing", linker)
 
-    def _rim_pace(self, depth: float) -> Pace:
-        """Feeds along a wall that is taken to size at a depth, mm: deflecting the tool no more than a finish may.
+    def _rim_pace(self, deepest: float) -> Pace:
+        """Feeds along a wall that is taken to size down to a depth, mm: deflecting the tool no more than a finish may.
 
-        Stock that the lattice hides is no wider than the lattice can hide, stock that it shows is wider by that at
-        most. Beside a wall it is no wider than the allowance. A slot too narrow for a ring has only a rim: there the
-        feed is that of layers.
+        Beside a wall stands no more than the allowance, and no higher than the wall or stock within a node of the
+        cutter, or ``deepest``. What the lattice hides is no wider than the lattice can hide, and as deep as that. A
+        slot too narrow for a ring has only a rim: there the feed is that of layers.
         """
         cut, tool, hides = self.cut, self.field.tool, SURE_RIM * self.field.lattice.step
         fine = cut.finish or cut
-        widest = fine.under(depth, self.allowance).feed
+        hidden = fine.under(deepest, hides).feed
 
         def seen(deep: float, angle: float) -> float:
             wide = 0.5 * tool.diameter * (1.0 - math.cos(angle)) + hides
-            least = widest if wide >= self.allowance else fine.under(depth, wide).feed
-            return min(least, cut.feed_under(tool, deep, angle))
+            beside = fine.under(min(deep, deepest), min(wide, self.allowance)).feed
+            return min(beside, hidden, cut.feed_under(tool, deep, angle))
 
-        return Pace(min(cut.feed, widest), cut.link_feed, seen, cut.step_down, fine.under(depth, hides).feed)
+        return Pace(min(cut.feed, fine.under(deepest, self.allowance).feed), cut.link_feed, seen, cut.step_down, hidden,
+                    SURE_RIM)
 
     def _thinner(self) -> CutData:
         """The cut of the stock between layers: a slot at most, a part of a layer deep."""
