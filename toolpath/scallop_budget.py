@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 LAID_SHARE = 0.8  # of the scallop, for passes whose envelope is measured; chords, facets and program take the rest
-CUSP_SHARE = 0.55  # of the scallop, for the distance between level passes; reach and chord take the rest
+CUSP_SHARE = 0.68  # of the scallop, for the distance between level passes; reach and chord take the rest
 PASS_SHARE = 0.85  # of the scallop: a sample with less left is done
 REACH_SHARE = 0.1  # of the scallop: lift of the tool off the part
 CHORD_SHARE = 0.5  # of the chordal tolerance: chords between the locations of a pass
