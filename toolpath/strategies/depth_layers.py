@@ -12,6 +12,7 @@ from toolpath.passes.contours import contours, dilated, from_walls, rings
 from toolpath.stock.stock_map import SURE_RIM, StockMap
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
+ROUND_CORNERS = 3.5  # lattice steps, beyond three allowances: ways round the ends of finished walls have no rim
 STOCK_WORTH = 0.05  # mm of stock above the cutter that makes a place worth a pass
 EVEN = 0.25  # of the deepest layer, how uneven stock may stay along the axis where it is evened out
 
@@ -87,7 +88,7 @@ def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], fin
     alone     : (ny, nx) bool on the lattice, where the tool would touch walls that are not to be machined; None: none
     """
     lat, tool = field.lattice, field.tool
-    skip = dilated(finished, 3.0 * allowance / lat.step + 2.0) & ~_slots(field, z, allowance)
+    skip = dilated(finished, 3.0 * allowance / lat.step + ROUND_CORNERS) & ~_slots(field, z, allowance)
     if unseen:
         skip = np.zeros_like(skip)
     if alone is not None:
