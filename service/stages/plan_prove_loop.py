@@ -15,6 +15,7 @@ from itertools import takewhile
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.child_process import give_back_memory
 from geometry.sampling import SurfaceSamples
 from service.delivery.written_program import WrittenProgram
 from service.stages.access_plan import AccessPlan, ProofFrame
@@ -107,6 +108,7 @@ def plan_and_prove(resumed: Resumed, scored: Score, trimmed: Mapping[str, Sequen
             access_plans.append(resumed.access_plan(view, access_plans, feedback.along(view.id), make))
         plan = Plan(tuple(t for a in access_plans for t in a.plan.steps),
                     tuple(z for a in access_plans for z in a.plan.zones))
+        give_back_memory()
         zone, given_up = scored.without(plan, ready.zones)
         written = programs_of(ready, access_plans, trimmed)
         programs = [p.given() for p in written]

@@ -315,6 +315,8 @@ class _Layers:
             for line in nearest_order(rims, linker.at, False):
                 linker.add(turned(line, settings))
             linker.pace = usual
+        if not self.left:
+            field.forget()
         made = self._step(number, "roughing", linker)
         if not settings.semi_finishing:
             return made

@@ -136,6 +136,10 @@ class TipField:
         out._off, out.kept = (math.nan, None), {}
         return out
 
+    def forget(self) -> None:
+        """Drop what is kept of the last height."""
+        self._off, self.kept = (math.nan, None), {}
+
     @property
     def grown_radius(self) -> float:
         """Radius of the cutting part with the allowance, mm."""
