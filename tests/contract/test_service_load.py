@@ -25,12 +25,12 @@ SETUP = {"tools": [{"id": "T1", "kind": "flat", "diameter_mm": 4, "flute_length_
 ALONE = """
 import sys
 from pathlib import Path
-from service import chain
+from service import pipeline
 from schemas.setup import canonical_json
 from service.from_wire import parse_setup
 part, setup, out = map(Path, sys.argv[1:])
 kept = canonical_json(parse_setup(setup.read_text())).decode()  # what a job keeps has all defaults filled in
-chain.plan(part, parse_setup(kept), out, lambda *_: None)
+pipeline.plan(part, parse_setup(kept), out, lambda *_: None)
 """
 # Of what a process grows by, this much is its caches filling; a leak of 100 bytes an answer would be twice that.
 ALLOWED_MB, ALLOWED = 15.0, 0.10

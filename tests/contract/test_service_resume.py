@@ -26,11 +26,11 @@ PLAIN = """
 import sys
 from pathlib import Path
 from schemas.setup import canonical_json
-from service import chain
+from service import pipeline
 from service.from_wire import parse_setup
 folder = Path(sys.argv[1])
 kept = canonical_json(parse_setup((folder / "setup.json").read_text())).decode()  # with all defaults, as a job keeps it
-chain.plan(folder / "part.step", parse_setup(kept), folder / "out", lambda *_: None)
+pipeline.plan(folder / "part.step", parse_setup(kept), folder / "out", lambda *_: None)
 """
 
 
