@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -335,6 +336,20 @@ def gauge_lengths(tools: Sequence[Tool], bodies: Sequence[ToolBody]) -> dict[int
 def gauges_given(tools: Sequence[Tool]) -> frozenset[int]:
     """T numbers of the tools whose gauge length the setup states."""
     return frozenset(t.number for t in tools if t.gauge_given and t.number is not None)
+
+
+def change_in_frame(change: Sequence[float] | None, *, level: bool) -> tuple[float, ...] | None:
+    """Place of the spindle face at a tool change in the frame of a proof; nan in a frame that is not the setup frame.
+
+    change : mm, setup frame, Z or X, Y and Z, or None
+    level  : whether the frame of the proof is the setup frame
+
+    In another frame the part is clamped anew, and the setup does not state where.
+
+    >>> change_in_frame([100.0], level=True), change_in_frame([100.0], level=False)
+    ((100.0,), (nan,))
+    """
+    return None if change is None else tuple(change) if level else (math.nan,) * len(change)
 
 
 def face_numbers(ids: list[str]) -> tuple[int, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 from geometry.mesh import TriangleMesh
 from geometry.sampling import lattice_samples
 from schemas.setup import Lean
-from service.from_wire import face_numbers, gauges_given
+from service.from_wire import change_in_frame, face_numbers, gauges_given
 from service.setup_assumptions import planned_sense, setup_assumptions
 from service.stages.access_plan import ProofFrame
 from service.stages.job_inputs import RAMP_ANGLE, JobInputs
@@ -107,7 +107,7 @@ def proof_setup(job: JobPart, view: View | ProofFrame, *, foreign: bool = False)
         gauge_length=inputs.gauge_lengths,
         gauge_given=gauges_given(inputs.tools),
         line_spacing=min(ProofSetup.line_spacing, inputs.engagement_spacing),
-        change_position=None if machine.change_position is None else tuple(machine.change_position),
+        change_position=change_in_frame(machine.change_position, level=level),
         nose_diameter=machine.nose_diameter_mm, dogleg=_own_speeds(inputs, foreign),
         max_feed=machine.max_feed_mm_min, max_engaged=inputs.max_engaged, max_rpm=inputs.max_rpm,
         table=table_height(inputs, job.blank) if tabled else None,

@@ -5,13 +5,20 @@ This module imports nothing that is compiled, so that the refusal comes at once.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from geometry.errors import SetupError
 from schemas.machine import Machine
 from schemas.setup import Setup
-from service.from_wire import check_spindle_tool, gauge_lengths, gauges_given, machine_kinematics, tool_bodies
+from service.from_wire import (
+    change_in_frame,
+    check_spindle_tool,
+    gauge_lengths,
+    gauges_given,
+    machine_kinematics,
+    tool_bodies,
+)
 from service.verification.rotary_sense import assumed_sense, check_gauges, check_sense, sense_in_header
 from verify.assumptions import Assumed, AssumedKind
 from verify.gcode.dialects import candidates, likeliest, others
@@ -64,6 +71,7 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
                          subjects=(access,), remedy="name one of them, or leave it out for the first")
     check_spindle_tool(setup, spindle_tool)
     own = known[access] if access is not None else setup.access[0]
+    level = (access is None and machine_kinematics(setup.machine) is not None) or _up(own.direction)
     may = candidates(text, ending) if dialect is None else [dialect]
     nc = NcProgram("program", text, dialect=dialect or likeliest(may, setup.machine.dialects))
     tools, machine = tool_bodies(setup), machine_kinematics(setup.machine)
@@ -72,7 +80,8 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
     def reading(of: Kinematics | None, program: NcProgram = nc, longer: Mapping[int, float] | None = None) -> Program:
         return read_one(program, tools, work_offset=own.work_offset, gouge_tolerance=setup.quality.gouge_tolerance_mm,
                         kinematics=of, gauge_length={**gauges, **(longer or {})}, spindle_tool=spindle_tool,
-                        change=setup.machine.change_position, gauge_given=gauges_given(setup.tools))
+                        change=change_in_frame(setup.machine.change_position, level=level),
+                        gauge_given=gauges_given(setup.tools))
 
     if dialect is None and not is_exchange_file(text):
         assumed.extend(_assumed_dialect(nc.dialect, others(may, _stated_dialects(setup))))
@@ -93,6 +102,11 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
                                "program M8 or M9, or state machine.coolant off"))
     whole = read_on(nc, read, lambda program: reading(stated or machine, program))
     return ProgramFirst(nc, read, access, spindle_tool, stated or machine, tuple(assumed), whole)
+
+
+def _up(direction: Sequence[float]) -> bool:
+    """Whether a direction is +Z, so that the frame of its access is the setup frame."""
+    return not any(direction[:2]) and direction[2] > 0
 
 
 def _stated_dialects(setup: Setup) -> list[str]:

@@ -5,6 +5,7 @@ Arrays are float64, mm or dimensionless for directions.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
@@ -39,7 +40,7 @@ class FramedProgram:
     program : as read
     turn    : (3, 3) float64, rotation from the frame of the proof to that of the program; None: the same frame
     setup   : of the proof; where the frame is turned, boxes round blank and fixtures stand in for them, and the height
-              of the table is not known unless Z stays
+              of the table and the place of tool changes are not known unless Z stays
     bounds  : (2, 3) float64, mm, of the part
     """
 
@@ -103,7 +104,7 @@ def read_all(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], s
         share = stages.span(done / total, (done + len(nc.text)) / total)
         program = known[k] if known is not None else read_one(
             nc, tools, work_offset=own.work_offset, gouge_tolerance=setup.gouge_tolerance, kinematics=setup.kinematics,
-            gauge_length=setup.gauge_length, spindle_tool=spindle_tool, report=share, change=setup.change_position,
+            gauge_length=setup.gauge_length, spindle_tool=spindle_tool, report=share, change=own.change_position,
             gauge_given=setup.gauge_given)
         read.append(FramedProgram(from_above(program, top + setup.clearance_rapid), nc.turn, own, bounds))
         done += len(nc.text)
@@ -118,6 +119,8 @@ def _own(nc: NcProgram, part: Part, setup: ProofSetup) -> tuple[ProofSetup, F64]
     there = part.mesh.vertices @ nc.turn.T
     flat = bool(nc.turn[2, 2] > 1.0 - 1e-9)
     own = replace(setup, work_offset=offset, stock_kind=StockKind.BOX, stock_cylinder=None, stock_mesh=None,
+                  change_position=setup.change_position and (
+                      *[math.nan] * (len(setup.change_position) - 1), setup.change_position[-1] if flat else math.nan),
                   table=setup.table if flat else None, table_known=setup.table_known and flat,
                   stock_box=_box_round(stock_bounds(part.mesh.bounds, setup), nc.turn),
                   fixtures=tuple(_box_round(f, nc.turn) for f in setup.fixtures))

@@ -17,7 +17,8 @@ from verify.program.program import NAN, Swap
 class ToolChanges(Rotary):
     """Tool changes of one reading.
 
-    change  : mm, setup frame, Z or X, Y and Z of the spindle face at a tool change; None where it is not known
+    change  : mm, frame of the program, Z or X, Y and Z of the spindle face at a tool change, nan where the frame leaves
+              them open; None where the setup states none
     hangs   : mm by T number, spindle face to tip, of the tools whose length is known; 0 for an empty spindle
     stays   : whether the control changes the tool where the spindle stands
     """
@@ -37,6 +38,8 @@ class ToolChanges(Rotary):
             self._leave([len(self.change) == 3, len(self.change) == 3, True])
             s.position[:2] = self.change[:2] if len(self.change) == 3 else s.position[:2]
             s.position[2] = NAN if length is None else self.change[-1] - length
+            if math.isnan(self.change[-1]):
+                log.unplaced.append(log.line)
             s.parked = False
             return
         height, before = s.position[2], self.hangs.get(old)

@@ -1,5 +1,8 @@
 """Empty spindles, tools that hang lower after a change, and what a proof takes for granted of them."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,10 +12,11 @@ from tests.pocket_case import block
 from verify.assumptions import AssumedKind
 from verify.checks.body_assumptions import length_assumptions
 from verify.checks.empty_spindle import SMALLEST_NOSE
-from verify.checks.program_sequence import FramedProgram
+from verify.checks.program_sequence import FramedProgram, read_all
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
 from verify.model import NcProgram, ProofSetup, ScoredSamples, StockKind
+from verify.progress import silent
 from verify.prove import prove
 from verify.tool_bodies import NOSE_LENGTH, Bodies
 
@@ -54,6 +58,19 @@ def test_a_shorter_tool_hangs_higher_and_an_empty_spindle_ends_at_its_face():
 def test_a_stated_change_position_counts(change, place):
     p = read("G0 Z30", "T2 M6", "S900 M3", "G43 H2", "G0 X5", change=change)
     assert p.end[-1].tolist() == place and not p.swaps and not p.unplaced
+
+
+def test_a_change_position_of_another_frame_is_left_open():
+    """It is stated in the setup frame; in the frame of another access the part is clamped anew."""
+    p = read("G0 Z30", "T2 M6", "S900 M3", "G43 H2", "G0 X5 Y5 Z9", "X7", change=(math.nan,))
+    assert p.unplaced == (3, 9) and not p.swaps and p.end[-1].tolist() == [7, 5, 9]
+    setup = replace(SETUP, change_position=(300.0,))
+    turn = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+    text = HEAD + "\n".join(["G0 Z90", "T2 M6", "S900 M3", "G43 H2", "G0 X5 Y5 Z99", "M5", "M30", "%"]) + "\n"
+    def told(turn):
+        (f,) = read_all([NcProgram("p", text, turn=turn)], block(), (SHORT_TOOL, LONG_TOOL), setup, 0, silent)
+        return f.program.unplaced
+    assert told(turn) == (3, 9) and told(None) == () and told(np.diag([-1.0, -1.0, 1.0])) == ()
 
 
 @pytest.mark.parametrize(("before", "told"), [("G53 G0 Z0.", False), ("G0 Z30.", True)])
