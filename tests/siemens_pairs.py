@@ -99,7 +99,7 @@ PAIRS = {
     # words without a move
     "idle words": ("MSG(\"a; b\")\nWORKPIECE(,,,\"BOX\",112,0,-20,-80,-20,-20,60,60)\nSOFT FFWON DYNFINISH\nG1 X1 G9 "
                    "G601\n"
-                   "FGROUP(X,Y,Z)\nOVR=80 ACC[X]=50\n$AC_TIMER[1]=0\nGROUP_BEGIN(0,\"a\",0,0)\nMSG()\nY1 M41 H5",
+                   "FGROUP(X,Y,Z)\nACC[X]=50\n$AC_TIMER[1]=0\nGROUP_BEGIN(0,\"a\",0,0)\nMSG()\nY1 M41 H5",
                    "G1 X1\nY1"),
     "a spindle that stands": ("G1 X1\nSPOS=DC(90)\nSPOS=0\nM3\nX2", "G1 X1\nM5\nM3\nX2"),
     "run from the start": ("IF $P_SEARCH OR $P_SIM GOTOF OUT\nG1 X1\nOUT: Y1\nWAITP(C)\nX2", "G1 X1\nY1\nX2"),

@@ -15,6 +15,7 @@ class AssumedKind(StrEnum):
     TRAVEL = "travel"
     MAX_RPM = "max_rpm"
     ROTARY_SENSE = "rotary_sense"
+    TIP_CONTROL = "tip_control"
     GAUGE_LENGTH = "gauge_length"
     HOLDER = "holder"
     ABOVE_HOLDER = "above_holder"

@@ -26,6 +26,10 @@ from verify.program.move_log import MAX_MOVES_A_BLOCK
 from verify.program.program import NAN
 from verify.program.turn_subdivision import TIP
 
+COUNT, INCH_COUNT = 1e-3, 2.54
+"""mm, what controls count in, and what that is in inches (0.0001 inch) by comparison."""
+SAME_ENDS = 1e-6
+"""mm: ends of an arc that are no farther apart are one place in ``arc_sweep``."""
 WAY_HOME = "a move of X or Y to a fixed place of the machine"
 _EXITS = {74: HoleExit.FEED_TO_CLEAR, 84: HoleExit.FEED_TO_CLEAR, 85: HoleExit.FEED_TO_CLEAR, 89: HoleExit.FEED}
 
@@ -167,7 +171,7 @@ class BlockMotion(FrameWords):
 
     def _feed(self, values: dict[str, float]) -> float | None:
         s = self.s
-        feed = values.get("F", NAN) if s.feed_mode == 93 else s.feed
+        feed = (values.get("F", NAN) if s.feed_mode == 93 else s.feed) * s.override
         if not feed > 0:
             self.log.error("inverse time feed (G93) needs F in every block" if s.feed_mode == 93
                            else "a feed move without a feed (F)")
@@ -215,6 +219,8 @@ class BlockMotion(FrameWords):
                 return error(f"the word {'IJK'[axes[2]]} has no meaning in plane G{s.plane}")
             sweep = arc_sweep(start, end, centre, s.motion == 2, axes, turns)
             middle = float(centre[0]), float(centre[1])
+            if "R" not in values and not self.fits:
+                self._one_place(start[list(axes[:2])], end[list(axes[:2])], centre)
             if self.contour is not None:
                 rate, _ = self._timing(feed, _length(start, end, centre, sweep, axes), turn)
                 return self._bow(target, complex(*middle), sweep, rate)
@@ -233,6 +239,21 @@ class BlockMotion(FrameWords):
         for k, p in enumerate(points, 1):
             self._line_to(p, FEED, rate, None if turn is None else between(was, turn, k / n), minutes / n)
         return None
+
+    def _one_place(self, start: F64, end: F64, centre: F64) -> None:
+        """Tell of an arc whose ends a control that counts in 0.001 mm (0.0001 inch) takes for one place.
+
+        start, end, centre : (2,) mm, in the plane of the arc
+
+        An arc that ends where it begins is a whole circle.
+        """
+        step, apart = COUNT * (1.0 if self.s.scale == 1.0 else INCH_COUNT), float(np.hypot(*(end - start)))
+        if apart < SAME_ENDS or math.dist(start, centre) < step:
+            return
+        if any((cut(start / step) == cut(end / step)).all() for cut in (np.round, np.trunc)):
+            self.log.remark("short_arc", f"the ends of an arc are {apart:.2g} mm apart: a control that counts in "
+                            f"{step:g} mm takes them for one place and runs a whole circle of radius "
+                            f"{math.dist(start, centre):.3f} mm; write a straight line")
 
     def _arc_chord(self, turn: list[float] | None) -> float:
         """Largest distance of chords from their arc, mm; half where a turning axis bends the tip path once more."""

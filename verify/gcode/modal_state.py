@@ -69,6 +69,7 @@ class Modes(ToolChanges):
         self._in_order(lambda: self.log.runs(speed, coolant))
         if not {428, 429}.isdisjoint(block.ms):
             self._control(s.tcp_word, 428 in block.ms)
+            self.tip_told = True
         for g in sorted(block.codes, key=lambda g: g != 80):  # with a motion word G80 only ends the cycle before it
             self._mode(g, values)
         if 64 in block.codes:
@@ -249,6 +250,7 @@ class Modes(ToolChanges):
         """G43 and G49 end the tool centre point control of G43.4: one modal group."""
         s = self.s
         self._control(g == 43.4, s.tcp_switch)
+        self.tip_told |= g == 43.4
         if g == 49:
             s.offset, s.length = None, 0.0
             return

@@ -24,6 +24,7 @@ import numpy as np
 
 from geometry.errors import ProgramError, VerificationError
 from geometry.mesh import F64
+from verify.assumptions import Assumed, AssumedKind
 from verify.gcode.block_motion import BlockMotion
 from verify.gcode.block_words import Block, BlockError, parse_block, straight, used_letters
 from verify.gcode.dialects import CONTROLS, DIALECTS, LINUXCNC, translated_blocks
@@ -87,10 +88,19 @@ class Reader(BlockMotion):
                        log.turned.minutes(np.linalg.norm(end - start, axis=1), feed),
                        log.turned.poses(len(table), self.machine), tuple(log.notes), speed, coolant, log.changes,
                        dialect, log.unbounded, tuple(log.pauses), log.leaves, tuple(log.places), cut_off,
-                       open=() if self.control is None else tuple(self.control.assumed), cools=log.cools,
-                       dwells=tuple(log.dwells), swaps=tuple(log.swaps), unplaced=tuple(log.unplaced),
-                       by_joints=frozenset(log.by_joints), lifts=tuple(log.lifts),
-                       own_speed=self.control is not None and self.control.own_speed)
+                       open=self._left_open(), cools=log.cools, dwells=tuple(log.dwells),
+                       swaps=tuple(log.swaps), unplaced=tuple(log.unplaced), by_joints=frozenset(log.by_joints),
+                       lifts=tuple(log.lifts), own_speed=self.control is not None and self.control.own_speed)
+
+    def _left_open(self) -> tuple[Assumed, ...]:
+        """What the program leaves to the control."""
+        if self.control is not None:
+            return tuple(self.control.assumed)
+        if not self.by_axes:
+            return ()
+        return (Assumed(AssumedKind.TIP_CONTROL, f"off ({self.log.name}, line {self.by_axes})",
+                        "kinematics such as xyzac-trt start with it on: X, Y and Z are then the tip, and the tool goes "
+                        "elsewhere", "program M428 or M429 before the rotary axes turn"),)
 
     def served(self, key: int | str) -> float:
         """A parameter that the control serves (``verify.gcode.flow.system_parameters``)."""
@@ -186,7 +196,7 @@ class Reader(BlockMotion):
                             rows.append((px, py, pz, ex, ey, ez, RAPID, NAN, s.tool, number))
                             continue
                         if s.feed > 0:
-                            rows.append((px, py, pz, ex, ey, ez, FEED, s.feed, s.tool, number))
+                            rows.append((px, py, pz, ex, ey, ez, FEED, s.feed * s.override, s.tool, number))
                             continue
                         s.position = [px, py, pz]
             log.line = number

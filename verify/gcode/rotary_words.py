@@ -30,6 +30,7 @@ class Rotary:
     machine : rotary axes of the machine, or None
     gauge   : mm by T number, spindle face to tip
     stated_axes : letters of the rotary axes whose angle the program has stated
+    tip_told : whether a word says if the tip is controlled; by_axes : first line that moves turned axes before one does
     """
 
     def __init__(self, log: Log, machine: Kinematics | None, gauge: Mapping[int, float]) -> None:
@@ -37,6 +38,8 @@ class Rotary:
         self.rotary = machine.letters if machine else ""
         self.s = State()
         self.stated_axes: set[str] = set()
+        self.tip_told = False
+        self.by_axes = 0
 
     def _turn(self, values: Mapping[str, float], *, absolute: bool = False) -> list[float] | None:
         """(2,) deg, angles of the axes after the rotary words of a block; None where it has none."""
@@ -136,6 +139,8 @@ class Rotary:
         if not turning and (s.tcp or not s.tilted):
             log.move(start, target, kind, feed, s.tool, unknown | TURNED if unknown and s.tilted else unknown)
             return
+        if not (s.tcp or self.tip_told or self.by_axes):
+            self.by_axes = log.line
         gauge = 0.0 if s.tcp else self._gauge()
         if gauge is None:
             self._no_tips()
@@ -158,7 +163,7 @@ class Rotary:
         if s.motion == 0:
             self._write(start, s.position, RAPID, NAN, 0, turn, NAN)
         else:
-            rate, minutes = self._timing(s.feed, math.dist(start, s.position), turn)
+            rate, minutes = self._timing(s.feed * s.override, math.dist(start, s.position), turn)
             self._write(start, s.position, FEED, rate, 0, turn, minutes)
 
     def _swing(self, start: list[float], target: list[float], kind: int, feed: float, was: list[float],

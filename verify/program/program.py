@@ -218,6 +218,7 @@ class State:
     length    : mm, by which the length offset in force differs from the length of the tool
     side      : of the cutter radius compensation in force, 1 left, -1 right, 0 off; d : its register
     frame     : rotation, mirror and scale of the programmed coordinates, None for none
+    override  : factor of feeds that the program states (OVR of Siemens)
     """
 
     position: list[float] = field(default_factory=lambda: [NAN, NAN, NAN])
@@ -228,6 +229,7 @@ class State:
     centre_absolute: bool = False
     feed_mode: int = 94
     feed: float = NAN
+    override: float = 1.0
     speed: float = NAN
     spindle: bool = False
     coolant: bool = False

@@ -25,6 +25,7 @@ _PLAIN = re.compile(r"(?:N[0-9]+ ?)?(?:G0?[01] ?)?(?:[XYZABC][+-]?(?:[0-9]*\.[0-
 _WORD = re.compile(rf"([A-Z])({NUMBER})")
 _NAME = re.compile(r"[O:](?:[0-9]+|<[^<>]*>)?(?:<[^<>]*>)?|<[^<>]*>")
 _CORNER = re.compile(r",[RC][-+.0-9]*")
+_PAIR = re.compile(r"\([^()]*\)")
 _TAPE = re.compile(r"%[O:]?[0-9]*")
 _DELETED = re.compile(r"(N[0-9]+)?/[1-9]?(?=[A-Z]|$)")
 _FOREIGN: dict[str, frozenset[float]] = {
@@ -169,8 +170,7 @@ class FanucReader(FanucPlanes):
 
     def _bare(self, raw: str) -> str:
         """The line without comments and blanks."""
-        while (less := re.sub(r"\([^()]*\)", " ", raw)) != raw:
-            raw = less
+        raw = _uncommented(raw)
         before, _, after = raw.partition(";")
         if _may_run(after):
             raise BlockError(f"'{after.strip()[:40]}' follows a ; which ends the block: give it its own line")
@@ -268,6 +268,31 @@ class FanucReader(FanucPlanes):
     def _after(self, codes: list[float]) -> list[str]:
         """Blocks that follow a block with these G words."""
         return []
+
+
+def _uncommented(raw: str) -> str:
+    """A line without its comments. A comment ends at its first closing parenthesis; pairs within it are let pass.
+
+    Raises
+    ------
+    BlockError
+        Between that parenthesis and the one that closes the outer pair stands what the control may run.
+    """
+    out, at = [], 0
+    while (opened := raw.find("(", at)) >= 0:
+        depth, end = 1, opened + 1
+        while end < len(raw) and depth:
+            depth += {"(": 1, ")": -1}.get(raw[end], 0)
+            end += 1
+        if depth:
+            break
+        behind = _PAIR.sub(" ", raw[raw.index(")", opened) + 1:end - 1])
+        if _may_run(behind):
+            raise BlockError(f"'{behind.strip()[:40]}' stands behind the first ) of a comment, and the control may run "
+                             "it: write the comment without parentheses in it")
+        out += [raw[at:opened], " "]
+        at = end
+    return "".join([*out, raw[at:]])
 
 
 def _may_run(text: str) -> bool:

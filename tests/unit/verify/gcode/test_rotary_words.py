@@ -256,3 +256,12 @@ def test_what_home_and_increments_say_of_where_an_axis_stood():
                          ("G53 G0 A0 C0", ()), ("G0", ("A0", "C0"))):
         p = read_program(f"T1 M6\nG43 H1\nM428\n{words}\nG90 G0 X0 Y0 Z50\nM30\n", kinematics=machine)
         assert tuple(w for w in p.assumed if w in ("A0", "C0")) == taken, words
+
+
+@pytest.mark.parametrize(("body", "line"), [
+    ("G0 A30\nG1 X1 F100\n", 9), ("M429\nG0 A30\nG1 X1 F100\n", 0), ("M428\nG0 A30\nG1 X1 F100\n", 0),
+    ("G43.4 H1\nG0 A30\nG1 X1 F100\n", 0), ("G0 A30\nM428\nG1 X1 F100\n", 9), ("G1 X1 F100\n", 0)])
+def test_tip_control_that_no_word_states_is_told(body, line):
+    """LinuxCNC starts in the first kinematics of its configuration, which may control the tip or not."""
+    p = read(body)
+    assert [(str(a.what), f"line {line})" in str(a.value)) for a in p.open] == [("tip_control", True)] * bool(line)

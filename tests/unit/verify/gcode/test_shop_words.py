@@ -306,3 +306,26 @@ def test_a_spindle_that_takes_an_angle_stands(dialect, word):
 def test_the_number_of_holes_has_no_point(dialect, word):
     p = read(f"G91 G99 G81 X5. Z-3. R-1. F100. {word}\nG80 G90\n", dialect)
     assert p.end[p.kind == FEED][:, 0].tolist() == [5, 10, 15]
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas"])
+def test_words_behind_the_first_end_of_a_comment_are_not_hidden(dialect):
+    with pytest.raises(ProgramError, match="'Z4.' stands behind the first . of a comment"):
+        read("G1 X5. F100. (A (B) Z4. )\n", dialect)
+    for comment in ("(TOOL 1 (D8) FLAT)", "(A (B 2) (Z4.) )", "((T1))"):
+        assert ends(f"G1 X5. F100. {comment}\n", dialect) == [[5, 0, 10]]
+
+
+@pytest.mark.parametrize(("dialect", "end", "told"), [
+    ("fanuc", "Y0.0004", True), ("haas", "Y0.0004", True), ("fanuc", "Y-0.0009", True), ("fanuc", "Y0.002", False),
+    ("fanuc", "", False), ("fanuc", "X19.9996", True), ("linuxcnc", "Y0.0004", False)])
+def test_an_arc_that_a_control_takes_for_a_whole_circle_is_told(dialect, end, told):
+    """Of radius 5, clockwise from (20, 0): controls that count in 0.001 mm run 31.4 mm where the text has 0.0004."""
+    p = read(f"G1 X20.{F}\nG2 {end} I5.{F}\n", dialect)
+    assert sum("runs a whole circle of radius 5.000 mm" in r.message for r in p.remarks) == told
+
+
+def test_short_arcs_in_inches_and_by_their_radius():
+    inch = read("G20\nG1 X1. F4.\nG2 Y0.00004 I1.\nG21\n").remarks
+    assert ["whole circle" in r.message for r in inch].count(True) == 1
+    assert not any("whole circle" in r.message for r in read(f"G1 X20.{F}\nG2 Y0.0004 R5.\n").remarks)

@@ -176,6 +176,8 @@ class HeidenhainReader(HeidenhainPaths):
             self.auto = given["F"]
             self.rate = self.feed_word(given["F"])
             out.append(self.rate)
+        if m[1] is None and not {"DL", "DR", "DR2"}.isdisjoint(given):
+            raise BlockError("TOOL CALL with DL or DR and without a tool is not followed", "name the tool in it")
         if m[1] is None:
             return [*out] if not out else [" ".join(out)]
         number = self._numbered(m[1])

@@ -103,6 +103,9 @@ def cycle_blocks(call: CycleCall, here: Sequence[float], machine: Machine, over:
                          "program")
     if depth == 0:
         return []
+    if n in (205, 241) and call.get("Q379", 0.0):
+        raise BlockError(f"cycle {n} that begins within the hole (Q379={call.get('Q379'):g}) is not followed: what "
+                         "stands above is passed at the feed Q253", "drill from the surface (Q379=+0)")
     back = max(surface + call.get("Q204", 0.0) * unit, clear)
     dwell = call.get("Q211", 0.0)
     down = feed(call.get("Q206")) if n not in (207, 209) else ""

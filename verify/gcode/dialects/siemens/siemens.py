@@ -38,6 +38,7 @@ from verify.gcode.dialects.siemens.siemens_words import (
     UNBOUNDED,
     UNITS,
     VALUES,
+    factor_of_feeds,
 )
 from verify.gcode.dialects.stated_places import digits
 from verify.gcode.machine_words import SIEMENS_M
@@ -357,6 +358,9 @@ class SiemensReader(SiemensMoves):
             return self.variables.put(name, (), reader.value())
         if name in REFUSED:
             raise BlockError(f"{name}= ({REFUSED[name]}) is not followed")
+        if name == "OVR":
+            self.machine.s.override = factor_of_feeds(reader.number())
+            return None
         if name == "DISC" or name in IDLE_VALUES or re.fullmatch(r"H[0-9]+", name):
             value = self._stood(reader) if name in ("SPOS", "SPOSA") else reader.value()
             if name == "DISC" and value:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from verify.gcode.cutter_compensation import Approach, Corner, Style
+from verify.gcode.dialects.base import BlockError
 
 SIEMENS_STYLE = Style(Corner.ARC, Approach.NEXT_NORMAL)
 """NORM and G450."""
@@ -41,7 +42,7 @@ COMPRESSORS = frozenset({"COMPON", "COMPCURV", "COMPCAD", "COMPSURF"})
 """Words after which the control may leave the path, by CTOL where it is stated."""
 
 IDLE_VALUES = frozenset("""
-    ACC ACCLIMA FGREF FL H JERKLIM JERKLIMA LIMS OVR OVRA OVRRAP SPOS SPOSA STOLF SVC VELOLIM
+    ACC ACCLIMA FGREF FL H JERKLIM JERKLIMA LIMS OVRA OVRRAP SPOS SPOSA STOLF SVC VELOLIM
     VELOLIMA""".split())
 """Names with a value that change speed, smoothing or outputs only."""
 
@@ -100,5 +101,19 @@ REFUSED = {
 }
 """Words and names that move or cut and are not followed, and what they are."""
 
+
+def factor_of_feeds(percent: float) -> float:
+    """Factor of path feeds that OVR= states.
+
+    Raises
+    ------
+    BlockError
+        The percentage is not in the range of the control.
+    """
+    if not 0.0 < percent <= 200.0:
+        raise BlockError(f"OVR={percent:g} is not above 0 and up to 200")
+    return percent / 100.0
+
+
 __all__ = ["COMPRESSORS", "ENVELOPES", "IDLE", "IDLE_CALLS", "IDLE_CODES", "IDLE_VALUES", "MOVES", "NOT_FOLLOWED",
-           "REFUSED", "SAME", "SHARP_STYLE", "SIEMENS_STYLE", "UNBOUNDED", "UNITS", "VALUES"]
+           "REFUSED", "SAME", "SHARP_STYLE", "SIEMENS_STYLE", "UNBOUNDED", "UNITS", "VALUES", "factor_of_feeds"]

@@ -204,3 +204,13 @@ def test_rapids_of_their_own_speed_are_told():
 def test_diameters_are_refused(word):
     with pytest.raises(ProgramError, match="diameter"):
         read(f"{word}\nG1 X5 F100\n", "siemens")
+
+
+def test_a_programmed_override_counts_as_feed():
+    p = read("G1 X10 F100\nOVR=200\nX20\nOVR=50 X30\nG95 F0.1\nX40\nG94 F100\nOVR=100\nX50", "siemens")
+    feed = p.feed[p.kind == FEED]
+    assert feed[:3].tolist() == [100.0, 200.0, 50.0] and feed[-1] == 100.0
+    speed = p.speed[p.kind == FEED][3]
+    assert feed[3] == pytest.approx(0.05 * speed)
+    with pytest.raises(ProgramError, match="OVR=201 is not above 0 and up to 200"):
+        read("OVR=201\nG1 X1 F100", "siemens")
