@@ -16,6 +16,7 @@ class AssumedKind(StrEnum):
     MAX_RPM = "max_rpm"
     ROTARY_SENSE = "rotary_sense"
     TIP_CONTROL = "tip_control"
+    LENGTH_AXIS = "length_axis"
     GAUGE_LENGTH = "gauge_length"
     HOLDER = "holder"
     ABOVE_HOLDER = "above_holder"

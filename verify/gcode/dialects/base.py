@@ -104,6 +104,11 @@ class DialectReader:
             raise BlockError(f"M{number} ({what}) is not followed")
         self.functions.append(number)
 
+    def leave_open(self, assumed: Assumed) -> None:
+        """Keep what a line leaves to the control, the first of each kind."""
+        if all(a.what != assumed.what for a in self.assumed):
+            self.assumed.append(assumed)
+
     def bound(self, known: bool) -> None:
         """From here on a word bounds the deviation from the path (``known``), or none does."""
         self._free |= not known

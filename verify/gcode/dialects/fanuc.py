@@ -25,6 +25,9 @@ _PLAIN = re.compile(r"(?:N[0-9]+ ?)?(?:G0?[01] ?)?(?:[XYZABC][+-]?(?:[0-9]*\.[0-
 _WORD = re.compile(rf"([A-Z])({NUMBER})")
 _NAME = re.compile(r"[O:](?:[0-9]+|<[^<>]*>)?(?:<[^<>]*>)?|<[^<>]*>")
 _CORNER = re.compile(r",[RC][-+.0-9]*")
+LENGTH_BY_PLANE = Assumed(AssumedKind.LENGTH_AXIS, "Z in the planes G18 and G19 too", "where parameter 5001#1 is 1, "
+                          "G43 moves the axis across the plane by the length of the tool, and Z without it",
+                          "program G17 before G43")
 _PAIR = re.compile(r"\([^()]*\)")
 _TAPE = re.compile(r"%[O:]?[0-9]*")
 _DELETED = re.compile(r"(N[0-9]+)?/[1-9]?(?=[A-Z]|$)")
@@ -156,6 +159,9 @@ class FanucReader(FanucPlanes):
         """Keep the modes that the words of later blocks depend on."""
         if 91 in codes and (self.polar or 16 in codes):
             raise BlockError("G91 with polar coordinates (G16), which controls read differently")
+        plane = next((c for c in codes if c in (17, 18, 19)), self.machine.s.plane)
+        if 43 in codes and plane != 17:
+            self.leave_open(LENGTH_BY_PLANE)
         if 15 in codes:
             self.polar = False
         if 16 in codes:
@@ -206,10 +212,9 @@ class FanucReader(FanucPlanes):
         """A block has several M words, with the numbers ``ms``. Spindle and coolant together are usual."""
         names, kinds = " and ".join(f"M{m}" for m in ms), {float(m) for m in ms}
         if len(ms) == 2 and len(kinds & {3, 4, 5}) == 1 and len(kinds & {7, 8, 9}) == 1:
-            if not self.assumed:
-                self.assumed.append(Assumed(AssumedKind.COOLANT, f"{names} in one block both count", "where parameter "
-                                            "3404#7 is 0 the control runs only the last of them: the spindle may stand",
-                                            "give each M word its own block"))
+            self.leave_open(Assumed(AssumedKind.COOLANT, f"{names} in one block both count", "where parameter "
+                                    "3404#7 is 0 the control runs only the last of them: the spindle may stand",
+                                    "give each M word its own block"))
             return
         self.remarks.append(f"{names} in one block: parameter 3404#7 decides whether the control runs both or only the "
                             "last; give each its own block")

@@ -329,3 +329,9 @@ def test_short_arcs_in_inches_and_by_their_radius():
     inch = read("G20\nG1 X1. F4.\nG2 Y0.00004 I1.\nG21\n").remarks
     assert ["whole circle" in r.message for r in inch].count(True) == 1
     assert not any("whole circle" in r.message for r in read(f"G1 X20.{F}\nG2 Y0.0004 R5.\n").remarks)
+
+
+@pytest.mark.parametrize(("body", "told"), [
+    ("G18\nG43 H1\nG17\n", True), ("G19 G43 H1\nG17\n", True), ("G18\nG17 G43 H1\n", False), ("G18\nX1.\n", False)])
+def test_the_axis_of_a_length_that_begins_in_another_plane_is_told(body, told):
+    assert [str(a.what) for a in read(body).open] == ["length_axis"] * told

@@ -106,6 +106,8 @@ def cycle_blocks(call: CycleCall, here: Sequence[float], machine: Machine, over:
     if n in (205, 241) and call.get("Q379", 0.0):
         raise BlockError(f"cycle {n} that begins within the hole (Q379={call.get('Q379'):g}) is not followed: what "
                          "stands above is passed at the feed Q253", "drill from the surface (Q379=+0)")
+    if n == 202 and call.get("Q214", 0.0):
+        machine.log.note("cycle 202 is read without its shift at the bottom (Q214): the edge of the tool decides")
     back = max(surface + call.get("Q204", 0.0) * unit, clear)
     dwell = call.get("Q211", 0.0)
     down = feed(call.get("Q206")) if n not in (207, 209) else ""

@@ -29,6 +29,7 @@ from verify.gcode.dialects.siemens.siemens_words import (
     IDLE_CALLS,
     IDLE_CODES,
     IDLE_VALUES,
+    LENGTH_BY_PLANE,
     MOVES,
     NOT_FOLLOWED,
     REFUSED,
@@ -316,6 +317,8 @@ class SiemensReader(SiemensMoves):
         line.codes.append(n)
         if n in (0, 1, 2, 3):
             self.motion = n
+        if n in (18, 19):
+            self.leave_open(LENGTH_BY_PLANE)
         if n in SAME:
             line.out.append(f"G{n}")
         elif n in (41, 42):

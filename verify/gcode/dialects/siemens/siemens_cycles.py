@@ -50,6 +50,8 @@ def drilling_blocks(call: DrillingCall, here: Sequence[float], machine: Machine)
     axis = PLANE_AXES[s.plane][2]
     hole = _hole(call, machine)
     before, after = [], []
+    if call.name == "CYCLE86" and (call.number(7) or call.number(8)):
+        machine.log.note("CYCLE86 is read without its shift at the bottom (RPA, RPO): the edge of the tool decides")
     restored = "" if math.isnan(s.feed) else f"F{digits(s.feed if s.feed_mode == 93 else s.feed / s.scale)}"
     if call.name in ("CYCLE84", "CYCLE840"):
         speed = call.number(10) if call.name == "CYCLE84" else 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from verify.assumptions import Assumed, AssumedKind
 from verify.gcode.cutter_compensation import Approach, Corner, Style
 from verify.gcode.dialects.base import BlockError
 
@@ -102,6 +103,12 @@ REFUSED = {
 """Words and names that move or cut and are not followed, and what they are."""
 
 
+LENGTH_BY_PLANE = Assumed(AssumedKind.LENGTH_AXIS, "Z in the planes G18 and G19 too", "where setting data 42940 is 0, "
+                          "the length of a mill counts in Y in G18 and in X in G19, and the tool goes down by it",
+                          "program G17, or set SD42940 $SC_TOOL_LENGTH_CONST to 17 on the machine")
+"""What a program leaves open that changes the plane while a length offset is on."""
+
+
 def factor_of_feeds(percent: float) -> float:
     """Factor of path feeds that OVR= states.
 
@@ -115,5 +122,6 @@ def factor_of_feeds(percent: float) -> float:
     return percent / 100.0
 
 
-__all__ = ["COMPRESSORS", "ENVELOPES", "IDLE", "IDLE_CALLS", "IDLE_CODES", "IDLE_VALUES", "MOVES", "NOT_FOLLOWED",
-           "REFUSED", "SAME", "SHARP_STYLE", "SIEMENS_STYLE", "UNBOUNDED", "UNITS", "VALUES", "factor_of_feeds"]
+__all__ = ["COMPRESSORS", "ENVELOPES", "IDLE", "IDLE_CALLS", "IDLE_CODES", "IDLE_VALUES", "LENGTH_BY_PLANE", "MOVES",
+           "NOT_FOLLOWED", "REFUSED", "SAME", "SHARP_STYLE", "SIEMENS_STYLE", "UNBOUNDED", "UNITS", "VALUES",
+           "factor_of_feeds"]

@@ -235,3 +235,9 @@ def test_a_stop_ends_the_spindle_too(word, line):
 def test_lengths_and_depths_that_would_be_passed_over_are_refused(line, said):
     with pytest.raises(ProgramError, match=said):
         read(line, "heidenhain")
+
+
+@pytest.mark.parametrize(("side", "told"), [(1, 1), (0, 0)])
+def test_the_shift_of_a_boring_bar_is_told(side, told):
+    cycle = f"CYCL DEF 202 Q200=+2 Q201=-4 Q206=+100 Q211=+0 Q208=+0 Q203=+0 Q204=+20 Q214=+{side} Q336=+0\nCYCL CALL"
+    assert sum("cycle 202 is read without its shift" in note for note in read(cycle, "heidenhain").notes) == told

@@ -214,3 +214,15 @@ def test_a_programmed_override_counts_as_feed():
     assert feed[3] == pytest.approx(0.05 * speed)
     with pytest.raises(ProgramError, match="OVR=201 is not above 0 and up to 200"):
         read("OVR=201\nG1 X1 F100", "siemens")
+
+
+@pytest.mark.parametrize(("line", "told"), [("G18", True), ("G19 G2 Y1 Z49 J0 K-1 F9", True), ("G17", False)])
+def test_the_axis_of_the_length_is_told_where_the_plane_changes(line, told):
+    """Programming Manual: in G18 length 1 of a mill counts in Y, in G19 in X, unless SD42940 is set."""
+    assert [str(a.what) for a in read(line + "\nG1 X3 F9", "siemens").open] == ["length_axis"] * told
+
+
+@pytest.mark.parametrize(("words", "told"), [("3,3,0,0,0", 1), ("3,0,0.2,0,0", 1), ("3", 0)])
+def test_the_shift_of_a_boring_bar_is_told(words, told):
+    notes = read(f"F50\nCYCLE86(30,0,2,-4,,0,{words})", "siemens").notes
+    assert sum("CYCLE86 is read without its shift" in note for note in notes) == told
