@@ -15,13 +15,13 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 
-from verify.gcode.dialects.base import NUMBER, ZEROS, BlockError, Machine, zero_word
+from verify.gcode.dialects.base import ZEROS, BlockError, Machine, zero_word
 from verify.gcode.dialects.orientation import needed
-from verify.gcode.dialects.siemens.siemens_cycles import DrillingCall, drilling_blocks, row_of_holes
+from verify.gcode.dialects.siemens.siemens_calls import SiemensCalls
+from verify.gcode.dialects.siemens.siemens_cycles import DrillingCall
 from verify.gcode.dialects.siemens.siemens_expressions import MAX_ELEMENTS, Value, ValueReader, Variables, arguments
 from verify.gcode.dialects.siemens.siemens_flow import LABEL, NUMBERED, PLAIN, SiemensFlow, statement
-from verify.gcode.dialects.siemens.siemens_moves import CURVES, Line, SiemensMoves
-from verify.gcode.dialects.siemens.siemens_swivel import is_number
+from verify.gcode.dialects.siemens.siemens_moves import CURVES, Line
 from verify.gcode.dialects.siemens.siemens_words import (
     COMPRESSORS,
     ENVELOPES,
@@ -43,10 +43,7 @@ from verify.gcode.dialects.siemens.siemens_words import (
 )
 from verify.gcode.dialects.stated_places import digits
 from verify.gcode.machine_words import SIEMENS_M
-from verify.program.arc_chords import PLANE_AXES
 
-SMALL = 0.01
-"""deg, deviation of a tool axis that needs no note: 0.01 mm at 57 mm above the tip."""
 _MARKS = re.compile(r"^\s*(?:N[0-9]+\s+)?[^;(\n]*\b(?:TRAORI|TRAFOOF|CYCLE8[0-9]{1,2}\s*\(|SUPA|G710|G700|G641|G642"
                     r"|G645|COMPCAD|COMPOF|FFWON|ORIAXES|ORIMKS|ORIWKS|MCALL|WORKPIECE\s*\(|MSG\s*\(|G[123]\b.*\bCR=|A?TRANS\s+[XYZ]"
                     r"|A?ROT\s+(?:[XYZ]|RPL=)|PROC\s+[A-Z]|R[0-9]+=|GOTO[FB]\s)|^%_N_|^;\$PATH", re.MULTILINE)
@@ -67,7 +64,7 @@ def is_siemens(text: str) -> bool:
     return bool(_MARKS.search(text.upper()))
 
 
-class SiemensReader(SiemensMoves):
+class SiemensReader(SiemensCalls):
     """840D sl, 828D and ONE."""
 
     home_from, gives_up_length = 1, True
@@ -78,7 +75,6 @@ class SiemensReader(SiemensMoves):
         self.unbounded = True
         self.tool = self.selected = 0
         self.edge = 1
-        self.loose = ""
         self.lost = ""  # the word after which the program has not stated a work offset
         self.moved = False
         self.variables = Variables(self._served)
@@ -494,61 +490,6 @@ class SiemensReader(SiemensMoves):
             raise BlockError(f"{name[:40]}( ): unknown cycle or function, and no subprogram of this file")
         return None
 
-    def _number(self, text: str) -> float:
-        reader = ValueReader(text, self.variables)
-        number = reader.number()
-        if text[reader.at:].strip():
-            raise BlockError(f"cannot read the value '{text[:40]}'")
-        return number
-
-    def _drill(self, call: DrillingCall, line: Line) -> None:
-        self.uncompensated(call.name)
-        if line.modal:
-            self.cycle = call
-            return
-        if line.places:
-            raise BlockError(f"{call.name} and coordinates in one block")
-        line.after += self._restored(drilling_blocks(call, self.here(), self.machine))
-
-    def _row(self, name: str, values: Sequence[float | None], line: Line) -> None:
-        if self.cycle is None:
-            raise BlockError(f"{name} without a cycle of MCALL")
-        i, j, k = PLANE_AXES[self.machine.s.plane]
-        place = self.here()
-        for u, v in row_of_holes(name, values):
-            target = list(place)
-            target[i], target[j] = u * self.unit, v * self.unit
-            if self.relative:
-                raise BlockError(f"{name} in incremental coordinates")
-            line.after.append(f"G0 {'XYZ'[i]}{digits(u)} {'XYZ'[j]}{digits(v)}")
-            blocks = drilling_blocks(self.cycle, target, self.machine)
-            line.after += blocks
-            place = list(target)
-            place[k] = math.nan
-        line.after = self._restored(line.after)
-
-    def _tolerant(self, parts: list[str]) -> list[str]:
-        """CYCLE832: the tolerance of the path."""
-        if parts == [""] or parts[1:2] in (["0"], ["_OFF"]):
-            self.notes.append("CYCLE832 is off: machine data decide how far the control rounds corners; the error "
-                              "bound does not include it")
-            self.bound(False)
-            return []
-        if not is_number(parts[0]):
-            raise BlockError(f"CYCLE832({','.join(parts)}): its tolerance is not a plain number")
-        self._oriented_within(parts)
-        self.bound(True)
-        return [f"G64 P{float(parts[0]):.6f}"]
-
-    def _oriented_within(self, parts: list[str]) -> None:
-        """Keep a note for the first turning tool axis where CYCLE832 allows it more than a small deviation."""
-        stated = len(parts) > 2 and re.fullmatch("1[0-9]|_ORI_[A-Z]+", parts[1]) and re.fullmatch(NUMBER, parts[2])
-        self.loose = ""
-        if stated and float(parts[2]) <= SMALL:
-            return
-        amount = f"of {parts[2]} deg" if stated else "that setting data decide"
-        self.loose = f"CYCLE832 allows the tool axis a deviation {amount}: the error bound does not include it"
-
     def _check_context(self, line: Line) -> None:
         """Refuse names whose value nothing in the block uses."""
         allowed = {"RPL": False, **dict.fromkeys(("CR", "TURN", "AR"), self.motion in (2, 3))}
@@ -604,4 +545,4 @@ class SiemensReader(SiemensMoves):
         return blocks
 
 
-__all__ = ["SMALL", "ZEROS", "SiemensReader", "is_siemens"]
+__all__ = ["ZEROS", "SiemensReader", "is_siemens"]
