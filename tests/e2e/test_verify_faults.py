@@ -233,13 +233,14 @@ def test_a_plunge_from_home_or_the_start_is_seen():
     assert first(run([*lines[:4], *rapid, *lines[7:]]), FindingKind.RAPID).line == 7
 
 
-@pytest.mark.parametrize("way", [
-    ["G43 H1", "G0 X-7 Y0 Z0.4"], ["G43 H1", "G53 G0 Z0", "G53 G0 X0 Y0", "G0 X-7 Y0 Z0.4"],
-    ["G43 H1", "G0 Z0.4", "X-7 Y0"], ["G43 H1", "G1 X-7 Y0 Z0.5 F300"]])
-def test_a_way_from_an_unstated_place_into_the_work_is_named(way):
+@pytest.mark.parametrize(("way", "named"), [
+    (["G43 H1", "G0 X-7 Y0 Z0.4"], 2), (["G43 H1", "G53 G0 Z0", "G53 G0 X0 Y0", "G0 X-7 Y0 Z0.4"], 4),
+    (["G43 H1", "G0 Z0.4", "X-7 Y0"], 2), (["G43 H1", "G1 X-7 Y0 Z0.5 F300"], 2)])
+def test_a_way_from_an_unstated_place_into_the_work_is_named(way, named):
     lines = program()
     found = first(run([*lines[:4], *way, "G0 Z1.5", *lines[7:]]), FindingKind.PROGRAM)
-    assert found.line == 4 + len(way) and "cannot be simulated" in found.message
+    assert found.line == 4 + named
+    assert ("before X and Y are stated" if way[1] == "G0 Z0.4" else "cannot be simulated") in found.message
     above = [w.replace("Z0.4", "Z1.5").replace("Z0.5", "Z1.5") for w in way]
     assert run([*lines[:4], *above, *lines[7:]]).no_findings
 
