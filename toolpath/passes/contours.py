@@ -214,7 +214,7 @@ def wall_distance(field: TipField, z: float, asked: NDArray[np.bool_]) -> F64 | 
     at, box, chains = field.kept.get("walls", (math.nan, None, None))
     needed = np.array([i.min(), j.min(), -i.max(), -j.max()])
     if at != z or (needed < box).any():
-        box = needed if box is None else np.minimum(needed, box)  # layers that follow each other need much the same
+        box = np.minimum(needed, box) if at == z else needed
         around = np.zeros_like(free)
         around[box[0]:1 - box[2], box[1]:1 - box[3]] = True
         chains = _chains(field, z, around)
