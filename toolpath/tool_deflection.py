@@ -24,8 +24,8 @@ MIN_SHARE = 0.2
 """Least share to which a feed is reduced: below it, edges rub and the tool wears without cutting."""
 LAYER_LIMIT = 0.05
 """mm, largest deflection of a tool in layers, unless ``BENT_SHARE`` of the stock they leave is less."""
-BENT_SHARE = 0.75
-LEFT_SHARE, LEFT_STEPS = 0.1, 1.0
+BENT_SHARE = 0.55
+LEFT_SHARE, LEFT_STEPS = 0.1, 1.3
 """Stock that layers leave for the finish: share of the deepest layer, and lattice steps; the greater counts."""
 MIN_FEED = 0.1
 """mm/min."""

@@ -52,7 +52,7 @@ WALL = 0.9  # part of a unit normal along the access: faces with more are no wal
 AGAIN_SHARE = 0.95  # of the progress, before zones are finished again
 THIN = 2.0  # scallops: thickness on a wall that a finish leaves
 # A ring is exact to one lattice step; the rest keeps it off the part after thinning to a tenth of a step.
-LATTICE_CARE = 1.0
+LATTICE_CARE = 1.3
 
 Progress = Callable[[float], None]
 
