@@ -43,6 +43,7 @@ from toolpath.stock.cut_history import Depths, Walked
 from toolpath.stock.engagement import SKIN_SHARE, UNBOUNDED
 from toolpath.stock.stock_map import SURE_RIM, StockMap
 from toolpath.strategies import depth_layers
+from toolpath.tool_deflection import left_by_layers
 from toolpath.workingsteps import Workingstep
 from zones.machinable_area import AreaForm
 from zones.reach.tip_field import TipField, contact_tips
@@ -51,8 +52,6 @@ from zones.zoning.zones import ZoneArea
 WALL = 0.9  # part of a unit normal along the access: faces with more are no walls
 AGAIN_SHARE = 0.95  # of the progress, before zones are finished again
 THIN = 2.0  # scallops: thickness on a wall that a finish leaves
-# A ring is exact to one lattice step; the rest keeps it off the part after thinning to a tenth of a step.
-LATTICE_CARE = 1.3
 
 Progress = Callable[[float], None]
 
@@ -261,7 +260,7 @@ class _Layers:
         self.settings, self.depths = settings, depths
         lat, tool = field.lattice, field.tool
         self.tips = tips = np.vstack([z.tips for z in zones])
-        self.allowance = max(0.1 * cut.step_down, LATTICE_CARE * lat.step)
+        self.allowance = left_by_layers(cut.step_down, lat.step)
         # without a finish, rims take every wall to size layer by layer, while the stock below still supports it
         steep = [z.tips for z in zones if z.form is AreaForm.STEEP and settings.finishing]
         self.walls = np.vstack([np.zeros((0, 3)), *steep])

@@ -233,14 +233,6 @@ class TipField:
         free[open_] = ~self.blocked_by_cutter(lat.nodes(rows + i0, cols + j0, z))
         return free
 
-    def off_blocked(self, z: float) -> F64 | None:
-        """(ny, nx) float64, mm: distance of each node from the nearest one that is blocked at tip height z, mm.
-
-        None where no node is blocked.
-        """
-        near = self.nearest_blocked(z)
-        return None if near is None else near[0]
-
     def nearest_blocked(self, z: float) -> tuple[F64, NDArray[np.int32]] | None:
         """Distance of each node, mm, from the nearest one that is blocked at tip height z, mm, and which that is.
 

@@ -19,7 +19,6 @@ from service.stages.cautions import bent, dry, limited, uncut_centres
 from service.stages.job_inputs import JobInputs
 from tests.synthetic_plan import BALL as SLIM
 from tests.synthetic_plan import step
-from toolpath.planning.job_plan import LATTICE_CARE
 from toolpath.tool_deflection import DeflectionEstimate, left_by_layers
 
 BALL = {"id": "T1", "number": 1, "kind": "ball", "diameter_mm": 3, "flutes": 2}
@@ -124,10 +123,9 @@ def test_the_sweep_notices_what_it_should(monkeypatch):
     assert faults(job) == ["T1 finishing: feed F101 of 100"]
 
 
-def test_what_layers_leave_is_what_the_planner_leaves():
-    """``toolpath.planning.job_plan`` computes it where it plans them."""
-    assert left_by_layers(0.7, 0.08) == max(0.1 * 0.7, LATTICE_CARE * 0.08) == LATTICE_CARE * 0.08
-    assert left_by_layers(2.0, 0.1) == max(0.1 * 2.0, LATTICE_CARE * 0.1) == 0.2
+def test_layers_leave_a_share_of_the_deepest_or_lattice_steps_whichever_is_more():
+    assert left_by_layers(0.7, 0.08) == pytest.approx(1.3 * 0.08)
+    assert left_by_layers(2.0, 0.1) == pytest.approx(0.2)
 
 
 def test_a_tool_that_bends_too_far_is_named_with_its_worst_step():

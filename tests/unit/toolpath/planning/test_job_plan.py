@@ -454,8 +454,8 @@ def test_walls_that_layers_take_to_size_are_fed_as_in_a_finish():
             for way in (w for w in step.trajectories if w.motion is TrajectoryKind.CUT):
                 field = c.fields[step.tool.id]
                 level = way.points[np.abs(way.points[:, 2] - way.points[:, 2].min()) < 1e-9]
-                off = field.off_blocked(float(level[0, 2]))
-                if off is not None:
-                    steps = off[field.lattice.cells(level[:, :2])].min() / field.lattice.step
+                near = field.nearest_blocked(float(level[0, 2]))
+                if near is not None:
+                    steps = near[0][field.lattice.cells(level[:, :2])].min() / field.lattice.step
                     (fast if way.feed > 500 else slow).append(steps)
     assert min(fast) > 0.99 and max(fast) > 4.0 and min(slow) == 0.0
