@@ -1,4 +1,4 @@
-"""Places of square lattices on triangles, seen along the axes each triangle faces most.
+"""Places of square lattices on triangles, seen along the axes each triangle faces most; rows sorted by cell.
 
 Notation
     h          : mm between the lines of the lattice, which lies square to the axis, shifted by ``SHIFT`` h from 0
@@ -16,6 +16,7 @@ import math
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from geometry.kernels.options import KERNEL
 
@@ -121,3 +122,23 @@ def graded_places(flat, h, k, i0, j0, near, out, coarse, owner):
                     coarse[count], owner[count] = not split, m
                 count += 1
     return count
+
+
+@njit(**KERNEL)
+def sorted_by_key(key: NDArray[np.int64], order: NDArray[np.int64], first: NDArray[np.int64]) -> None:
+    """Sort rows by a key and find where each key begins.
+
+    key   : (n,) int64, index, 0 to k - 1
+    order : (n,) int64, index, out; rows by key, in their own order where keys are equal
+    first : (k + 1,) int64, index, out; start of each key in ``order``
+    """
+    first[:] = 0
+    for i in range(len(key)):
+        first[key[i] + 1] += 1
+    for k in range(1, len(first)):
+        first[k] += first[k - 1]
+    place = first[:-1].copy()
+    for i in range(len(key)):
+        k = key[i]
+        order[place[k]] = i
+        place[k] += 1

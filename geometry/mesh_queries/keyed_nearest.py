@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from geometry.binning import limits_of
 from geometry.mesh import F64
 
 APART = 4.0  # times the extent of the points: how far one key is from the next along the added axis
@@ -20,8 +21,8 @@ class KeyedPoints:
 
     def __init__(self, key: NDArray[np.int64], points: F64) -> None:
         self.keys, place = np.unique(key, return_inverse=True)
-        self.low = points.min(axis=0) if len(points) else np.zeros(points.shape[1])
-        span = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
+        low, high = limits_of(points) if len(points) else (np.zeros(1), np.zeros(1))
+        span = float(np.linalg.norm(high - low))
         self.step = APART * span + 1.0
         self.reach = 0.5 * self.step
         self.tree = cKDTree(np.column_stack([points, self.step * place.reshape(-1)]))

@@ -82,42 +82,61 @@ def trace(blocked, active, segments):
     open chain. A closed chain does not repeat its first id.
     """
     ny, nx = blocked.shape
-    follow = np.full(2 * nx * ny, -1, np.int64)
-    entered = np.zeros(2 * nx * ny, np.bool_)
-    crossings = 0
+    room, count = 1024, 0
+    edges = np.empty((room, 2), np.int64)  # by which a segment enters its cell, and by which it leaves
+    mixed = np.empty(nx - 1, np.bool_)
     for i in range(ny - 1):
+        low, high, taken = blocked[i], blocked[i + 1], active[i]
         for j in range(nx - 1):
-            if not active[i, j]:
+            mixed[j] = taken[j] & ((low[j] != low[j + 1]) | (low[j] != high[j]) | (low[j] != high[j + 1]))
+        for j in range(nx - 1):
+            if not mixed[j]:
                 continue
-            code = (1 * blocked[i, j] + 2 * blocked[i, j + 1] + 4 * blocked[i + 1, j + 1] + 8 * blocked[i + 1, j])
+            code = 1 * blocked[i, j] + 2 * blocked[i, j + 1] + 4 * blocked[i + 1, j + 1] + 8 * blocked[i + 1, j]
             for k in (0, 2):
                 if segments[code, k] >= 0:
-                    a = _side_id(segments[code, k], i, j, nx)
-                    b = _side_id(segments[code, k + 1], i, j, nx)
-                    follow[a] = b
-                    entered[b] = True
-                    crossings += 1
-    ids = np.empty(2 * crossings + 2, np.int64)
-    starts = np.empty(crossings + 2, np.int64)
-    closed = np.zeros(crossings + 1, np.bool_)
+                    if count == room:
+                        room *= 2
+                        more = np.empty((room, 2), np.int64)
+                        more[:count] = edges
+                        edges = more
+                    edges[count, 0] = _side_id(segments[code, k], i, j, nx)
+                    edges[count, 1] = _side_id(segments[code, k + 1], i, j, nx)
+                    count += 1
+    first = np.sort(edges[:count, 0])  # no edge is entered by twice
+    follow = np.empty(count, np.int64)  # row of the edge that comes behind each, or its number less -1 at an open end
+    entered = np.zeros(count, np.bool_)
+    rows = np.searchsorted(first, edges[:count, 1])
+    here = np.searchsorted(first, edges[:count, 0])
+    for k in range(count):
+        if rows[k] < count and first[rows[k]] == edges[k, 1]:
+            follow[here[k]] = rows[k]
+            entered[rows[k]] = True
+        else:
+            follow[here[k]] = -1 - edges[k, 1]
+    ids = np.empty(2 * count + 2, np.int64)
+    starts = np.empty(count + 2, np.int64)
+    closed = np.zeros(count + 1, np.bool_)
+    done = np.zeros(count, np.bool_)
     n, chains = 0, 0
     for sweep in range(2):
-        for e in range(len(follow)):
-            if follow[e] < 0 or (sweep == 0 and entered[e]):
+        for e in range(count):
+            if done[e] or (sweep == 0 and entered[e]):
                 continue
             starts[chains] = n
             at = e
             while True:
-                ids[n] = at
+                ids[n] = first[at]
                 n += 1
-                to = follow[at]
-                follow[at] = -1
-                if to < 0:
+                done[at] = True
+                at = follow[at]
+                if at < 0:
+                    ids[n] = -1 - at
+                    n += 1
                     break
-                if to == e:
+                if at == e:
                     closed[chains] = True
                     break
-                at = to
             chains += 1
     starts[chains] = n
     return ids[:n], starts[: chains + 1], closed[:chains]

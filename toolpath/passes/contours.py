@@ -30,6 +30,7 @@ from toolpath.kernels.contour import (
     refine,
     trace,
 )
+from toolpath.kernels.grown import grow_square
 from toolpath.kernels.wall_distance import from_boundary
 from toolpath.lines import Line, dense, pieces_where, true_runs
 from zones.kernels.lattice import LatticeFrame
@@ -43,13 +44,12 @@ def dilated(mask: NDArray[np.bool_], cells: float) -> NDArray[np.bool_]:
 
     mask : (ny, nx) bool, on the lattice
     """
-    size = 2 * int(np.ceil(cells)) + 1
-    if size <= 1 or not mask.any():
+    reach = int(np.ceil(cells))
+    if reach <= 0 or not mask.any():
         return mask
-    near = _window(mask, size // 2)
-    grown = ndimage.maximum_filter1d(mask[near].view(np.uint8), size, axis=0)
-    out = np.zeros_like(mask)
-    out[near] = ndimage.maximum_filter1d(grown, size, axis=1).view(np.bool_)
+    near = _window(mask, reach)
+    out = np.zeros(mask.shape, np.bool_)
+    grow_square(np.ascontiguousarray(mask[near]), reach, out[near])
     return out
 
 

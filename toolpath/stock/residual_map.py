@@ -12,6 +12,7 @@ import copy
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.binning import by_cell, limits_of
 from geometry.errors import GeometryError
 from geometry.kernels.cutter_sizes import CutterSizes
 from geometry.mesh import F64
@@ -143,13 +144,11 @@ def _squares(normals: F64, level: NDArray[np.int64], covers: F64 | None) -> Plac
 
 def _binned(points: F64, cell: float) -> SampleCells:
     """Points (n, 3), mm, in square cells in plan."""
-    lo = points[:, :2].min(axis=0) if len(points) else np.zeros(2)
-    hi = points[:, :2].max(axis=0) if len(points) else np.zeros(2)
+    lo, hi = limits_of(points[:, :2]) if len(points) else (np.zeros(2), np.zeros(2))
     ncx, ncy = (np.floor((hi - lo) / cell).astype(int) + 1).tolist()
     key = np.zeros(0, np.int64)
     if len(points):
         c = np.floor((points[:, :2] - lo) / cell).astype(np.int64)
         key = c[:, 1] * ncx + c[:, 0]
-    items = np.argsort(key, kind="stable")
-    starts = np.searchsorted(key[items], np.arange(ncx * ncy + 1))
+    items, starts = by_cell(key, ncx * ncy)
     return SampleCells(starts, items, float(lo[0]), float(lo[1]), cell, ncx, ncy)

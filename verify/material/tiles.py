@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.binning import by_cell, limits_of
 from geometry.mesh import F64
 from verify.kernels.rays import CellArrays
 from verify.moves import Progress
@@ -40,15 +41,14 @@ class CellGrid:
 
         points : (n, 3) float64, setup frame, mm
         """
-        lower, upper = points.min(axis=0), points.max(axis=0)
+        lower, upper = limits_of(points)
         extent = np.maximum(upper - lower, 1e-6)
         size = max(size, float(np.cbrt(extent.prod() / MAX_CELLS)))
         while (shape := np.floor(extent / size).astype(np.int64) + 1).prod() > MAX_CELLS:
             size *= 1.2
         index = np.minimum(np.floor((points - lower) / size).astype(np.int64), shape - 1)
         key = (index[:, 0] * shape[1] + index[:, 1]) * shape[2] + index[:, 2]
-        order = np.argsort(key, kind="stable")
-        first = np.searchsorted(key[order], np.arange(int(shape.prod()) + 1)).astype(np.int64)
+        order, first = by_cell(key, int(shape.prod()))
         return cls(lower, size, shape, order, first)
 
     @property

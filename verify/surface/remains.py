@@ -31,6 +31,7 @@ WHOLE = 0.99  # of the way along a ray: a gouge that deep is measured by its ray
 BATCH = 64  # places of one call: near each other, so that few moves have to be looked through
 CELL = 5.0  # mm: of the places in such a cell only those are measured that may be the farthest
 APART = 0.05  # mm
+MANY_RAYS = 250_000  # whose ends are computed at a time
 NEAR, MANY = 2.0, 256  # mm, and of them along the places: what cells of that size do not hold is looked for among all
 
 
@@ -143,9 +144,7 @@ class LeftOnRays:
     """
 
     def __init__(self, tree: TriangleTree, rays: Rays, rows: NDArray[np.int64], largest: float) -> None:
-        self.tree, self.largest = tree, largest
-        self.ends = rays.points[rows] + np.minimum(rays.residual[rows], 0.0)[:, None] * rays.normals[rows]
-        self.doubtful = rays.residual[rows] < -CLOSE
+        self.tree, self.rays, self.rows, self.largest = tree, rays, rows, largest
 
     def bounds(self, points: F64) -> F64:
         """Distances of places to the nearest of these.
@@ -161,23 +160,34 @@ class LeftOnRays:
         low, high = asked.min(axis=0) - 1, asked.max(axis=0) + 2
         marked = np.zeros(high - low, np.uint8)
         marked[tuple((asked - low).T)] = 1
-        beside = np.flatnonzero(((self.ends >= low * near) & (self.ends < high * near)).all(axis=1))
-        cell = np.clip(np.floor(self.ends[beside] / near).astype(np.int64), low, high - 1) - low
-        beside = beside[maximum_filter(marked, 3)[tuple(cell.T)] > 0]
-        out = self._nearest(points, beside)
+        grown = maximum_filter(marked, 3)
+        found = [np.zeros(0, np.int64)]
+        for first in range(0, len(self.rows), MANY_RAYS):
+            rows = self.rows[first:first + MANY_RAYS]
+            ends = self._ends(rows)
+            within = np.flatnonzero(((ends >= low * near) & (ends < high * near)).all(axis=1))
+            cell = np.clip(np.floor(ends[within] / near).astype(np.int64), low, high - 1) - low
+            found.append(rows[within[grown[tuple(cell.T)] > 0]])
+        beside = np.concatenate(found)
+        out = self._nearest(points, beside, self._ends(beside))
         far = np.flatnonzero(out > near)  # all that is nearer lies in the cells beside
         if len(far):
-            out[far] = self._nearest(points[far], np.arange(len(self.ends)))
+            out[far] = self._nearest(points[far], self.rows, self._ends(self.rows))
         return np.minimum(out, self.largest)
 
-    def _nearest(self, points: F64, rows: NDArray[np.int64]) -> F64:
-        """Distances to the ends of rows (k,), inf where none counts."""
-        cut = np.flatnonzero(self.doubtful[rows])
+    def _ends(self, rows: NDArray[np.int64]) -> F64:
+        """Where rays (k,) meet what is left, (k, 3), mm."""
+        return np.asarray(self.rays.points[rows]
+                          + np.minimum(self.rays.residual[rows], 0.0)[:, None] * self.rays.normals[rows])
+
+    def _nearest(self, points: F64, rows: NDArray[np.int64], ends: F64) -> F64:
+        """Distances to the ends (k, 3) of rays (k,), inf where none counts."""
+        cut = np.flatnonzero(self.rays.residual[rows] < -CLOSE)
         kept = np.ones(len(rows), np.bool_)
-        kept[cut] = inside_part(self.tree, self.ends[rows[cut]])
+        kept[cut] = inside_part(self.tree, ends[cut])
         if not kept.any():
             return np.full(len(points), np.inf)
-        return np.asarray(cKDTree(self.ends[rows[kept]]).query(points)[0], dtype=np.float64)
+        return np.asarray(cKDTree(ends[kept]).query(points)[0], dtype=np.float64)
 
 
 def depths_both_ways(left: Remains, rays: Rays, deep: NDArray[np.int64], even: int, tolerance: float,

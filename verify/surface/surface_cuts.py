@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64, I32, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
+from geometry.sampling import SurfaceSamples
 from geometry.tool_body import ToolBody
 from verify.assumptions import Assumed
 from verify.blank.blank import stock_on_normals
@@ -80,6 +81,9 @@ class SurfaceCuts:
     notes: list[str]
 
 
+COLUMNS = ("points", "normals", "face", "area", "residual", "mover")
+
+
 @dataclass(frozen=True, eq=False)
 class _Table(CutPlaces):
     """Rays so far, and what was left on their normals."""
@@ -88,11 +92,22 @@ class _Table(CutPlaces):
         return len(self.points)
 
     def only(self, rows: NDArray[np.int64] | slice) -> _Table:
-        return _Table(*(getattr(self, f)[rows] for f in ("points", "normals", "face", "area", "residual", "mover")))
+        return _Table(*(getattr(self, f)[rows] for f in COLUMNS))
 
-    def __add__(self, more: _Table) -> _Table:
-        return _Table(*(np.concatenate([getattr(self, f), getattr(more, f)])
-                        for f in ("points", "normals", "face", "area", "residual", "mover")))
+
+def _joined(parts: list[_Table]) -> _Table:
+    """Tables as one, in order.
+
+    ``parts`` is emptied, so that each column is freed as soon as it is copied: the memory of the proof peaks here.
+    """
+    columns = [[getattr(part, f) for part in parts if len(part)] for f in COLUMNS] if any(map(len, parts)) else []
+    parts.clear()
+    made = []
+    while columns:
+        column = columns.pop(0)
+        made.append(column[0] if len(column) == 1 else np.concatenate(column))
+        del column
+    return _Table(*made) if made else _none()
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,30 +145,29 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
 
     Returns SurfaceCuts; the same bytes for any number of threads.
     """
-    s, guard = scored.samples, guard_samples(part.mesh)
-    tell(0.05)
-    edge, bisector, edge_face = convex_edges(part.mesh)
-    tell(0.1)
-    shot = _Shooting(part.mesh.bounds, moves, tools, setup, threads, reach_of(setup))
-    table = shot.rays(np.concatenate([s.points, guard.points, edge]),
-                      np.concatenate([s.normals, guard.normals, bisector]),
-                      np.concatenate([s.face, guard.face, edge_face]),
-                      np.concatenate([s.area, guard.area, np.zeros(len(edge))]), lambda f: tell(0.1 + 0.6 * f))
-    first, on_edge = len(table), len(s) + len(guard)
-    places = judged_places(s, table.residual[:len(s)], part.mesh.bounds, moves, tools, setup, shot.reach, threads,
+    s, shot = scored.samples, _Shooting(part.mesh.bounds, moves, tools, setup, threads, reach_of(setup))
+    rays, guarded = _even_rays(s, part.mesh, tell)
+    first, on_edge = len(rays[0]), len(s) + guarded
+    parts = [shot.rays(*rays, lambda f: tell(0.1 + 0.6 * f))]
+    del rays
+    left_on = parts[0].residual[:len(s)]
+    places = judged_places(s, left_on, part.mesh.bounds, moves, tools, setup, shot.reach, threads,
                            lambda f: tell(0.7 + 0.05 * f))
-    close = close_points(s, table.residual[:len(s)], places, setup)
+    close = close_points(s, left_on, places, setup)
+    del left_on
     if len(close.row):
-        table += shot.rays(close.points, close.normals, s.face[close.row], np.zeros(len(close.row)),
-                           lambda f: tell(0.75 + 0.05 * f))
-    even = len(table)
+        parts.append(shot.rays(close.points, close.normals, s.face[close.row], np.zeros(len(close.row)),
+                               lambda f: tell(0.75 + 0.05 * f)))
+    even = sum(map(len, parts))
     tree = TriangleTree(part.mesh)
     feet, wide = turning_feet(tree, moves, tools, setup.gouge_tolerance)
     if len(feet.triangle):
-        table += shot.rays(feet.points, feet.normals, part.mesh.face_ids[feet.triangle], np.zeros(len(feet.triangle)),
-                           lambda f: tell(0.8 + 0.05 * f), stock=shot.reach)
-    table += _followed(tree, shot)
-    table = _at_ends(_deepened(table, even, tree, shot, lambda f: tell(0.85 + 0.15 * f)), tree, shot)
+        parts.append(shot.rays(feet.points, feet.normals, part.mesh.face_ids[feet.triangle],
+                               np.zeros(len(feet.triangle)), lambda f: tell(0.8 + 0.05 * f), stock=shot.reach))
+    parts.append(_followed(tree, shot))
+    parts = [_joined(parts)]
+    parts = [_deepened(parts, even, tree, shot, lambda f: tell(0.85 + 0.15 * f))]
+    table = _at_ends(parts, tree, shot)
     gouged = np.flatnonzero((table.residual < -setup.gouge_tolerance - RAY_ERROR) & (table.mover >= 0))
     tips = tip_gouges(part.mesh, moves, tools, source, setup.gouge_tolerance + RAY_ERROR)
     watch = np.arange(len(s), first)
@@ -166,9 +180,21 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
                                 table.mover[gouged], source, setup.gouge_tolerance)],
         _in_allowance(table, (row < on_edge) | ((row >= first) & (row < even)), setup, source),
         _excluded(table, slice(len(s), on_edge), part.mesh, shot, source),
-        max([float(-table.residual.min(initial=0.0)), 0.0, *(f.depth for f in tips)]), left[:len(guard)],
-        left[len(guard):], close, table.residual[first:even], shot.reach, [*wide_samples(part.mesh), *wide],
+        max([float(-table.residual.min(initial=0.0)), 0.0, *(f.depth for f in tips)]), left[:guarded],
+        left[guarded:], close, table.residual[first:even], shot.reach, [*wide_samples(part.mesh), *wide],
         _thread_notes(np.unique(moves.tool[table.mover[gouged]]).tolist(), tools))
+
+
+def _even_rays(samples: SurfaceSamples, mesh: TriangleMesh, tell: Report) -> tuple[tuple[F64, F64, I32, F64], int]:
+    """Points, normals, faces and areas of samples, guard points and places on edges; and how many guard points."""
+    guard = guard_samples(mesh)
+    tell(0.05)
+    edge, bisector, edge_face = convex_edges(mesh)
+    tell(0.1)
+    return (np.concatenate([samples.points, guard.points, edge]),
+            np.concatenate([samples.normals, guard.normals, bisector]),
+            np.concatenate([samples.face, guard.face, edge_face]),
+            np.concatenate([samples.area, guard.area, np.zeros(len(edge))])), len(guard)
 
 
 def _thread_notes(cutting: Sequence[int], tools: Sequence[ToolBody]) -> list[str]:
@@ -200,7 +226,7 @@ def _followed(tree: TriangleTree, shot: _Shooting) -> _Table:
         if sum(map(len, rows)) >= RAY_BATCH:
             shoot()
     shoot()
-    return sum(kept[1:], kept[0])
+    return _joined(kept)
 
 
 def _none() -> _Table:
@@ -224,17 +250,18 @@ def _cut(table: _Table, shot: _Shooting) -> _Table:
                                      & (table.mover >= 0)))
 
 
-def _deepened(table: _Table, even: int, tree: TriangleTree, shot: _Shooting, tell: Report) -> _Table:
+def _deepened(taken: list[_Table], even: int, tree: TriangleTree, shot: _Shooting, tell: Report) -> _Table:
     """More rays round the places that are cut, and the depths of all gouges.
 
-    even : count of rays that lie evenly over the part
+    taken : one table, which is taken out of the list
+    even  : count of rays that lie evenly over the part
     """
     tolerance = shot.setup.gouge_tolerance
-    near = _cut(table, shot)
+    near = _cut(taken[0], shot)
     if not len(near):
-        return table
+        return taken.pop()
     doubtful, deep = closer_seeds(near.points, near.residual, near.mover, tolerance)
-    looks, kept = len(doubtful) + len(deep), [table]
+    looks, kept = len(doubtful) + len(deep), [taken.pop()]
     for i in range(0, len(doubtful), SEED_BATCH):
         seeds = doubtful[i:i + SEED_BATCH]
         first = _close_rays(tree, shot, *first_points(tree, seeds))
@@ -245,15 +272,19 @@ def _deepened(table: _Table, even: int, tree: TriangleTree, shot: _Shooting, tel
         seeds = deep[i:i + SEED_BATCH]
         kept.append(_gouged(_close_rays(tree, shot, *closer_points(tree, seeds)), shot))
         tell(0.25 + 0.25 * (i + len(seeds)) / len(deep))
-    table = sum(kept[1:], kept[0])
+    table = _joined(kept)
     rows = np.flatnonzero((table.residual < -tolerance) & (table.mover >= 0))
     rays, left = Rays(table.points, table.normals, table.residual), Remains(tree, shot.moves, shot.tools, shot.threads)
     table.residual[rows] = -depths_both_ways(left, rays, rows, even, tolerance, lambda f: tell(0.5 + 0.5 * f))
     return table
 
 
-def _at_ends(table: _Table, tree: TriangleTree, shot: _Shooting) -> _Table:
-    """The rays of a table, and the ends of tools that gouge deeper than the rays of their move say."""
+def _at_ends(taken: list[_Table], tree: TriangleTree, shot: _Shooting) -> _Table:
+    """The rays of a table, and the ends of tools that gouge deeper than the rays of their move say.
+
+    taken : one table, which is taken out of the list
+    """
+    table = taken.pop()
     tolerance = shot.setup.gouge_tolerance + RAY_ERROR
     gouged = np.flatnonzero((table.residual < -tolerance) & (table.mover >= 0))
     gouged = gouged[np.lexsort((gouged, table.residual[gouged], table.mover[gouged]))]
@@ -266,8 +297,10 @@ def _at_ends(table: _Table, tree: TriangleTree, shot: _Shooting) -> _Table:
     known[np.searchsorted(rows, mover)] = -table.residual[gouged[first]]
     pointed = np.array([t.cone_height > 0.0 and t.tip_diameter <= 0.0 for t in shot.tools])  # see ``tip_gouges``
     new = np.flatnonzero((depth > known + RAY_ERROR) & ~pointed[shot.moves.tool[rows]])
-    return table + _Table(place[new], tree.mesh.normals[triangle[new]], tree.mesh.face_ids[triangle[new]],
-                          np.zeros(len(new)), -depth[new], rows[new].astype(np.int32))
+    parts = [table, _Table(place[new], tree.mesh.normals[triangle[new]], tree.mesh.face_ids[triangle[new]],
+                           np.zeros(len(new)), -depth[new], rows[new].astype(np.int32))]
+    del table
+    return _joined(parts)
 
 
 def _gouged(table: _Table, shot: _Shooting) -> _Table:

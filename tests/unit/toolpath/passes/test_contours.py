@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from geometry.mesh import TriangleMesh
 from tests.hand_parts import ball, box_mesh, field_of, terraces, tool, walls
 from tests.plan_checks import dense
-from toolpath.kernels.contour import OFF
+from toolpath.kernels.contour import OFF, SEGMENTS, trace
 from toolpath.lines import Line, pieces_where, place_keys, thinned, true_runs
 from toolpath.passes.contours import contour_pieces, contours, dilated, free_pieces, moves_free, rings
 
@@ -58,6 +59,54 @@ def test_dilation_grows_a_square():
     m = np.zeros((9, 9), bool)
     m[4, 4] = True
     assert dilated(m, 0.0).sum() == 1 and dilated(m, 1.0).sum() == 9 and dilated(m, 1.2).sum() == 25
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_dilation_agrees_with_every_node_asked_for_itself(seed):
+    rng = np.random.default_rng(seed)
+    mask, reach = rng.random(rng.integers(1, 30, 2)) < rng.choice([0.01, 0.1, 0.5]), int(rng.integers(1, 7))
+    got = dilated(mask, reach - 0.5)
+    for i, j in np.ndindex(mask.shape):
+        assert got[i, j] == mask[max(i - reach, 0):i + reach + 1, max(j - reach, 0):j + reach + 1].any()
+
+
+def chains_by_hand(blocked, active):
+    """Chains of lattice edges, each edge as its two nodes, from a table of who follows whom."""
+    follow = {}
+    for i, j in np.ndindex(blocked.shape[0] - 1, blocked.shape[1] - 1):
+        nodes = [(i, j), (i, j + 1), (i + 1, j + 1), (i + 1, j)]
+        if not active[i, j]:
+            continue
+        turns = [k for k in range(4) if blocked[nodes[k]] != blocked[nodes[(k + 1) % 4]]]
+        for k in turns:  # into the cell where the side runs from a free node to a blocked one, seen anticlockwise
+            if blocked[nodes[(k + 1) % 4]]:
+                out = next(m % 4 for m in range(k - 1, k - 4, -1) if m % 4 in turns)
+                follow[frozenset((nodes[k], nodes[(k + 1) % 4]))] = frozenset((nodes[out], nodes[(out + 1) % 4]))
+    chains = []
+    for at in [*(e for e in follow if e not in follow.values()), *follow]:
+        chain = []
+        while at in follow:
+            chain.append(at)
+            at = follow.pop(at)
+        if chain:
+            chains.append((chain if at == chain[0] else [*chain, at], at == chain[0]))
+    return chains
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_traced_chains_are_those_found_by_hand(seed):
+    rng = np.random.default_rng(seed)
+    blocked = ndimage.gaussian_filter(rng.random((14, 17)), rng.choice([0.1, 1.0])) > 0.5
+    active = rng.random(blocked.shape) < rng.choice([0.7, 1.0])
+    ids, starts, closed = trace(blocked, active, SEGMENTS)
+    nx = blocked.shape[1]
+    ends = [frozenset((divmod(e // 2, nx), divmod(e // 2 + (nx if e % 2 else 1), nx))) for e in ids.tolist()]
+    got = {(frozenset(zip(ends[a:b], ends[a + 1:b], strict=False)), bool(c))
+           for a, b, c in zip(starts[:-1], starts[1:], closed, strict=True)}
+    hand = chains_by_hand(blocked, active)
+    assert {(frozenset(zip(c, c[1:], strict=False)), k) for c, k in hand if not k} == {g for g in got if not g[1]}
+    rounds = {frozenset(c) for c, k in hand if k}
+    assert rounds == {frozenset(ends[a:b]) for a, b, c in zip(starts[:-1], starts[1:], closed, strict=True) if c}
 
 
 def test_pieces_are_cut_out_extended_and_joined():
