@@ -262,3 +262,39 @@ def test_many_fixture_points_are_thinned_and_what_no_tool_comes_near_is_left_out
     assert len(here) < 0.2 * MAX_FIXTURE_POINTS and here[:, 0].max() < 60 and here[:, 2].max() == 100
     assert near_all(big, (10.0, 10, 105), (20.0, 20, 110)).shape == (0, 3)
 
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_rapids_that_stray_keep_as_much_more_free_however_far_the_place_is(seed):
+    rng, steps = np.random.default_rng(seed), np.linspace(0.0, 1.0, 601)
+    plain = random_moves(rng, 10, length=5.0)
+    stray = np.repeat([0.0, 6.0, 80.0], (2, 4, 4))
+    moves = Moves(plain.start, plain.end, np.zeros(10, bool), plain.tool, plain.axes, stray)
+    points = rng.uniform(-70.0, 70.0, (300, 3))
+    points = points[(np.linalg.norm(points[:, :2], axis=1) > 25.0) | (points[:, 2] < -12.0)]
+    fixed = rng.random(len(points)) < 0.3
+    got = {}
+    for row in run_clashes(points, fixed, moves, [TOOL], SETUP)[0]:
+        key = (int(row[0]), int(row[1]))
+        got[key] = max(got.get(key, 0.0), row[2] - row[3] + SETUP.clearance_rapid + stray[int(row[0])])
+    count = 0
+    for m in range(10):
+        rho, h = seen(points[:, None, :], moves, m, np.broadcast_to(steps, (len(points), len(steps))))
+        gaps = {CUTTER: signed(rho, h, TOOL)}
+        for row in Bodies.of([TOOL], SETUP).rows:
+            gap = apart(rho, h, row[0], row[1], row[2] - row[4], row[3] - row[4])
+            gaps[int(row[5])] = np.minimum(gaps.get(int(row[5]), np.inf), gap)
+        for code, gap in gaps.items():
+            for held in (False, True):
+                want = SETUP.clearance_rapid + stray[m] - gap.min(axis=1)[fixed == held].min()
+                assert got.get((m, code + FIXTURE * held), 0.0) == pytest.approx(max(want, 0.0), abs=0.02)
+                count += want > 0.0
+    assert count > 20
+
+
+def test_a_place_beyond_the_reach_of_the_tool_is_within_its_stray():
+    z = np.array([[0.0, 0.0, 1.0]])
+    moves = Moves(np.zeros((1, 3)), np.array([[0.0, 3.0, 0.0]]), np.zeros(1, bool), np.zeros(1, np.int32),
+                  ToolAxes.between(z, z), np.array([70.0]))
+    events, _ = run_clashes(np.array([[62.0, 1.0, 2.5]]), np.zeros(1, bool), moves, [TOOL], SETUP)
+    assert events[events[:, 1] == CUTTER, 2] == pytest.approx([71.0 - 60.0])

@@ -17,9 +17,11 @@ from verify.kernels.field import brick_tops
 from verify.kernels.grid import cross_columns
 from verify.kernels.stock import CUTTER, HOLDER, NECK, PLUNGE, SHANK
 from verify.material.stock_field import DistanceField, run_field, stock_field
+from verify.material.stock_lines import blank, run_stock
 from verify.material.stock_pass import parts
 from verify.model import ProofSetup
 from verify.moves import BOW, Moves
+from verify.tool_axes import ToolAxes
 
 MESH = box_mesh(*BOX)
 TOOLS = {"ball": mill(4.0, 2.0, 7.0), "flat": mill(5.0, 0.0, 8.0), "bull": mill(6.0, 1.0, 8.0)}
@@ -290,3 +292,21 @@ def test_tops_of_bricks():
     for i, j, k in itertools.product(range(3), repeat=3):
         own = values[1 + 4 * i:min(5 + 4 * i, 11), 4 * j:min(4 + 4 * j, 9), 3 + 4 * k:min(7 + 4 * k, 14)]
         assert tops[i, j, k] == own.max()
+
+
+@pytest.mark.parametrize("away", [12.0, 40.0, 150.0])
+def test_stock_is_within_the_stray_of_a_rapid_however_far_it_is(away):
+    tool = mill(4.0, 0.0, 8.0)
+    start, end = np.array([[BOX[1, 0] + 2.0 + away, -3.0, -2.0]]), np.array([[BOX[1, 0] + 2.0 + away, 3.0, -2.0]])
+    for lean in (0.0, 0.1):
+        z = np.array([[0.0, np.sin(lean), np.cos(lean)]])
+        for stray in (away - 1.5, away + 5.0):
+            moves = Moves(start, end, np.zeros(1, bool), np.zeros(1, np.int32), ToolAxes.between(z, z),
+                          np.array([stray]))
+            events = run_field(stock_field(MESH, block(), 0.3), moves, [tool], block()).events
+            upright = replace(moves, axes=None)
+            lines = run_stock(blank(MESH, 0.3, block()), upright, [tool], block()).events if lean == 0.0 else events
+            near = block().clearance_rapid + stray - away
+            for found in (events, lines):
+                met = found[found[:, 1] == CUTTER, 2]
+                assert met.max(initial=0.0) == pytest.approx(max(near, 0.0), abs=0.4)

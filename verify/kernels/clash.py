@@ -15,13 +15,14 @@ from numba import njit
 
 from geometry.kernels.cutter_sizes import CutterSizes
 from geometry.kernels.options import KERNEL
-from verify.kernels.frustum import Frustum, clear_of, contact, no_deeper
+from verify.kernels.frustum import Frustum, at_least, clear_of, contact, no_deeper
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import beside, carried
-from verify.kernels.stock import CUTTER, FIXTURE, ROUNDING, _note, _worse, known_depth
+from verify.kernels.stock import CUTTER, FIXTURE, ROUNDING, _note, _worse, known_depth, known_gap
 from verify.kernels.tables import F64, AxisArrays, Bool, ContactLimits, MoveArrays, RapidArrays, ToolArrays
 
 TOUCHING = 1e-3
+SEARCHED = 1e-4  # mm, more than searches for the least distance leave
 ASIDE = 5e-3  # mm a straight lift may end beside its axis: coordinates of programs have two or three decimals
 
 
@@ -58,6 +59,12 @@ def _meets(p, balls, node, z0, z1, wide, clearance, known):
 
 
 @njit(**KERNEL)
+def _off(p, balls, node, cutter, bodies, b, gap):
+    """Whether no point of a ball comes nearer to body b of a tool on piece p than ``gap``, mm."""
+    return keeps_off(p, balls[node, 0], balls[node, 1], balls[node, 2], balls[node, 3], cutter, bodies, b, gap)
+
+
+@njit(**KERNEL)
 def _meet_point(p, x, y, z, cutter, bodies, b, grow, slack, known):
     """Depth of a point in body b of a tool on piece p as an event counts it; b < 0 is the cutting part.
 
@@ -76,14 +83,39 @@ def _meet_point(p, x, y, z, cutter, bodies, b, grow, slack, known):
 
 
 @njit(**KERNEL)
-def _clear_point(p, x, y, z, cutter, bodies, b):
+def clear_point(p, x, y, z, cutter, bodies, b):
     """Distance of a point to body b of a tool on piece p, mm; b < 0 is the cutting part; 0 inside."""
     qx, qy, qz, dx, dy, dz = view(p, x, y, z)
     if b < 0:
         return max(carried(qx, qy, qz, dx, dy, dz, cutter.radius - cutter.corner, cutter.corner, cutter.length,
                            cutter.cone), 0.0)
-    body = bodies[b]
-    return clear_of(qx, qy, qz, dx, dy, dz, Frustum(body[0], body[1], body[2] - body[4], body[3] - body[4]), False)
+    return clear_of(qx, qy, qz, dx, dy, dz, bare_body(bodies, b), False)
+
+
+@njit(**KERNEL)
+def bare_body(bodies, b):
+    """Body b without its clearance."""
+    return Frustum(bodies[b, 0], bodies[b, 1], bodies[b, 2] - bodies[b, 4], bodies[b, 3] - bodies[b, 4])
+
+
+@njit(**KERNEL)
+def keeps_off(p, x, y, z, rad, cutter, bodies, b, gap):
+    """Whether no place of a ball comes nearer to body b of a tool on piece p than ``gap``, mm."""
+    if b >= 0:
+        qx, qy, qz, dx, dy, dz = view(p, x, y, z)
+        if at_least(qx, qy, qz, dx, dy, dz, bare_body(bodies, b)) - rad >= gap:
+            return True
+    return clear_point(p, x, y, z, cutter, bodies, b) - rad >= gap
+
+
+@njit(**KERNEL)
+def nearest_known(p, best, code, cutter, bodies, b, clearance, room):
+    """How near, mm, a place must come to body b on piece p to be the gravest of code: no farther than the gravest of
+    this move, and than the place that was the gravest of an earlier one."""
+    out = known_gap(best, code, clearance, room)
+    if best[code, 1] >= 0.0:
+        out = min(out, clear_point(p, best[code, 2], best[code, 3], best[code, 4], cutter, bodies, b))
+    return out + SEARCHED
 
 
 @njit(**KERNEL)
@@ -100,6 +132,11 @@ def _traverse(p, chunk, cloud, held, every, cutter, bodies, b, grow, room, slack
     z0, z1 = z0 - room, z1 + room
     of_fixture, known = known_depth(best, code + FIXTURE, clearance), known_depth(best, code, clearance)
     known = of_fixture if not every else min(known, of_fixture) if held else known
+    near, near_fixture = -math.inf, -math.inf
+    if room > 0.0:
+        near = nearest_known(p, best, code, cutter, bodies, b, clearance, room) if every else near
+        if held:
+            near_fixture = nearest_known(p, best, code + FIXTURE, cutter, bodies, b, clearance, room)
     points, fixed = cloud.points, cloud.fixed
     t0, t1, t2, t3 = cloud.balls
     if not _meets(p, t3, chunk, z0, z1, wide, clearance, known):
@@ -107,12 +144,21 @@ def _traverse(p, chunk, cloud, held, every, cutter, bodies, b, grow, room, slack
     for n2 in range(chunk * 8, chunk * 8 + 8):
         if not _meets(p, t2, n2, z0, z1, wide, clearance, known):
             continue
+        if room > 0.0 and _off(p, t2, n2, cutter, bodies, b, max(near, near_fixture)):
+            continue
         for n1 in range(n2 * 8, n2 * 8 + 8):
             if not _meets(p, t1, n1, z0, z1, wide, clearance, known):
+                continue
+            if room > 0.0 and _off(p, t1, n1, cutter, bodies, b, max(near, near_fixture)):
                 continue
             for leaf in range(n1 * 8, n1 * 8 + 8):
                 if not _meets(p, t0, leaf, z0, z1, wide, clearance, known):
                     continue
+                if room > 0.0:
+                    near = min(near, known_gap(best, code, clearance, room) + SEARCHED)
+                    near_fixture = min(near_fixture, known_gap(best, code + FIXTURE, clearance, room) + SEARCHED)
+                    if _off(p, t0, leaf, cutter, bodies, b, max(near, near_fixture)):
+                        continue
                 for i in range(leaf * 8, min(leaf * 8 + 8, len(points))):
                     if every or fixed[i]:
                         depth = _meet_point(p, points[i, 0], points[i, 1], points[i, 2], cutter, bodies, b, grow,
@@ -122,7 +168,7 @@ def _traverse(p, chunk, cloud, held, every, cutter, bodies, b, grow, room, slack
                         if depth > 0.0:
                             _worse(best, into, depth, clearance, points[i, 0], points[i, 1], points[i, 2])
                         if room > 0.0 and known_depth(best, into, room) < room:
-                            gap = _clear_point(p, points[i, 0], points[i, 1], points[i, 2], cutter, bodies, b)
+                            gap = clear_point(p, points[i, 0], points[i, 1], points[i, 2], cutter, bodies, b)
                             if gap < room - ROUNDING:
                                 _worse(best, into, room - gap, room, points[i, 0], points[i, 1], points[i, 2])
 
@@ -137,6 +183,7 @@ def clash_chunk(chunk, cloud: PointArrays, moves: MoveArrays, axes: AxisArrays, 
     free, rooms = rapids
     fixed, t3 = cloud.fixed, cloud.balls[3]
     best, piece = np.zeros((16, 5)), np.empty(PIECE)
+    best[:, 1] = -1.0  # no place is known yet
     x, y, z, rad = t3[chunk, 0], t3[chunk, 1], t3[chunk, 2], t3[chunk, 3]
     held = False
     for i in range(chunk * 4096, min(chunk * 4096 + 4096, len(fixed))):
@@ -144,7 +191,7 @@ def clash_chunk(chunk, cloud: PointArrays, moves: MoveArrays, axes: AxisArrays, 
     count = 0
     for m in range(len(starts)):
         k, feed = tool[m], feeds[m]
-        far = reach[k] + rad + bow + limits.rapid
+        far = reach[k] + rad + bow + max(limits.rapid, rooms[m])
         if near_segment2(x, y, z, starts[m], ends[m]) > far * far:
             continue
         cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3])

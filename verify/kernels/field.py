@@ -24,13 +24,13 @@ from numpy.typing import NDArray
 
 from geometry.kernels.cutter_sizes import CutterSizes
 from geometry.kernels.options import KERNEL
-from verify.kernels.clash import TOUCHING, is_lift
+from verify.kernels.clash import SEARCHED, TOUCHING, bare_body, is_lift, keeps_off, nearest_known
 from verify.kernels.engaged import LEAST_DEPTH, EngagedArrays, bottom, edge_radius, sector_bits
 from verify.kernels.frustum import Frustum, clear_of, contact_of_ball, no_deeper
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import beside, carried
 from verify.kernels.rays import gap, plan_distance
-from verify.kernels.stock import CUTTER, ROUNDING, _note, _worse, known_depth
+from verify.kernels.stock import CUTTER, ROUNDING, _note, _worse, known_depth, known_gap
 from verify.kernels.tables import F64, I64, AxisArrays, ContactLimits, MoveArrays, RapidArrays, ToolArrays
 
 LEAST_CUT = 1e-5
@@ -39,6 +39,7 @@ ON_NODE = 1e-6  # mm: a layer of nodes in the plane of an end counts whole, what
 RISE = 0.02  # mm: a tool that goes up goes no further between two looks at its bodies, where they met what stood before
 MAX_LOOKS = 128
 VOLUME_UNITS = 1e9
+BLOCK = 4  # bricks a side that one look at their ball passes over
 
 
 class FieldArrays(NamedTuple):
@@ -238,16 +239,30 @@ def _cut(stock, bricks, p, cutter, steep, end_radius, twist, engaged, parted, to
 
 
 @njit(**KERNEL)
-def _meet(stock, bricks, p, body, is_cutter, cutter, grow, room, slack, best):
-    """Find the stock of a tile that one body of a tool, grown by ``grow``, takes in on piece p, or is within ``room``
-    of."""
+def _known(stock, p, best, code, cutter, bodies, b, clearance, room):
+    """As ``nearest_known``, of a place that is still stock."""
     field, origin, h, _band = stock
+    if best[code, 1] >= 0.0:
+        i, j, k = (round((best[code, 2] - origin[0]) / h), round((best[code, 3] - origin[1]) / h),
+                   round((best[code, 4] - origin[2]) / h))
+        if field[i, j, k] <= 0.0:
+            best[code, 1] = -1.0
+    return nearest_known(p, best, code, cutter, bodies, b, clearance, room)
+
+
+@njit(**KERNEL)
+def _meet(stock, bricks, p, bodies, b, cutter, grow, room, slack, best):
+    """Find the stock of a tile that body b of a tool, grown by ``grow``, takes in on piece p, or is within ``room`` of.
+
+    b < 0 is the cutting part
+    """
+    _field, origin, h, band = stock
     tile, tops, solid = bricks
     z0, z1, wide, clearance, code = 0.0, cutter.length, cutter.radius + max(grow, room), grow, CUTTER
-    bare = Frustum(body[0], body[1], body[2] - body[4], body[3] - body[4])
-    if not is_cutter:
-        z0, z1, clearance, code = body[0], body[1], body[4] + grow, int(body[5])
-        wide = max(max(body[2], body[3]) + grow, max(bare.r0, bare.r1) + room)
+    if b >= 0:
+        bare = bare_body(bodies, b)
+        z0, z1, clearance, code = bare.z0, bare.z1, bodies[b, 4] + grow, int(bodies[b, 5])
+        wide = max(bare.r0, bare.r1) + max(clearance, room)
     z0, z1 = z0 - room, z1 + room
     box = _box(p, z0, z1, wide)
     nx, ny, nz = tops.shape
@@ -257,46 +272,70 @@ def _meet(stock, bricks, p, body, is_cutter, cutter, grow, room, slack, best):
     a0, b0, c0 = max(a0, solid[0]), max(b0, solid[1]), max(c0, solid[2])
     a1, b1, c1 = min(a1, solid[3]), min(b1, solid[4]), min(c1, solid[5])
     half = 1.5 * math.sqrt(3.0) * h
-    for bi in range(a0, a1 + 1):
-        for bj in range(b0, b1 + 1):
-            for bk in range(c0, c1 + 1):
-                top = tops[bi, bj, bk]
-                if top <= 0.0:
+    near = _known(stock, p, best, code, cutter, bodies, b, clearance, room) if room > 0.0 else 0.0
+    for block in np.ndindex((a1 - a0 + BLOCK) // BLOCK, (b1 - b0 + BLOCK) // BLOCK, (c1 - c0 + BLOCK) // BLOCK):
+        i0, j0, k0 = a0 + BLOCK * block[0], b0 + BLOCK * block[1], c0 + BLOCK * block[2]
+        if room > 0.0:
+            middle = 0.5 * (4 * BLOCK - 1)
+            if keeps_off(p, origin[0] + (tile[0] + 4 * i0 + middle) * h, origin[1] + (tile[2] + 4 * j0 + middle) * h,
+                         origin[2] + (tile[4] + 4 * k0 + middle) * h, middle * math.sqrt(3.0) * h + band, cutter,
+                         bodies, b, near):
+                continue
+        for bi in range(i0, min(i0 + BLOCK, a1 + 1)):
+            x = origin[0] + (tile[0] + 4 * bi + 1.5) * h
+            for bj in range(j0, min(j0 + BLOCK, b1 + 1)):
+                y = origin[1] + (tile[2] + 4 * bj + 1.5) * h
+                for bk in range(k0, min(k0 + BLOCK, c1 + 1)):
+                    top = tops[bi, bj, bk]
+                    if top <= 0.0:
+                        continue
+                    z = origin[2] + (tile[4] + 4 * bk + 1.5) * h
+                    qx, qy, qz, dx, dy, dz = view(p, x, y, z)
+                    far = half + top
+                    # no node here can be deeper than that
+                    if no_deeper(qx, qy, qz, dx, dy, dz, z0 - far, z1 + far, wide + far, clearance,
+                                 known_depth(best, code, clearance)):
+                        continue
+                    if room > 0.0:
+                        near = min(near, known_gap(best, code, clearance, room) + SEARCHED)
+                        if keeps_off(p, x, y, z, far, cutter, bodies, b, near):
+                            continue
+                    _meet_brick(stock, tile, (bi, bj, bk), p, bodies, b, cutter, grow, room, slack, best)
+
+
+@njit(**KERNEL)
+def _meet_brick(stock, tile, brick, p, bodies, b, cutter, grow, room, slack, best):
+    """As ``_meet``, of the nodes of one brick."""
+    field, origin, h, _band = stock
+    clearance, code = (grow, CUTTER) if b < 0 else (bodies[b, 4] + grow, int(bodies[b, 5]))
+    i0, j0, k0 = tile[0] + 4 * brick[0], tile[2] + 4 * brick[1], tile[4] + 4 * brick[2]
+    for i in range(i0, min(i0 + 4, tile[1])):
+        for j in range(j0, min(j0 + 4, tile[3])):
+            for k in range(k0, min(k0 + 4, tile[5])):
+                v = field[i, j, k]
+                if v <= 0.0:
                     continue
-                i0, j0, k0 = tile[0] + 4 * bi, tile[2] + 4 * bj, tile[4] + 4 * bk
-                qx, qy, qz, dx, dy, dz = view(p, origin[0] + (i0 + 1.5) * h, origin[1] + (j0 + 1.5) * h,
-                                              origin[2] + (k0 + 1.5) * h)
-                far = half + top
-                # no node here can be deeper than that
-                if no_deeper(qx, qy, qz, dx, dy, dz, z0 - far, z1 + far, wide + far, clearance,
-                             known_depth(best, code, clearance)):
-                    continue
-                for i in range(i0, min(i0 + 4, tile[1])):
-                    for j in range(j0, min(j0 + 4, tile[3])):
-                        for k in range(k0, min(k0 + 4, tile[5])):
-                            v = field[i, j, k]
-                            if v <= 0.0:
-                                continue
-                            x, y, z = origin[0] + i * h, origin[1] + j * h, origin[2] + k * h
-                            qx, qy, qz, dx, dy, dz = view(p, x, y, z)
-                            if is_cutter:
-                                gap = carried(qx, qy, qz, dx, dy, dz, cutter.radius - cutter.corner, cutter.corner,
-                                              cutter.length, cutter.cone) - v
-                                depth = grow - gap if gap < -slack else 0.0
-                                if depth == 0.0 and known_depth(best, code, grow) < grow:
-                                    depth = grow - beside(qx, qy, qz, dx, dy, dz, cutter, v, grow, slack)
-                            else:
-                                # the ball of radius v round the node is stock
-                                depth = contact_of_ball(qx, qy, qz, dx, dy, dz,
-                                                        Frustum(body[0], body[1], body[2] + grow, body[3] + grow), v,
-                                                        clearance, slack, known_depth(best, code, clearance))
-                                gap = math.inf
-                                if room > 0.0 and known_depth(best, code, room) < room:
-                                    gap = clear_of(qx, qy, qz, dx, dy, dz, bare, False) - v
-                            if depth > 0.0:
-                                _worse(best, code, depth, clearance, x, y, z)
-                            if gap < room - ROUNDING:
-                                _worse(best, code, room - max(gap, 0.0), room, x, y, z)
+                x, y, z = origin[0] + i * h, origin[1] + j * h, origin[2] + k * h
+                qx, qy, qz, dx, dy, dz = view(p, x, y, z)
+                if b < 0:
+                    gap = carried(qx, qy, qz, dx, dy, dz, cutter.radius - cutter.corner, cutter.corner, cutter.length,
+                                  cutter.cone) - v
+                    depth = grow - gap if gap < -slack else 0.0
+                    if depth == 0.0 and known_depth(best, code, grow) < grow:
+                        depth = grow - beside(qx, qy, qz, dx, dy, dz, cutter, v, grow, slack)
+                else:
+                    # the ball of radius v round the node is stock
+                    depth = contact_of_ball(qx, qy, qz, dx, dy, dz,
+                                            Frustum(bodies[b, 0], bodies[b, 1], bodies[b, 2] + grow,
+                                                    bodies[b, 3] + grow),
+                                            v, clearance, slack, known_depth(best, code, clearance))
+                    gap = math.inf
+                    if room > 0.0 and known_depth(best, code, room) < room:
+                        gap = clear_of(qx, qy, qz, dx, dy, dz, bare_body(bodies, b), False) - v
+                if depth > 0.0:
+                    _worse(best, code, depth, clearance, x, y, z)
+                if gap < room - ROUNDING:
+                    _worse(best, code, room - max(gap, 0.0), room, x, y, z)
 
 
 @njit(**KERNEL)
@@ -342,7 +381,7 @@ def _look(stock, bricks, p, tools, k, seen, feed, free, grow, room, limits, best
         if _beside(seen, bodies[b, 0] - room, bodies[b, 1] + room, max(bodies[b, 2], bodies[b, 3]) + max(extra, room)):
             continue
         loose = limits.beside if max(bodies[b, 2], bodies[b, 3]) <= cutter.radius + 1e-9 else TOUCHING
-        _meet(stock, bricks, p, bodies[b], False, cutter, extra, room, loose, best)
+        _meet(stock, bricks, p, bodies, b, cutter, extra, room, loose, best)
 
 
 @njit(**KERNEL)
@@ -382,7 +421,7 @@ def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, tw
     bricks = TileArrays(tile, tops, solid)
     changing = _solid(tops, band, solid)
     best, trial, piece, totals = np.zeros((16, 5)), np.zeros((16, 5)), np.empty(PIECE), np.zeros(5)
-    rows = np.zeros((1, 6)) if len(bodies) == 0 else bodies
+    best[:, 1] = -1.0  # no place is known yet
     sx, sy, sz = (tile[1] - tile[0] - 1) * h, (tile[3] - tile[2] - 1) * h, (tile[5] - tile[4] - 1) * h
     cx, cy = origin[0] + tile[0] * h + 0.5 * sx, origin[1] + tile[2] * h + 0.5 * sy
     cz = origin[2] + tile[4] * h + 0.5 * sz
@@ -392,7 +431,7 @@ def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, tw
         if not changing:
             break
         k, feed = tool[m], feeds[m]
-        far = reach[k] + rad + band + bow + limits.rapid
+        far = reach[k] + rad + band + bow + max(limits.rapid, rooms[m])
         if near_segment2(cx, cy, cz, starts[m], ends[m]) > far * far:
             continue
         cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3])
@@ -423,7 +462,7 @@ def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, tw
                 _cut(stock, bricks, piece, cutter, steep[m], ends_radius[k], twists[m], sectors[parts[m]:parts[m + 1]],
                      sums.parted[parts[m]:parts[m + 1]], totals)
             elif near:
-                _meet(stock, bricks, piece, rows[0], True, cutter, grow, rooms[m], TOUCHING, best)
+                _meet(stock, bricks, piece, bodies, -1, cutter, grow, rooms[m], TOUCHING, best)
             _look(stock, bricks, piece, tools, k, seen, feed, free[m], grow, rooms[m], limits, best)
         if totals[0] > 0.0 or totals[2] > 0.0:
             sums.taken[m, 0] += max(round(totals[0] * VOLUME_UNITS), 1)

@@ -216,6 +216,14 @@ def clear_of(wx, wy, wz, dx, dy, dz, body: Frustum, column):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def at_least(wx, wy, wz, dx, dy, dz, body: Frustum):
+    """A lower bound of ``clear_of`` for a point, mm: on the way neither distance at an end falls by more than it."""
+    first, last = _apart(math.hypot(wx, wy), wz, body, False), \
+        _apart(math.hypot(wx - dx, wy - dy), wz - dz, body, False)
+    return 0.5 * (first + last - math.sqrt(dx * dx + dy * dy + dz * dz))
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _of_ball(s, wx, wy, wz, dx, dy, dz, body, k, v, lesser):
     """The greatest of aside, or of the lesser of aside and down, of places within v of the point, at s.
 

@@ -170,6 +170,16 @@ def known_depth(best, code, clearance):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def known_gap(best, code, clearance, room):
+    """How near to the bare body, mm, a place must come to be graver than the one noted.
+
+    Without one, it is what is asked: the clearance aside or the room in every direction, whichever is more. 0 where one
+    is in the body.
+    """
+    return max(room - known_depth(best, code, room), clearance - known_depth(best, code, clearance), 0.0)
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _worse(best, code, depth, clearance, x, y, z):
     if depth > known_depth(best, code, clearance):
         best[code, 0], best[code, 1], best[code, 2], best[code, 3], best[code, 4] = depth, clearance, x, y, z
@@ -486,7 +496,7 @@ def stock_tile(box, lines: LineArrays, moves: MoveArrays, rapids: RapidArrays, d
         wide = cutters[k, 0]
         for b in range(body_first[k], body_first[k + 1]):
             wide = max(wide, bodies[b, 2], bodies[b, 3])
-        wide += grow
+        wide += max(grow, rooms[m])
         if min(a[0], ends[m, 0]) - wide > x1 or max(a[0], ends[m, 0]) + wide < x0 \
                 or min(a[1], ends[m, 1]) - wide > y1 or max(a[1], ends[m, 1]) + wide < y0:
             continue
