@@ -60,6 +60,7 @@ class FanucReader(FanucPlanes):
     """Fanuc 0i, 30i and relatives.
 
     further : G word of the work offsets after G59; counts : letters of whole numbers in a drilling cycle
+    rigid   : M word that begins rigid tapping; None: every tapping cycle is rigid
     """
 
     title = "Fanuc"
@@ -70,6 +71,7 @@ class FanucReader(FanucPlanes):
     further_words = FURTHER
     refused_m = FANUC_M
     repeats = "KL"
+    rigid: int | None = 29
     home_from, gives_up_length = 0, True
 
     def __init__(self) -> None:
@@ -78,6 +80,7 @@ class FanucReader(FanucPlanes):
         self.polar = False
         self.hole = False
         self.exact = self.limited = False
+        self.synchronous = self.taps = False
 
     def order(self, lines: Sequence[str], machine: Machine) -> Iterator[tuple[int, str]]:
         """As in the base class; ``verify.gcode.flow.macro_flow`` follows subprograms, macros, jumps and variables."""
@@ -105,7 +108,7 @@ class FanucReader(FanucPlanes):
         BlockError
             The line cannot be read, or could be read in two ways.
         """
-        if not self.polar and _PLAIN.fullmatch(raw):
+        if not self.polar and not self.taps and _PLAIN.fullmatch(raw):
             return [raw]
         text = self._bare(raw)
         if not text or _TAPE.fullmatch(text):
@@ -139,7 +142,7 @@ class FanucReader(FanucPlanes):
             return []
         if 53.1 in codes:
             return self.square(values)
-        before = self.level() if 69 in codes and self.frame is not None else []
+        before = [*self._spindle_of_taps(codes), *(self.level() if 69 in codes and self.frame is not None else [])]
         out = []
         arc = not {2.0, 3.0}.isdisjoint(codes) or (self.machine.s.motion in (2, 3) and {0.0, 1.0}.isdisjoint(codes)
                                                    and not self.hole)
@@ -154,6 +157,16 @@ class FanucReader(FanucPlanes):
         if deleted and not re.search(r"[XYZABCGTFH]", block):  # nothing of it moves the tool
             deleted = False
         return [*before, *([f"/{block}" if deleted else block] if block else []), *self._after(codes)]
+
+    def _spindle_of_taps(self, codes: list[float]) -> list[str]:
+        """Words of the spindle before a block: rigid tapping turns it itself, and leaves it standing at its end."""
+        if self.taps and not {0.0, 1.0, 2.0, 3.0, 80.0}.isdisjoint(codes):
+            self.taps = self.synchronous = False
+            return ["M5"]
+        if {74.0, 84.0}.isdisjoint(codes) or not (self.synchronous or self.rigid is None):
+            return []
+        begins, self.taps = not self.taps, True
+        return ["M3"] if begins and not self.machine.s.turning else []
 
     def _follow(self, codes: list[float]) -> None:
         """Keep the modes that the words of later blocks depend on."""
@@ -203,6 +216,9 @@ class FanucReader(FanucPlanes):
     def _idle_m(self, digits: str) -> bool:
         """Whether an M word moves nothing that the proof knows."""
         number = float(digits)
+        if number == self.rigid:
+            self.synchronous = True
+            return True
         if number in _KNOWN_M or number in _FOREIGN["M"] or number in (96, 97, 98, 99) or number % 1:
             return False
         self.function(int(number))

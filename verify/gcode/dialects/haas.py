@@ -28,6 +28,7 @@ class HaasReader(FanucReader):
     repeats = "L"
     counts = "KJ"
     refused_m = HAAS_M
+    rigid = None
 
     def _check(self, letter: str, digits: str) -> None:
         super()._check(letter, digits)

@@ -70,7 +70,7 @@ class Flow:
         self.structure = Structure()
         self._back: list[int] = []
         self._latest: dict[int, tuple[int, int]] = {}
-        self._programs: dict[int, int] = {}
+        self._programs: dict[int, list[int]] = {}
         self._runs_left: list[list[int]] = []  # of M98: line to come back to, first line, runs left
         self._kept: dict[int, ParametricLine] = {}
         self._runs: dict[str, Callable[[OWordStep], int]] = {
@@ -95,8 +95,10 @@ class Flow:
             return self.machine.log.error(str(problem), problem.line)
         at, runs = 0, 0
         if any(map(_CALL.search, self.lines)):
-            self._programs = {int(m[1]): k for k, line in enumerate(self.lines) if (m := _LABEL.fullmatch(line))}
-            self._programs.setdefault(-1, 0)
+            self._programs[-1] = []
+            for k, line in enumerate(self.lines):
+                if label := _LABEL.fullmatch(line):
+                    self._programs.setdefault(int(label[1]), []).append(k)
         plain, steps = self.structure.plain, self.structure.steps
         if not all(plain):
             self.machine.log.note("parameters, expressions and O-words are read as in LinuxCNC; other controls differ")
@@ -150,14 +152,18 @@ class Flow:
             call[2] -= 1
             return call[1] if call[2] > 0 else self._runs_left.pop()[0]
         number, times = int(words.get("P", -1)), int(words.get("L", 1))
-        if number not in self._programs or "P" not in words:
+        found = self._programs.get(number, [])
+        if not found:
             raise BlockError(f"M98 P{number}: the program O{number} is not in the file")
+        if len(found) > 1:
+            raise BlockError(f"M98 P{number}: O{number} stands twice in the file, at the lines {found[0] + 1} and "
+                             f"{found[1] + 1}")
         if len(self._runs_left) >= MAX_CALLS:
             raise BlockError(f"more than {MAX_CALLS} nested calls; LinuxCNC runs no more")
         if times < 1:
             return at + 1
-        self._runs_left.append([at + 1, self._programs[number] + 1, times])
-        return self._programs[number] + 1
+        self._runs_left.append([at + 1, found[0] + 1, times])
+        return found[0] + 1
 
     def _line(self, at: int) -> ParametricLine:
         """The parsed line; it is cached only where it can run again, as caching all lines slows garbage collection."""

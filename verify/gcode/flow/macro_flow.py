@@ -347,17 +347,18 @@ class MacroFlow:
         found = section.labels.get(number, [])
         if not found:
             raise BlockError(f"N{number} is not in the program")
+        _check_single(f"N{number}", found)
         return found[0]
 
     def _program(self, kind: str, number: int, times: int, counted: bool) -> tuple[_Section, int]:
         """The section of a called program and how often it runs; eight digits of M98 are count and number."""
-        by_number = {s.number: s for s in self.sections}
-        if number in by_number:
-            return by_number[number], times
-        if kind == "M98" and not self.haas and not counted and number >= 10_000:
+        found = [s for s in self.sections if s.number == number]
+        if not found and kind == "M98" and not self.haas and not counted and number >= 10_000:
             times, number = divmod(number, 10_000)
-            if number in by_number:
-                return by_number[number], times
+            found = [s for s in self.sections if s.number == number]
+        if found:
+            _check_single(f"O{number}", [s.start for s in found])
+            return found[0], times
         raise BlockError(f"{kind} P{number}: the program O{number} is not in the file",
                          f"put O{number} into the file, behind the end of the main program")
 
@@ -372,8 +373,16 @@ class MacroFlow:
         if call.level:
             self.scope.frames.pop()
         if "P" in words:
+            _check_single(f"N{words['P']:g}", call.caller.labels.get(round(words["P"]), []))
             return call.caller, self._label(words["P"], call.back - 1, call.caller)
         return call.caller, call.back
+
+
+def _check_single(name: str, lines: Sequence[int]) -> None:
+    """Refuse a destination that stands at several lines (from 0): controls differ in which one they take, or stop."""
+    if len(lines) > 1:
+        raise BlockError(f"{name} stands at the lines {', '.join(str(k + 1) for k in lines[:4])}, and controls "
+                         "differ in which one runs", "give each its own number")
 
 
 def has_macros(lines: Sequence[str]) -> bool:

@@ -335,3 +335,29 @@ def test_short_arcs_in_inches_and_by_their_radius():
     ("G18\nG43 H1\nG17\n", True), ("G19 G43 H1\nG17\n", True), ("G18\nG17 G43 H1\n", False), ("G18\nX1.\n", False)])
 def test_the_axis_of_a_length_that_begins_in_another_plane_is_told(body, told):
     assert [str(a.what) for a in read(body).open] == ["length_axis"] * told
+
+
+@pytest.mark.parametrize(("dialect", "calls"), [
+    ("fanuc", "M98 P10\nM30\nO10\nG1 X1. F9.\nM99\nO10\nG1 X2. F9.\nM99\n"),
+    ("haas", "M98 P10\nM30\nO10\nG1 X1. F9.\nM99\nO10\nG1 X2. F9.\nM99\n"),
+    ("fanuc", "G65 P10\nM30\nO10\nG1 X1. F9.\nM99\nO10\nG1 X2. F9.\nM99\n"),
+    ("linuxcnc", "M98 P10\nM2\nO10\nG1 X1 F9\nM99\nO10\nG1 X2 F9\nM99\n"),
+    ("haas", "M97 P5\nM30\nN5 G1 X1. F9.\nM99\nN5 G1 X2. F9.\nM99\n"),
+    ("fanuc", "M98 P10 Q5\nM30\nO10\nN5 G1 X1. F9.\nN5 G1 X2. F9.\nM99\n"),
+    ("fanuc", "M98 P10\nN7 X9.\nN7 X8.\nM30\nO10\nG1 X1. F9.\nM99 P7\n")])
+def test_a_destination_that_stands_twice_is_refused(dialect, calls):
+    with pytest.raises(ProgramError, match="stands (twice|at the lines)"):
+        read(calls, dialect)
+
+
+@pytest.mark.parametrize(("dialect", "tap", "stands"), [
+    ("fanuc", "M29 S500\nG99 G84 X5. Z-3. R2. F500.\nX7.\nG80\n", True),
+    ("fanuc", "G99 G84 X5. Z-3. R2. F500.\nG80\n", False),
+    ("fanuc", "M29 S500 G84 X5. Z-3. R2. F500.\nG0 X8.\n", True),
+    ("haas", "G99 G84 X5. Z-3. R2. F500.\nX7.\nG80\n", True)])
+def test_the_spindle_stands_behind_rigid_tapping(dialect, tap, stands):
+    for before in ("", "M5\n") if stands else ("",):  # a rigid cycle turns it by itself
+        for again in ("", "M3\n"):
+            p = read(f"{before}{tap}{again}G1 X1. F100.\n", dialect)
+            told = sum("spindle standing" in r.message for r in p.remarks)
+            assert told == (stands and not again), (before, again, p.remarks)

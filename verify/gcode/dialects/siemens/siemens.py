@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 from verify.gcode.dialects.base import ZEROS, BlockError, Machine, zero_word
 from verify.gcode.dialects.orientation import needed
@@ -88,11 +89,23 @@ class SiemensReader(SiemensCalls):
             self.number = number
             yield number, raw
 
-    def _modes(self) -> str:
-        """Words that restore the modes of now."""
+    def _modes(self) -> Callable[[], str]:
+        """A call that restores the modes and the programmable frame of now; it gives the words for what is left."""
         s = self.machine.s
-        motion = [f"G{self.motion}"] if isinstance(self.motion, int) else []
-        return " ".join([f"G{s.plane}", "G91" if s.relative else "G90", *motion])
+        kept, frames, named = replace(s), (self.swivel, self.programmed), (self.motion, self.circle, self.style)
+
+        def restore() -> str:
+            if self.swivel is not frames[0] or (s.work_offset, s.side) != (kept.work_offset, kept.side):
+                raise BlockError("a subprogram with SAVE changes the work offset, the plane of CYCLE800 or cutter "
+                                 "radius compensation: machine data decide whether its return brings it back")
+            if self.programmed is not frames[1]:
+                self.program_again(frames[1])
+            self.motion, self.circle, self.style = named
+            words = [f"G{kept.plane}", "G91" if kept.relative else "G90"]
+            words += [f"G{kept.feed_mode}"] if s.feed_mode != kept.feed_mode else []
+            words += ["G710" if kept.scale == 1.0 else "G700"] if s.scale != kept.scale else []
+            return " ".join([*words, *([f"G{self.motion}"] if isinstance(self.motion, int) else [])])
+        return restore
 
     def _served(self, name: str, index: str) -> Value:
         """A value of the control."""
@@ -475,6 +488,9 @@ class SiemensReader(SiemensCalls):
             line.after += self.swivelled(parts, self._number)
         elif name in ENVELOPES:
             self._drill(DrillingCall(name, tuple(self._number(p) if p else None for p in parts)), line)
+        elif name == "SETMS" and parts not in ([""], ["1"]):
+            raise BlockError(f"SETMS({','.join(parts)[:20]}): another spindle becomes the master, and S and M3 turn "
+                             "that one")
         elif name in ("HOLES1", "HOLES2"):
             self._row(name, [self._number(p) if p else None for p in parts], line)
         elif name == "CYCLE832":

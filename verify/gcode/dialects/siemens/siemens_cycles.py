@@ -17,6 +17,10 @@ METRIC = {1: 0.25, 2: 0.4, 3: 0.5, 4: 0.7, 5: 0.8, 6: 1.0, 8: 1.25, 10: 1.5, 12:
           22: 2.5, 24: 3.0, 27: 3.0, 30: 3.5, 33: 3.5, 36: 4.0, 39: 4.0, 42: 4.5, 45: 4.5, 48: 5.0}
 """Pitch, mm, of the coarse metric thread by its nominal diameter."""
 Arguments = Sequence[float | None]
+_DIRECTION = {"CYCLE86": 6, "CYCLE87": 5, "CYCLE88": 6}
+"""Place of the direction of rotation (SDIR) of the cycles that bore and leave the spindle standing."""
+_AFTERWARDS = {"CYCLE84": 6, "CYCLE840": 7}
+"""Place of the direction of rotation after the cycle (SDAC)."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,7 @@ def drilling_blocks(call: DrillingCall, here: Sequence[float], machine: Machine)
     s = machine.s
     axis = PLANE_AXES[s.plane][2]
     hole = _hole(call, machine)
-    before, after = [], []
+    before, after = _turns(call)
     if call.name == "CYCLE86" and (call.number(7) or call.number(8)):
         machine.log.note("CYCLE86 is read without its shift at the bottom (RPA, RPO): the edge of the tool decides")
     restored = "" if math.isnan(s.feed) else f"F{digits(s.feed if s.feed_mode == 93 else s.feed / s.scale)}"
@@ -65,13 +69,28 @@ def drilling_blocks(call: DrillingCall, here: Sequence[float], machine: Machine)
             rate = pitch if s.feed_mode == 95 else pitch * speed
             hole = DrilledHole(hole.clear, hole.bottom, hole.back, hole.pecks, hole.surface, hole.lift,
                                f"F{digits(rate / s.scale)}", f"F{digits(rate / s.scale)}", hole.dwell)
-        if not s.turning or speed != s.speed:
+        if call.name == "CYCLE84" and (not s.turning or speed != s.speed):
             before = [f"S{digits(speed)} M3"]
-            after = [] if s.turning else ["M5"]
             if not math.isnan(s.speed) and s.speed != speed:
                 after.append(f"S{digits(s.speed)}")
     blocks = hole_blocks(hole, here, axis, s.scale, s.relative)
     return [*before, *blocks, *after, *([restored] if restored and any("F" in b for b in blocks) else [])]
+
+
+def _turns(call: DrillingCall) -> tuple[list[str], list[str]]:
+    """Words of the spindle before and after a cycle: those that bore leave it standing, those that tap say how.
+
+    Without SDAC it stands.
+    """
+    words = {3.0: ["M3"], 4.0: ["M4"], 5.0: ["M5"]}
+    for places, name, allowed in ((_DIRECTION, "SDIR", "3 or 4"), (_AFTERWARDS, "SDAC", "3, 4 or 5")):
+        value = call.number(places.get(call.name, len(call.values)))
+        if value and (value not in words or (name == "SDIR" and value == 5)):
+            raise BlockError(f"{call.name} with {name}={value:g}: the control takes {allowed}")
+    before = words.get(call.number(_DIRECTION.get(call.name, len(call.values))), [])
+    if call.name in _DIRECTION:
+        return before, ["M5"]
+    return [], words.get(call.number(_AFTERWARDS[call.name]), ["M5"]) if call.name in _AFTERWARDS else []
 
 
 def _hole(call: DrillingCall, machine: Machine) -> DrilledHole:

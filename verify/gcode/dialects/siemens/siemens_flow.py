@@ -76,7 +76,7 @@ class _Frame:
     repeats: dict[int, int] = field(default_factory=dict)
     returns: dict[int, int] = field(default_factory=dict)
     given: tuple[tuple[str, str, tuple[int, ...]], ...] = ()
-    saved: str = ""
+    saved: Callable[[], str] | None = None
     modal: bool = False
 
 
@@ -86,10 +86,11 @@ class SiemensFlow:
     lines     : of the file
     variables : R parameters and variables
     machine   : the reader that runs the blocks
-    modes     : gives the words that restore the modes of the control (SAVE)
+    modes     : keeps the modes of the control; what it gives restores them and gives the words for the rest (SAVE)
     """
 
-    def __init__(self, lines: Sequence[str], variables: Variables, machine: Machine, modes: Callable[[], str]) -> None:
+    def __init__(self, lines: Sequence[str], variables: Variables, machine: Machine,
+                 modes: Callable[[], Callable[[], str]]) -> None:
         self.lines, self.variables, self.machine, self.modes = lines, variables, machine, modes
         self.sections = find_sections(lines)
         self.pairs: dict[int, dict[str, int]] = {}
@@ -391,7 +392,7 @@ class SiemensFlow:
                              f"block")
         if times != int(times) or not 0 <= times <= 9999:
             raise BlockError(f"P{times:g} is not a count of repeats")
-        frame = _Frame(section, back, int(times), saved=self.modes() if section.saves else "")
+        frame = _Frame(section, back, int(times), saved=self.modes() if section.saves else None)
         if times == 0:
             return back
         scope: dict[str, tuple[str, Value]] = {}
@@ -445,8 +446,8 @@ class SiemensFlow:
         self.variables.types.pop()
         for value, target, index in values:
             self.variables.put(target, index, value)
-        if frame.saved:
-            yield min(at, len(self.lines) - 1) + 1, frame.saved
+        if frame.saved is not None:
+            yield min(at, len(self.lines) - 1) + 1, frame.saved()
         return frame.back
 
 

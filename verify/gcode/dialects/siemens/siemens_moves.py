@@ -300,7 +300,10 @@ class SiemensMoves(SiemensCorners):
         return [*([" ".join(rest)] if rest else []), f"G4 P{digits(seconds)}"]
 
     def _tapped(self, line: Line, places: Mapping[str, float], chuck: bool) -> list[str]:
-        """G331 and G332 (rigid, pitch in I, J, K) and G63 (floating chuck, with F): a straight feed."""
+        """G331 and G332 (rigid, pitch in I, J, K) and G63 (floating chuck, with F): a straight feed.
+
+        Rigid tapping turns the spindle itself and leaves it standing.
+        """
         words, _ = self._absolute(line, False)
         speed = line.values.get("S", self.machine.s.speed)
         feed = line.values.get("F")
@@ -316,9 +319,9 @@ class SiemensMoves(SiemensCorners):
         settled = words if self.relative else self.settle(words, False)
         block = " ".join([*line.out, "G1", *(f"{k}{v}" for k, v in (settled or {}).items()), *rate,
                           *([f"S{digits(line.values['S'])}"] if "S" in line.values else [])])
-        spin = [] if self.machine.s.turning else ["M3"]
+        spin = not chuck and not self.machine.s.turning
         back = [] if math.isnan(old) or chuck else [f"F{digits(old / self.unit)}"]
-        return self._restored([*([f"S{digits(speed)} M3"] if spin else []), block, *back])
+        return self._restored([*([f"S{digits(speed)} M3"] if spin else []), block, *back, *([] if chuck else ["M5"])])
 
     def _path(self, line: Line) -> list[str]:
         """Words that bound the rounding of corners."""

@@ -72,6 +72,11 @@ class SiemensFrames(OrientedMoves):
         self.programmed = new
         return self._reframe()
 
+    def program_again(self, frame: Frame | None) -> None:
+        """Put a programmable frame of before in force, or none."""
+        self.programmed = frame
+        self._reframe()
+
     def _step(self, kind: str, places: Mapping[str, float], values: Mapping[str, float]) -> Frame:
         numbers = [places.get(k, 0.0) for k in "XYZ"]
         if kind == "TRANS":

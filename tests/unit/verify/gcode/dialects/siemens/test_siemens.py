@@ -226,3 +226,52 @@ def test_the_axis_of_the_length_is_told_where_the_plane_changes(line, told):
 def test_the_shift_of_a_boring_bar_is_told(words, told):
     notes = read(f"F50\nCYCLE86(30,0,2,-4,,0,{words})", "siemens").notes
     assert sum("CYCLE86 is read without its shift" in note for note in notes) == told
+
+
+@pytest.mark.parametrize(("lines", "stands"), [
+    ("CYCLE86(30,0,2,-4,,0,3,0,0,0,0)", True), ("CYCLE87(30,0,2,-4,,3)", True), ("CYCLE88(30,0,2,-4,,0,3)", True),
+    ("CYCLE84(5,0,2,-10,,,5,,1.25,,400)", True), ("CYCLE84(5,0,2,-10,,,3,,1.25,,400)", False),
+    ("CYCLE84(5,0,2,-10,,,,,1.25,,400)", True), ("CYCLE840(5,0,2,-10,,,4,5,,,1)", True),
+    ("CYCLE840(5,0,2,-10,,,4,3,,,1)", False), ("G331 Z-10 K1.5 S200\nG332 Z5 K1.5", True),
+    ("G63 Z-10 F9\nG63 Z5", False),
+    ("MCALL CYCLE86(30,0,2,-4,,0,3,0,0,0,0)\nX5\nMCALL", True), ("CYCLE85(5,0,1,-4,,0,100,400)", False)])
+def test_the_spindle_behind_a_cycle_turns_or_stands_as_the_manual_has_it(lines, stands):
+    """Programming Manual: 86 ends in SPOS, 87 and 88 in M5, SDAC counts behind 84 and 840, G332 stands."""
+    for again in ("", "M3\n"):
+        p = read(f"F50\n{lines}\n{again}G1 X9 F200", "siemens")
+        told = [r.line for r in p.remarks if "spindle standing" in r.message]
+        assert told == ([5 + lines.count("\n") + 3] if stands and not again else []), p.remarks
+    stood = read(f"F50\nM5\n{lines}", "siemens")
+    alone = lines.startswith(("CYCLE86", "CYCLE87", "CYCLE88", "CYCLE84(", "MCALL", "G331"))
+    assert any("spindle standing" in r.message for r in stood.remarks) != alone
+
+
+@pytest.mark.parametrize(("line", "back"), [
+    ("CYCLE86(30,0,2,-4,,0,4)", True), ("CYCLE84(5,0,2,-10,,,4,,1.25,,400)", True), ("CYCLE86(30,0,2,-4,,0,3)", False)])
+def test_a_cycle_that_turns_the_spindle_backwards_is_told_as_m4_is(line, back):
+    assert any("M4 turns the spindle backwards" in r.message for r in read(f"F50\n{line}", "siemens").remarks) == back
+
+
+def test_another_master_spindle_is_refused():
+    with pytest.raises(ProgramError, match=r"SETMS\(2\): another spindle becomes the master"):
+        read("SETMS(2)", "siemens")
+    for line in ("SETMS", "SETMS(1)", "SETMS()"):
+        assert not read(f"{line}\nG1 X1", "siemens").remarks
+
+
+@pytest.mark.parametrize(("body", "z"), [("TRANS", -1.0), ("TRANS Z-5", -1.0), ("ATRANS Z-5", -1.0), ("", -1.0)])
+def test_save_brings_the_frame_back(body, z):
+    p = read(f"TRANS Z-1\nUP1\nG1 X5 Z0\nM30\nPROC UP1 SAVE\n{body}\nG0 Z2\nRET", "siemens")
+    assert p.end[-1].tolist() == [5.0, 0.0, z]
+    p = read(f"UP1\nG1 X5 Z0\nM30\nPROC UP1 SAVE\n{body}\nG0 Z2\nRET", "siemens")
+    assert p.end[-1].tolist() == [5.0, 0.0, 0.0]
+    p = read(f"TRANS Z-1\nUP1\nG1 X5 Z0\nM30\nPROC UP1\n{body}\nRET", "siemens")
+    assert p.end[-1, 2] == {"TRANS": 0.0, "TRANS Z-5": -5.0, "ATRANS Z-5": -6.0, "": -1.0}[body]
+
+
+def test_save_brings_unit_and_kind_of_feed_back():
+    p = read("UP1\nG1 X5 F100\nM30\nPROC UP1 SAVE\nG95 G700\nRET", "siemens")
+    assert p.end[-1, 0] == 5.0 and p.feed[-1] == 100.0
+    for word in ("G55", "G41 G1 X9"):
+        with pytest.raises(ProgramError, match="a subprogram with SAVE changes the work offset"):
+            read(f"UP1\nM30\nPROC UP1 SAVE\n{word}\nRET", "siemens")
