@@ -22,7 +22,7 @@ from service.report.report import (
     time_of,
     too_little,
 )
-from service.stages.cautions import exceeded
+from service.stages.cautions import exceeded, unheld
 from service.stages.job_part import JobPart
 from service.version import VERSION
 from verify.model import HARMLESS, FindingKind, Proof, WorkDone
@@ -57,7 +57,7 @@ def verification_report(job: JobPart, proof: Proof, dense: SurfaceSamples) -> tu
             "proof": {"samples": len(dense), "error_bound_mm": proof.error_bound,
                       "stock_line_spacing_mm": proof.line_spacing, "notes": list(proof.notes),
                       "support": support_of(proof), "assumed": [a.as_dict() for a in proof.assumed]},
-            "warnings": [c.as_dict() for c in exceeded(job.inputs, proof.cautions)],
+            "warnings": [c.as_dict() for c in (*unheld(proof.support), *exceeded(job.inputs, proof.cautions))],
             "deviation": deviation(proof), "machined": None, "files": [],
             "part": part_of(job), "version": VERSION}, entry
 

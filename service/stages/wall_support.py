@@ -22,12 +22,14 @@ PLANNED_RATIO = 8.0
 """The same in a plan. The difference covers the layer under a band and the error of the measured wall."""
 
 
-def in_turn(job: JobPart) -> bool:
+def in_turn(job: JobPart, *, foreign: bool = False) -> bool:
     """Whether a wall that is finished without support is a finding, so that the plan goes down in bands.
 
-    Only where everything is cut along one axis: with several accesses no plan knows what the others leave.
+    In a plan only where everything is cut along one axis: with several accesses no plan knows what the others leave.
+
+    foreign : whether one program of any origin is proved, which is all that cuts
     """
-    one_way = len(job.accesses) == 1 and job.inputs.rotary is None
+    one_way = foreign or (len(job.accesses) == 1 and job.inputs.rotary is None)
     return job.inputs.operations.walls_in_turn and one_way
 
 

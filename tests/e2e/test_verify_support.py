@@ -195,6 +195,15 @@ def test_tools_of_which_axes_are_known_are_judged_alike():
     assert judged(in_turn(7.0), axes=axes) == plain
 
 
+def test_an_order_is_a_finding_where_one_axis_cuts_and_a_figure_where_several_do():
+    cuts = [*whole("left"), *whole("right")]
+    axes = np.tile([0.0, 0.0, 1.0], (len(cuts), 1))
+    assert judged(cuts, axes=axes).found
+    axes[-1] = [0.0, np.sin(0.01), np.cos(0.01)]
+    leaning = judged(cuts, axes=axes)
+    assert leaning.over > 1000 and not leaning.found
+
+
 @pytest.mark.parametrize("order", [in_turn(2.0), [*whole("left"), *whole("right")]])
 def test_a_leaning_wall_is_judged_along_itself(order):
     """Wall and tool lean by 12 degrees about Y; stock and order are the same."""

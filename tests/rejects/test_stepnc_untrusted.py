@@ -59,6 +59,13 @@ def test_a_feed_of_no_size_is_refused(form, value):
     assert "feedrate" in error.message and error.subjects[0].startswith("#")
 
 
+@pytest.mark.parametrize(("words", "named"), [
+    (r"\1$\2,5.,", "feedrate_per_tooth"), (r"\g<1>0.01\2,$,", "cutspeed")])
+def test_a_rate_that_is_stated_twice_is_refused(words, named):
+    text, count = re.subn(r"(MILLING_TECHNOLOGY\([^,]+,\.TCP\.,)\$(,[^,]+),\$,", words, WRITERS["arm"](tiny()))
+    assert count and f"{named}: $ expected" in refusal(text).message
+
+
 @pytest.mark.parametrize(("what", "instead", "entity"), [
     ("(LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT(.MILLI.,.METRE.))", "SI_UNIT()", "SI_UNIT"),
     ("CONTEXT_DEPENDENT_UNIT(#17,'revolution')", "(NAMED_UNIT(*) CONTEXT_DEPENDENT_UNIT())", "CONTEXT_DEPENDENT_UNIT"),

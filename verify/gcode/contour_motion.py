@@ -61,6 +61,7 @@ class ContourMotion(Origins):
     names   : T numbers by the ids of the tools of the setup
     actual  : (3,) mm, place of the tool where it is not the programmed one, None elsewhere
     across  : whether the running block has a word of an axis of the plane
+    elements, idle : as in ``verify.gcode.dialects.base.Machine``
     """
 
     def __init__(self, *arguments: object, **named: object) -> None:
@@ -71,6 +72,7 @@ class ContourMotion(Origins):
         self.contour: Contour | None = None
         self.actual: list[float] | None = None
         self.across = False
+        self.elements = self.idle = 0
         self._composed: tuple[tuple[object, ...], Frame | None] | None = None
         self._stated: tuple[Frame, list[float]] | None = None  # coordinates of a place that is not known whole
 
@@ -209,7 +211,7 @@ class ContourMotion(Origins):
         if a == b:
             pieces: Iterable[Piece | object] = self.contour.wait(_Event(self.log.line, lambda: self._along(way)))
         else:
-            pieces = self.contour.add(Element(a, b, line=self.log.line, rapid=kind == RAPID, tag=way), self.style)
+            pieces = self._add(self.contour, Element(a, b, line=self.log.line, rapid=kind == RAPID, tag=way))
         self._write_pieces(pieces)
         self._stand_at(target)
 
@@ -218,10 +220,20 @@ class ContourMotion(Origins):
         start, (i, j, _) = self._here(), PLANE_AXES[self.s.plane]
         if self.contour is None or any(math.isnan(v) for v in [*start, *target]):
             raise BlockError("cutter radius compensation at a place that the program has not stated")
-        self._write_pieces(self.contour.add(Element(
+        self._write_pieces(self._add(self.contour, Element(
             complex(start[i], start[j]), complex(target[i], target[j]), centre, sweep, self.log.line,
-            tag=_Way(FEED, feed, start, target)), self.style))
+            tag=_Way(FEED, feed, start, target))))
         self._stand_at(target)
+
+    def _add(self, contour: Contour, element: Element) -> Iterable[Piece | object]:
+        """The next element of the contour; it tells a corner that the control does not look ahead to."""
+        ahead = math.inf if self.control is None else self.control.looks_ahead
+        if self.idle > ahead and contour.bends(element, self.style):
+            self.log.remark("looks_ahead", f"{self.idle} blocks without a move in the plane stand before this corner "
+                            f"of a contour under G41 or G42: with more than {ahead:g} of them the control may not look "
+                            "ahead to it, and cuts into the contour", self.log.line)
+        self.elements, self.idle = self.elements + 1, 0
+        return contour.add(element, self.style)
 
     def _stand_at(self, target: list[float]) -> None:
         frame = self._frame()

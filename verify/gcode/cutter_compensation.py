@@ -215,6 +215,13 @@ class Contour:
         """Whether an element waits for the next one."""
         return self._last is not None
 
+    def bends(self, element: Element, style: Style) -> bool:
+        """Whether a corner lies between the latest element and this one, which follows it."""
+        if self._last is None:
+            return False
+        turn = cmath.phase(element.tangent(False) / self._last.element.tangent(True))
+        return abs(turn) > style.tangent
+
     def add(self, element: Element, style: Style) -> Iterator[Piece | object]:
         """Take the next element; give the pieces, and the objects that waited, that are certain now.
 

@@ -75,6 +75,9 @@ class Origins(OffsetTables):
         """G92.1 of Fanuc: the axes named have no shift, neither of G92 nor of G52."""
         if all(a is None for a in axes) or any(axes):
             raise BlockError("G92.1 names the axes that it sets back, each with 0", "write G92.1 X0 Y0 Z0")
+        if self.s.side or (self.s.offset and axes[2] is not None):
+            raise BlockError("G92.1 while a tool length (G43) or cutter radius compensation is on: the control drops "
+                             "it", "end them before, and state them again behind it")
         for k, axis in enumerate(axes):
             if axis is not None:
                 self.s.shift[k] = self.s.local[k] = 0.0

@@ -352,6 +352,9 @@ class Iso14649Reader:
             raise self.file.error(technology, ", feedrate: a real number, m/s, expected; feeds per tooth are not read")
         if spindle is None:
             raise self.file.error(technology, ", spindle: a real number, 1/s, expected; cutting speeds are not read")
+        for own, other in (("feedrate", "feedrate_per_tooth"), ("spindle", "cutspeed")):
+            if None not in (self.data.real(technology, entity, own), self.data.real(technology, entity, other)):
+                raise self.file.error(technology, f", {other}: $ expected beside {own}; one of both may stand")
         if not rapid and self.data.one(technology, entity, "feedrate_reference") != "TCP":
             raise self.file.error(technology, ", feedrate_reference: .TCP. expected, the feed of the tip")
         return sane_rates(self.data, technology, math.nan if feed is None else feed * MM_MIN, -RPM * spindle)

@@ -65,7 +65,8 @@ def supported(tree: TriangleTree, scored: ScoredSamples, setup: ProofSetup, move
     scored : the samples that supply the places
     report : called with the share done, 0 to 1; an exception from it ends the work
 
-    Returns Support, and a finding for each wall and program where ``setup.walls_in_turn`` is on.
+    Returns Support, and a finding for each wall and program where ``setup.walls_in_turn`` is on and one axis that never
+    turns cuts everything.
 
     Notes
     -----
@@ -82,11 +83,20 @@ def supported(tree: TriangleTree, scored: ScoredSamples, setup: ProofSetup, move
     over = np.flatnonzero(judged & (free > walls.limit + ROOM * walls.spacing))
     ratio = np.where(judged, free / walls.limit, 0.0) * setup.free_ratio
     x, y, z = walls.points[int(np.argmax(ratio))].tolist()
+    in_turn = setup.walls_in_turn and _one_axis(moves)
     figures = Support(len(np.unique(walls.wall[walls.free])), int(judged.sum()), float(ratio.max()), setup.free_ratio,
-                      len(over), setup.walls_in_turn and bool(len(over)), (x, y, z) if judged.any() else None)
-    if not setup.walls_in_turn:
+                      len(over), in_turn and bool(len(over)), (x, y, z) if judged.any() else None)
+    if not in_turn:
         return figures, []
     return figures, _findings(walls, free, over, times, setup, scored, source, zone_ids)
+
+
+def _one_axis(moves: Moves) -> bool:
+    """Whether one axis that never turns cuts everything."""
+    if moves.axes is None:
+        return True
+    axes = moves.axes.only(moves.feed)
+    return bool((axes.angle == 0.0).all() and (axes.axis @ axes.axis[0] > 1.0 - 1e-9).all())
 
 
 def _times(points: F64, normals: F64, thickness: F64, spacing: float, bounds: F64, setup: ProofSetup, moves: Moves,

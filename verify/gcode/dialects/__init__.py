@@ -7,6 +7,7 @@ only words without effect on a move. Lines keep their numbers.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Sequence
 
 from verify.gcode.block_words import BlockError
@@ -25,6 +26,9 @@ CONTROLS: dict[str, type[DialectReader]] = {
 OWN_SPEED_RAPIDS = frozenset({"fanuc", "haas"})
 """Controls on which each axis of a rapid moves at its own speed unless a parameter or setting says otherwise: Fanuc's
 parameter 1401#1 (LRP), Haas's setting 335. LinuxCNC, Siemens and Heidenhain interpolate rapids."""
+
+_IDLE = re.compile(r"\([^()]*\)|;.*|^\s*/?[NO:][0-9]+|[%\s]")
+"""What is no word of a block."""
 
 NEWS = " "
 """A block without words that keeps the next one off the fast path."""
@@ -57,8 +61,10 @@ def translated_blocks(lines: Sequence[str], control: DialectReader, machine: Mac
             if control.notes or control.remarks or control.functions:
                 _report(control, number, log)
             log.unbounded = control.unbounded
+            elements = machine.elements
             for block in blocks:
                 yield block if isinstance(block, tuple) else (number, block)
+            machine.idle += machine.elements == elements and bool(_IDLE.sub("", raw))
     except BlockError as problem:
         log.error(str(problem), log.line or 1, remedy=problem.remedy)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Protocol
 
@@ -24,6 +25,7 @@ class Machine(Protocol):
     s       : modal state after the blocks so far; log : record of the reading
     machine : rotary axes of the machine, or None; rotary : their letters
     radii   : mm by T number, radius of the tools of the setup
+    elements : number of moves of compensated contours so far; idle : blocks since the last one
     """
 
     s: State
@@ -31,6 +33,8 @@ class Machine(Protocol):
     machine: Kinematics | None
     rotary: str
     radii: dict[int, float]
+    elements: int
+    idle: int
 
     def here(self) -> list[float]:
         """(3,) mm, the programmed place in the coordinates of the blocks; nan where it is unknown."""
@@ -60,6 +64,8 @@ class DialectReader:
     assumed : what lines leave to the control, each kind once
     names   : T numbers by the names (ids) of the tools of the setup
     own_speed : whether a word has made each axis go at its own speed in a rapid
+    looks_ahead : most blocks without a move in the plane between two moves of a compensated contour through which the
+              control finds the second one
     """
 
     style: Style = FANUC_STYLE
@@ -71,6 +77,7 @@ class DialectReader:
     home_from: int | None = None
     gives_up_length = False
     own_speed = False
+    looks_ahead: float = math.inf
 
     def __init__(self) -> None:
         self.notes: list[str] = []

@@ -72,6 +72,7 @@ class FanucReader(FanucPlanes):
     refused_m = FANUC_M
     repeats = "KL"
     rigid: int | None = 29
+    looks_ahead = 1.0
     home_from, gives_up_length = 0, True
 
     def __init__(self) -> None:

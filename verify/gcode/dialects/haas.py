@@ -29,6 +29,7 @@ class HaasReader(FanucReader):
     counts = "KJ"
     refused_m = HAAS_M
     rigid = None
+    looks_ahead = 80.0
 
     def _check(self, letter: str, digits: str) -> None:
         super()._check(letter, digits)

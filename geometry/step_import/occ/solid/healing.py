@@ -87,6 +87,9 @@ def one_solid(products: Sequence[Product], solid: int | None, warnings: list[str
         bodies = _without_strays(bodies, warnings)
     if len(bodies) > 1:
         bodies, met = _united(bodies, solid, fuse, warnings)
+    if solid is not None and len(bodies) > 1:
+        warnings.append(f"solid {solid} of {len(bodies)} is the part; what stands beside it in the file counts only "
+                        "where the setup has it as a fixture")
     return _outward(_valid(_chosen(bodies, solid, met, fuse), warnings), warnings)
 
 

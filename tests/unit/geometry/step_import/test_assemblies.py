@@ -58,7 +58,7 @@ def test_each_product_can_be_chosen(tmp_path):
     assert plate.volume == pytest.approx(40 * 30 * 10 - np.pi * 16 * 10, rel=1e-6)
     assert bolt.volume == pytest.approx(np.pi * 16 * 16, rel=1e-6)
     assert bolt.bounds[:, 2] == pytest.approx([-3, 13])
-    assert not plate.warnings and not bolt.warnings
+    assert [len(p.warnings) for p in (plate, bolt)] == [1, 1] and "solid 2 of 2 is the part" in bolt.warnings[0]
     assert refused(path, solid=3).code == "no_such_solid"
 
 

@@ -170,7 +170,9 @@ def test_stray_sliver_is_dropped_by_name(tmp_path):
 def test_named_solid_is_taken(tmp_path):
     two = cq.Compound.makeCompound([cq.Solid.makeBox(10, 10, 10), cq.Solid.makeBox(5, 5, 5, cq.Vector(30, 0, 0))])
     path = write_step(two, tmp_path / "two.step")
-    assert load_part(path, solid=1).volume == pytest.approx(1000)
+    first = load_part(path, solid=1)
+    assert first.volume == pytest.approx(1000)
+    assert any("solid 1 of 2 is the part" in w and "fixture" in w for w in first.warnings)
     assert load_part(path, solid=2).volume == pytest.approx(125)
 
 

@@ -178,3 +178,16 @@ def distance(place, element):
     way = element.end - element.start
     t = min(max(((place - element.start) * way.conjugate()).real / abs(way) ** 2, 0.0), 1.0)
     return abs(place - element.start - t * way)
+
+
+@pytest.mark.parametrize(("dialect", "between", "told"), [
+    ("fanuc", "G4 P100\nM8\n", True), ("fanuc", "Z-3.\nZ-2.\nG4 P10\n", True), ("fanuc", "M88\nM89\n", True),
+    ("fanuc", "M8\n", False), ("fanuc", "(A)\n(B)\nN30\nM8\n", False), ("haas", "G4 P100\nM8\nM9\n", False),
+    ("linuxcnc", "M8\nM9\nG4 P1\nM8\nM9\n", False)])
+def test_a_corner_behind_many_blocks_without_a_move_is_told(dialect, between, told):
+    """Fanuc: with two or more of them in a row the vector stands square to the last line, and the corner is overcut."""
+    inside = f"G41 D10 G1 X0. Y0. F100.\nX20.\n{between}Y20.\nG40 G1 X-9.\n"
+    p = read(inside, dialect)
+    assert any("without a move in the plane stand before this corner" in r.message for r in p.remarks) == told
+    straight = f"G41 D10 G1 X0. Y0. F100.\nX20.\n{between}X30.\n{between}G40 G1 X40.\n"
+    assert not any("without a move in the plane" in r.message for r in read(straight, dialect).remarks)

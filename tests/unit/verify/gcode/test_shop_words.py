@@ -253,7 +253,9 @@ def test_registers_of_zero_shifts_are_those_of_the_control(dialect, body, expect
 
 
 @pytest.mark.parametrize(("dialect", "word", "words"), [
-    ("fanuc", "G92.1", "G92.1 names the axes"), ("fanuc", "G92.1 X5.", "each with 0"),
+    ("fanuc", "G92.1", "G92.1 names the axes"),
+    ("fanuc", "G92.1 Z0", "the control drops it"),
+    ("fanuc", "G92.1 X5.", "each with 0"),
     ("haas", "G92.1 X0", "Haas ends a shift"), ("fanuc", "G91 G52 X5.", "incremental")])
 def test_shift_words_that_a_control_does_not_take(dialect, word, words):
     with pytest.raises(ProgramError, match=words):

@@ -45,7 +45,9 @@ _COORDINATE = re.compile(rf"\s*(I?)([XYZABC])\s*({VALUE})(?=\s|$)")
 _UNTILTED = re.compile(rf"(?:(?:[ABCF]|ABST|DIST)\s*{VALUE}\s*)*")
 SMALL = 0.01
 """deg, deviation of a rotary axis that needs no note."""
-_IDLE = ("BLK FORM", "TOOL DEF", "* -", "*", "FUNCTION PROG PATH", "FUNCTION MODE MILL", "FUNCTION FEED DWELL",
+_DEF = re.compile(rf"TOOL DEF\s+(\"[^\"]*\"|{NUMBER}|QS?[0-9]+)((?:\s+[LR]\s*{VALUE})*)")
+_SIZE = re.compile(rf"([LR])\s*({VALUE})")
+_IDLE = ("BLK FORM", "* -", "*", "FUNCTION PROG PATH", "FUNCTION MODE MILL", "FUNCTION FEED DWELL",
          "FUNCTION S-PULSE",
          "FUNCTION DWELL", "WMAT", "CYCL DEF 13.", "FUNCTION COUNT", "FUNCTION FILE", "OPEN TABLE",
          "FUNCTION FEED RESET",
@@ -83,6 +85,7 @@ class HeidenhainReader(HeidenhainPaths):
         self.unbounded = True
         self.cycle: CycleCall | None = None
         self.dotted: dict[int, dict[int, str]] = {}
+        self.lengths: dict[int, float] = {}  # mm, by T number, of TOOL DEF
 
     def order(self, lines: Sequence[str], machine: Machine) -> Iterator[tuple[int, str]]:
         """Blocks in the order they run, as ``HeidenhainFlow.run`` has it; raises as that does."""
@@ -124,6 +127,8 @@ class HeidenhainReader(HeidenhainPaths):
             return [f"G{21 if m[1] == 'MM' else 20} G17 G90 G94 G40"]
         if m := _TOOL.fullmatch(text):
             return self._tool(m)
+        if text.startswith("TOOL DEF"):
+            return self._tool_def(text)
         if text.startswith("CYCL DEF"):
             return self._define(text)
         if m := _CALLED.fullmatch(text):
@@ -189,6 +194,27 @@ class HeidenhainReader(HeidenhainPaths):
         if given.get("DR2", 0.0):
             self.notes.append("TOOL CALL with DR2 changes the compensation in space only; the reader has none")
         return [" ".join([f"T{number} M6", *out]), *([f"G43 H{number}"] if number else [])]
+
+    def _tool_def(self, text: str) -> list[str]:
+        """TOOL DEF: a tool that is made ready. Sizes have to be those that the proof has.
+
+        The first length of a tool counts as the true one.
+        """
+        m = _DEF.fullmatch(text)
+        if m is None:
+            raise BlockError(f"cannot read '{text[:40]}'")
+        sizes = {w[1]: self.q.value(w[2]) * self.factor_of_unit for w in _SIZE.finditer(m[2])}
+        if not sizes:
+            return []
+        number = self._numbered(m[1])
+        radius = self.machine.radii.get(number)
+        if "R" in sizes and (radius is None or abs(sizes["R"] - radius) > 1e-6):
+            raise BlockError(f"TOOL DEF {number} with the radius {sizes['R']:g} mm: the setup gives T{number} "
+                             + ("no radius" if radius is None else f"{radius:g} mm"))
+        if "L" in sizes and abs(self.lengths.setdefault(number, sizes["L"]) - sizes["L"]) > 1e-6:
+            raise BlockError(f"TOOL DEF {number} with the length {sizes['L']:g} mm: an earlier one gives it "
+                             f"{self.lengths[number]:g} mm")
+        return []
 
     def _numbered(self, word: str) -> int:
         """T number of a tool by its name (the id of the setup), its number, or a parameter."""

@@ -69,6 +69,7 @@ class SiemensReader(SiemensCalls):
     """840D sl, 828D and ONE."""
 
     home_from, gives_up_length = 1, True
+    looks_ahead = 3.0
     style, refused_m = SIEMENS_STYLE, SIEMENS_M
 
     def __init__(self) -> None:

@@ -45,6 +45,7 @@ class SiemensMoves(SiemensCorners):
 
     motion    : G number or name of the motion in force, None before the first
     tolerance : mm or inch, of the path (CTOL); rounding : of corners (ADIS)
+    follows   : the name of the value that bounds the rounding in force (CTOL, ADIS), '' for none
     cycle     : the drilling cycle that MCALL repeats after each move
     end       : (3,) mm, end of the latest move in the coordinates of the control
     """
@@ -54,6 +55,7 @@ class SiemensMoves(SiemensCorners):
         self.motion: int | str | None = None
         self.tolerance: float | None = None
         self.rounding: float | None = None
+        self.follows = ""
         self.top_speed = math.inf  # 1/min, of G26 S
         self.cycle: DrillingCall | None = None
         self.end = [math.nan] * 3
@@ -325,18 +327,24 @@ class SiemensMoves(SiemensCorners):
 
     def _path(self, line: Line) -> list[str]:
         """Words that bound the rounding of corners."""
-        values = line.values
+        values, again = line.values, ""
         if "CTOL" in values:
-            self.tolerance = values["CTOL"] if values["CTOL"] >= 0 else None
+            self.tolerance, again = values["CTOL"] if values["CTOL"] >= 0 else None, "CTOL"
         if "ADIS" in values or "ADISPOS" in values:
-            self.rounding = max(values.get("ADIS", 0.0), values.get("ADISPOS", 0.0))
-        if 641 in line.codes:
+            self.rounding, again = max(values.get("ADIS", 0.0), values.get("ADISPOS", 0.0)), again or "ADIS"
+        if not {9, 60, 64, 641, 642, 643, 644, 645}.isdisjoint(line.codes):
+            self.follows = ""
+        if 641 in line.codes or (again == self.follows == "ADIS"):
             if self.rounding is None:
                 raise BlockError("G641 without ADIS in its block or before: the rounding of corners is unknown")
+            self.follows = "ADIS"
             self.bound(True)
             return [f"G64 P{self.rounding:.6f}"]
         rounds = not UNBOUNDED.isdisjoint(line.codes)
-        if (rounds or "COMPRESS" in values) and self.tolerance is not None and 64 not in line.codes:
+        if (rounds and 64 not in line.codes) or "COMPRESS" in values:
+            self.follows = "CTOL"
+        if (rounds or "COMPRESS" in values or again == self.follows == "CTOL") and self.tolerance is not None \
+                and 64 not in line.codes:
             self.bound(True)
             return [f"G64 P{self.tolerance:.6f}"]
         if rounds:

@@ -43,7 +43,7 @@ COMPRESSORS = frozenset({"COMPON", "COMPCURV", "COMPCAD", "COMPSURF"})
 """Words after which the control may leave the path, by CTOL where it is stated."""
 
 IDLE_VALUES = frozenset("""
-    ACC ACCLIMA FGREF FL H JERKLIM JERKLIMA LIMS OVRA OVRRAP SPOS SPOSA STOLF SVC VELOLIM
+    ACC ACCLIMA FGREF FL H JERKLIM JERKLIMA LIMS OVRA OVRRAP SPOS SPOSA STOLF VELOLIM
     VELOLIMA""".split())
 """Names with a value that change speed, smoothing or outputs only."""
 
@@ -95,7 +95,7 @@ REFUSED = {
     **_named("an angle of a line", "ANG"), **_named("surface normals",
                                                                                       "A4 B4 C4 A5 B5 C5"),
     **_named("a lead or tilt angle", "LEAD TILT"), **_named("a turn of the tool about itself", "THETA"),
-    **_named("a feed per tooth", "FZ"), **_named(_SOFT, "DISR DISCL"),
+    **_named("a feed per tooth", "FZ"), **_named("a cutting rate", "SVC"), **_named(_SOFT, "DISR DISCL"),
     **_named("another transformation", "TRACON TRANSMIT TRACYL TRAANG"),
     **_named("a positioning axis", "POS POSA POSP"), **_named("a turn of the tool", "ORIRESET"),
     **_named("coordinates that count as diameters", "DIAMCHANA"),

@@ -241,3 +241,16 @@ def test_lengths_and_depths_that_would_be_passed_over_are_refused(line, said):
 def test_the_shift_of_a_boring_bar_is_told(side, told):
     cycle = f"CYCL DEF 202 Q200=+2 Q201=-4 Q206=+100 Q211=+0 Q208=+0 Q203=+0 Q204=+20 Q214=+{side} Q336=+0\nCYCL CALL"
     assert sum("cycle 202 is read without its shift" in note for note in read(cycle, "heidenhain").notes) == told
+
+
+@pytest.mark.parametrize(("defs", "said"), [
+    (("TOOL DEF 1 L+0 R+2.5",), "the setup gives T1 5 mm"), (("TOOL DEF 9 L+0 R+2.5",), "the setup gives T9 no radius"),
+    (("TOOL DEF 1 L+50 R+5", "TOOL DEF 1 L+49 R+5"), "an earlier one gives it 50 mm")])
+def test_sizes_of_tool_def_are_those_of_the_proof(defs, said):
+    with pytest.raises(ProgramError, match=re.escape(said)):
+        read([*defs, "TOOL CALL 1 Z S1000"], "heidenhain", tools={1, 9})
+
+
+def test_tool_def_makes_a_tool_ready():
+    for line in ("TOOL DEF 2", 'TOOL DEF "drill 8"', "TOOL DEF 1 L+50 R+5", 'TOOL DEF "SOMETHING"'):
+        assert not read([line, line, "L X+1 F100"], "heidenhain").remarks

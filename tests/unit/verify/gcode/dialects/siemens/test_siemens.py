@@ -275,3 +275,27 @@ def test_save_brings_unit_and_kind_of_feed_back():
     for word in ("G55", "G41 G1 X9"):
         with pytest.raises(ProgramError, match="a subprogram with SAVE changes the work offset"):
             read(f"UP1\nM30\nPROC UP1 SAVE\n{word}\nRET", "siemens")
+
+
+def test_a_cutting_rate_is_refused():
+    with pytest.raises(ProgramError, match="a cutting rate"):
+        read("SVC=1\nG1 X1", "siemens")
+
+
+@pytest.mark.parametrize("lines", ["CTOL=1\nCOMPCAD", "COMPCAD\nCTOL=1", "COMPCAD CTOL=1", "G642\nG1 X1\nCTOL=1",
+                                   "G641 ADIS=1", "G641 ADIS=0.001\nG1 X1\nADIS=1", "ADIS=1\nG641"])
+def test_a_tolerance_counts_wherever_it_stands(lines):
+    p = read(f"{lines}\nG1 X5 F100", "siemens")
+    assert any("lets the control leave the path by 1 mm" in r.message for r in p.remarks)
+
+
+@pytest.mark.parametrize("lines", ["CTOL=1", "ADIS=1", "G641 ADIS=0.001\nG60\nADIS=1", "COMPCAD\nG60\nCTOL=1"])
+def test_a_tolerance_that_no_mode_uses_counts_not(lines):
+    assert not any("leave the path" in r.message for r in read(f"{lines}\nG1 X5 F100", "siemens").remarks)
+
+
+@pytest.mark.parametrize(("between", "told"), [("M8\nG4 F1\nM9", False), ("M8\nG4 F1\nM9\nG4 F1", True)])
+def test_a_corner_behind_more_than_three_blocks_without_a_move_is_told(between, told):
+    """MD20250: with more blocks than that the control gives alarm 10762 and stands in the cut."""
+    p = read(f"G0 X-30\nG41 G1 X0 Y0 F100\nX20\n{between}\nY20\nG40 X-9", "siemens")
+    assert any("without a move in the plane stand before this corner" in r.message for r in p.remarks) == told
