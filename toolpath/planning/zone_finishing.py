@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
+from toolpath.feeds.feed_changes import with_few_changes
 from toolpath.five_axis.oriented_motion import TURN_S, Runs, Surroundings
 from toolpath.five_axis.oriented_pass import enters
 from toolpath.lines import Line, thinned, true_runs
@@ -402,6 +403,6 @@ def step_of(step_id: str, name: str, zone: str | None, zones: Sequence[ZoneArea]
     lo, hi = tips[:, :2].min(axis=0), tips[:, :2].max(axis=0)
     outline = np.array([lo, [hi[0], lo[1]], hi, [lo[0], hi[1]], lo])
     return Workingstep(step_id, name, zone, faces, operation, strategy, tool, cut.spindle_rpm, cut.feed, side_step,
-                       settings.scallop_height, settings.chordal_tolerance, walked, outline,
-                       max(z.top for z in zones), min(z.bottom for z in zones), settings.cut_direction,
+                       settings.scallop_height, settings.chordal_tolerance, with_few_changes(walked, settings.rates),
+                       outline, max(z.top for z in zones), min(z.bottom for z in zones), settings.cut_direction,
                        rates=settings.rates, bend=cut.bend)
