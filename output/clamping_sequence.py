@@ -63,10 +63,10 @@ class Leg:
 
 @dataclass(frozen=True, eq=False)
 class ClampedStep:
-    """A step with the moves to it and, before a tool is put away, from it.
+    """A step with the moves to it, and from it to ``home_of`` where the next one begins there.
 
-    fresh : its tool is loaded before it, and the moves to it begin at ``home_of``
-    last  : its tool is put away after it
+    fresh : the moves to it begin at ``home_of``, where its tool is loaded unless it is in the spindle
+    last  : the tool goes back to ``home_of`` after it
     before, legs, after : moves to its start, the step itself, moves back to ``home_of``
 
     With restart points every step is fresh and last. So are steps between which the spindle speed changes while the
@@ -104,16 +104,16 @@ def each_clamped_step(plan: Workplan) -> Iterator[ClampedStep]:
         raise OutputError(f"the workplan '{plan.name}' has no clamping", code="no_clamping", subjects=(plan.name,))
     position, steps = _ToolPosition(plan.clamping), plan.steps
     for k, step in enumerate(steps):
-        fresh = k == 0 or _needs_tool_change(plan, steps[k - 1], step)
-        last = k + 1 == len(steps) or _needs_tool_change(plan, step, steps[k + 1])
+        fresh = k == 0 or _goes_home(plan, steps[k - 1], step)
+        last = k + 1 == len(steps) or _goes_home(plan, step, steps[k + 1])
         grid_path(step)
         before = position.enter(step, fresh)
         legs = position.through(step)
         yield ClampedStep(step, fresh, last, tuple(before), tuple(legs), tuple(position.home()) if last else ())
 
 
-def _needs_tool_change(plan: Workplan, step: Workingstep, follower: Workingstep) -> bool:
-    """Whether the tool is put away between two steps and loaded again."""
+def _goes_home(plan: Workplan, step: Workingstep, follower: Workingstep) -> bool:
+    """Whether the tool goes to ``home_of`` between two steps."""
     if plan.restart or follower.fresh or follower.tool != step.tool:
         return True
     # a Heidenhain sets the speed by TOOL CALL, which M128 forbids

@@ -108,7 +108,7 @@ class Workplan:
     comments        : header lines for the machinist (ASCII, no parentheses)
     assumed         : header lines on what the proof takes for granted (ASCII)
     figures         : header lines for the figures of the proof, ``output.gcode.proof_header``
-    restart         : every step begins as after a tool change, so that a program can be started at each step
+    restart         : a program can be started at each step
     stock_words     : kind of the blank where it is not a box; ``stock`` is then its bounding box
     cylinder        : the blank where it is a cylinder, or None; stock_mesh : where it is a mesh, or None
     part_mesh       : the part with its face numbers, or None where the file needs no part

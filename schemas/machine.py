@@ -48,10 +48,12 @@ class Machine(WireModel):
         description=f"Controls that need a program: {', '.join(DIALECT_ENDINGS)}. Each gets its own program. The first "
                     f"is simulated; the others are read back and compared with it move for move.")] = ["linuxcnc"]
     restart_points: Annotated[bool, Field(
-        description="true: the program can be started at every workingstep. Each begins with a label and states tool, "
-                    "length, zero, speed, coolant and tool centre point control, as after a tool change. On a 5-axis "
-                    "machine the rotary axes return to 0 between workingsteps. false: there are no labels, and only "
-                    "workingsteps after a tool change state these.")] = True
+        description="true: the program can be started at every workingstep. Each begins with a label, tool, length, "
+                    "zero, speed, coolant and tool centre point control, as after a tool change. A program that runs "
+                    "from the top neither calls the tool in the spindle nor stops it: it jumps over these words, which "
+                    "on fanuc needs custom macros and on fanuc and haas a program in memory, not in DNC operation. On "
+                    "a 5-axis machine the rotary axes return to 0 between workingsteps. false: there are no labels and "
+                    "jumps, and only workingsteps after a tool change state these.")] = True
     max_program_kb: Annotated[Number | None, Field(
         ge=1, le=1e6, description="Largest program that the control accepts, in 1000 bytes. A larger program is split, "
                                   "at tool changes where possible, into programs that run in order: "

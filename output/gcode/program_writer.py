@@ -10,8 +10,10 @@ rapids that turn. The control keeps the tip from before the first approach until
 without this function gets the linear joints, and the header states their pivots. Cutting blocks that turn are then
 timed one by one. Tools are changed with both rotary axes at zero.
 
-Restart points: every step begins as after a tool change. Behind a label it states tool, length, zero, speed, coolant
-and tool centre point control again. It starts above the clearance plane, or above the ball on a machine that turns.
+Restart points: a program can be started at every step. Behind a label stand tool, length, zero, speed, coolant and tool
+centre point control, as after a tool change. Between steps with one tool a program that runs from the top does not
+execute them (``Dialect.begun_again``): it neither calls the tool nor stops the spindle. The step starts above the
+clearance plane, or above the ball on a machine that turns.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from output.clamping_sequence import ClampedStep, Leg, clamped_steps, home_of
 from output.gcode.dialects.base import Dialect
+from output.gcode.program_header import header_lines
 from output.header_text import decimal, face_words, height_word, step_title, tool_name
 from output.program_grid import GRID, I64, GridArc, check_plan, grid_path, link, pieces, to_grid
 from output.workplan import FIRST_NUMBER, Clamping, Workplan
@@ -33,8 +36,6 @@ from toolpath.workingsteps import ArcSpan, Trajectory, TrajectoryKind, Workingst
 
 UPRIGHT_TOLERANCE = 1e-6  # rad from Z, up to which no plane is tilted
 _PARTED = re.compile("S[0-9]+([b-z]*)")  # ids of steps, and of their parts after a change to a fresh cutter
-GRANTED = "Taken for granted by the proof, check it on the machine:"
-MIN_DEPTH_BELOW_STOCK = 0.01  # mm below the stock; less is not mentioned in the header
 
 
 def write_program(plan: Workplan, dialect: Dialect) -> str:
@@ -57,7 +58,7 @@ def write_program(plan: Workplan, dialect: Dialect) -> str:
     steps = [] if plan.clamping is None else clamped_steps(plan)
     low, high = plan.stock.lower.tolist(), plan.stock.upper.tolist()
     head = [*dialect.opening(_program_title(plan), low, high), *dialect.numbered(plan.number, plan.number_words),
-            *_header(plan, dialect, zero, tolerance)]
+            *header_lines(plan, dialect, zero, tolerance)]
     if plan.clamping is not None:
         turning = _FiveAxisProgram(plan, dialect, zero, tolerance, plan.clamping)
         turning.run(steps)
@@ -157,6 +158,23 @@ class _ProgramText:
         if self.plan.restart:
             self.lines += self.dialect.label(step.id, label_number(self.plan, step))
 
+    def _is_new(self, step: Workingstep) -> bool:
+        """Whether a step needs another tool than the one in the spindle, or a fresh cutter."""
+        return self.tool is None or step.tool != self.tool or step.fresh
+
+    def _begun_again(self, step: Workingstep, modes: list[str], up: list[str], arrive: list[str]) -> None:
+        """What a start at a step needs that goes on with the tool in the spindle.
+
+        modes, up, arrive : lines of modes and zero, of the way up before a tool is called, and of the first approach
+        """
+        d, speed = self.dialect, decimal(step.spindle_rpm, 0)
+        take = d.take(step.tool.number, speed)
+        ready = [*take[1:], *d.spindle(speed, True, self.plan.coolant), *arrive]
+        self.lines += d.begun_again(step.id, label_number(self.plan, step), modes, [*up, take[0]], ready)
+        self.rapid, self.feed = None, ""
+        if d.restates:
+            self.speed = speed
+
 
 class _ThreeAxisProgram(_ProgramText):
     """A program of three axes."""
@@ -176,7 +194,8 @@ class _ThreeAxisProgram(_ProgramText):
         path = grid_path(step)
         start = path[0][1][0]
         self.lines.append("")
-        if self.tool is None or step.tool != self.tool or step.fresh or self.plan.restart:
+        kept = not self._is_new(step)
+        if not kept:
             if self.tool is not None:
                 self._retract()
                 self.lines += self.dialect.stop()
@@ -186,8 +205,11 @@ class _ThreeAxisProgram(_ProgramText):
             elif self.tool is not None and step.tool != self.tool:
                 self.lines += self.dialect.before_change()
             self._put_in(step)
+        here = self._part(step, start) if kept and self.plan.restart else None
         self.lines += self.dialect.comment(step_words(step))
         self._set_speed(step)
+        if here is not None:
+            self._go_across(here, start)
         self._go_to(step, start)
         for trajectory, points in path:
             self._follow(trajectory, points)
@@ -204,10 +226,38 @@ class _ThreeAxisProgram(_ProgramText):
             self._straight([self.letters[2] + self.dialect.number(self.clearance)], True)
             self.position = np.array([*self.position[:2], self.clearance])
 
+    def _part(self, step: Workingstep, start: I64) -> I64:
+        """Above the step before, where a program from the top and one started at the label of a step come together.
+
+        Returns the place of the first; the second is above any place, at the height of ``_height``.
+        """
+        d, height = self.dialect, self._height(start)
+        here = np.zeros(3, dtype=np.int64) if self.position is None else self.position
+        if here[2] < height:
+            self._straight([self.letters[2] + d.number(height)], True)
+            here = np.array([*here[:2], height])
+        row = self.letters[2] + d.number(height)
+        self._begun_again(step, self._modes(), d.up(), d.arrive(step.tool.number, row, False))
+        if d.restates:
+            self.rapid = True
+        return here
+
+    def _height(self, start: I64) -> int:
+        """Height above the first point of a step at which the tool arrives, grid steps."""
+        return max(self.clearance, int(start[2]))
+
+    def _go_across(self, here: I64, start: I64) -> None:
+        """Across to above the first point of a step, with both words, since a start at its label needs them."""
+        d, height = self.dialect, self._height(start)
+        self._straight([" ".join(a + d.number(v) for a, v in zip("XY", start.tolist(), strict=False))], True)
+        if here[2] > height:
+            self._straight([self.letters[2] + d.number(height)], True)
+        self.position = np.array([*start[:2], height])
+
     def _go_to(self, step: Workingstep, start: I64) -> None:
         """Rapids to the first point of a step: Z to the clearance plane, XY, Z."""
         if self.position is None:
-            place = [int(start[0]), int(start[1]), max(self.clearance, int(start[2]))]
+            place = [int(start[0]), int(start[1]), self._height(start)]
             self._arrive(step, place, False)
             self.position = np.array(place)
         points = link(self.position, start, self.clearance)
@@ -253,16 +303,7 @@ class _FiveAxisProgram(_ProgramText):
         step = clamped.step
         self.lines.append("")
         if clamped.fresh:
-            if self.tool is not None:
-                self.lines += self.dialect.stop()
-            if self.plan.restart:
-                self._label(step)
-                self.lines += self._modes()
-            elif self.tool == step.tool and not step.fresh:  # same tool, other speed: it is not raised
-                self.lines += self.dialect.rise()
-            elif self.tool is not None and step.tool != self.tool:
-                self.lines += self.dialect.before_change()
-            self._put_in(step)
+            self._begin(step)
         self.lines += self.dialect.comment(step_words(step))
         self._set_speed(step)
         if clamped.fresh:
@@ -280,6 +321,26 @@ class _FiveAxisProgram(_ProgramText):
         if clamped.last and self.machine.tcp:
             self.lines += [*self.dialect.tcp_off(), *self.dialect.restated(self.zero)]
             self.rapid = None
+
+    def _begin(self, step: Workingstep) -> None:
+        """A step that begins above the ball: its tool is loaded, or stays in the spindle."""
+        if not self._is_new(step):
+            self.lines += self.dialect.lift()
+            self.position, self.rapid, self.feed = None, None, ""
+            if self.plan.restart:
+                self._begun_again(step, self._modes(), [], [])
+            else:  # another speed
+                self.lines += self.dialect.rise()
+            self.lines += self.dialect.lowered()
+            return
+        if self.tool is not None:
+            self.lines += self.dialect.stop()
+        if self.plan.restart:
+            self._label(step)
+            self.lines += self._modes()
+        elif self.tool is not None and step.tool != self.tool:
+            self.lines += self.dialect.before_change()
+        self._put_in(step)
 
     def _in_plane(self, legs: Sequence[Leg]) -> None:
         """The moves of a step; in a tilted plane where its axis is fixed and tilted and the dialect wants it."""
@@ -371,96 +432,6 @@ def _program_title(plan: Workplan) -> str:
     return plan.name if plan.number == FIRST_NUMBER else f"{plan.number} {plan.name}"
 
 
-def _header(plan: Workplan, d: Dialect, zero: str, tolerance: str) -> list[str]:
-    low, high = plan.stock.lower, plan.stock.upper
-    box = ", ".join(f"{a} {decimal(low[i], 3)} to {decimal(high[i], 3)}" for i, a in enumerate("XYZ"))
-    restart = ["Every step can be started at its label: it states tool, length, zero, speed and coolant again",
-               "Start at a label only when all steps before it have been cut: no way was proved through their stock"]
-    texts = [
-        f"Program {plan.name}, zonemill {plan.version}, {d.title}, {_axes_words(plan)}",
-        f"Part sha256 {plan.part_sha256}",
-        f"Setup sha256 {plan.setup_sha256}",
-        *plan.figures,
-        *(f"Label {key}: {value}" for key, value in sorted(plan.labels.items())),
-        f"Material {plan.material}",
-        f"Units mm and mm/min. Work offset {zero}. Program zero is the origin of the setup frame",
-        f"XYZ is the tool tip{_only_at_zero(plan)}: set every tool length in the tool table, {d.length_words}",
-        f"Stock box {box}",
-        *_heights(plan, d),
-        *(restart if plan.restart else ()),
-        d.path(tolerance),
-        *d.needs,
-        *(d.needs_restart if plan.restart and plan.clamping is None else ()),
-        "Tools, all lengths in mm from the tip:",
-        *(tool_name(t) for t in _tools_in_use(plan)),
-        *([GRANTED, *plan.assumed] if plan.assumed else ()),
-        *plan.comments,
-    ]
-    return [line for text in texts for line in d.comment(text)]
-
-
-def _axes_words(plan: Workplan) -> str:
-    return "3 axes" if plan.clamping is None else f"5 axes {plan.clamping.machine.kind}"
-
-
-def _only_at_zero(plan: Workplan) -> str:
-    return "" if plan.clamping is None or plan.clamping.machine.tcp else " at zero of the rotary axes only"
-
-
-def _heights(plan: Workplan, d: Dialect) -> list[str]:
-    """Header lines: where rapids are free, how deep the tip goes, and the clamping of a machine with rotary axes."""
-    c = plan.clamping
-    if c is None:
-        return [f"Clearance plane Z {decimal(plan.clearance_plane, 3)}: above it rapids in XY are free", _lowest(plan)]
-    x, y, z = c.centre.tolist()
-    ball = f"({decimal(x, 3)}, {decimal(y, 3)}, {decimal(z, 3)}), radius {decimal(c.radius, 3)}"
-    out = [f"Part, stock and fixtures lie in the ball round {ball}: the tool turns outside it", _lowest(plan),
-           *(f"Access {name}, tool axis " + " ".join(decimal(v, 6) for v in f.rotation[2].tolist()) + ": "
-             + " ".join(f"{letter}{decimal(float(np.degrees(v)), 4)}" for letter, v in
-                        zip(c.machine.letters, c.machine.words(c.machine.follow(f.rotation[2:], np.zeros(2))[0]),
-                            strict=True))
-             + ", or tilted the other way with C half a turn on; and whole turns of C" for name, f in c.frames.items()),
-           *_table_axes(c)]
-    if c.machine.tcp:
-        return [*out, d.tcp_words]
-    pivots = "; ".join(" ".join(decimal(v, 4) for v in p) for p in c.machine.pivots or ())
-    long = ", ".join(f"T{n} {decimal(g, 4)}" for n, g in sorted(c.gauges.items()))
-    head = f" and gauge lengths {long}" if c.machine.tilts_head else ""
-    return [*out, "XYZ are linear joints where rotary axes stand off 0",
-            f"Made only for pivots {pivots} mm{head}"]
-
-
-def _table_axes(c: Clamping) -> list[str]:
-    """Header line: which way a positive angle turns the table. A reader of the program may rely on its words."""
-    letters = {"table-table": c.machine.letters, "head-table": "C"}.get(c.machine.kind[:-3], "")
-    words = [f"{letter} {'right-handed' if sense > 0 else 'ISO 841'}"
-             for letter, sense in zip(c.machine.letters, c.machine.sense, strict=True) if letter in letters]
-    return [f"Table axes: {', '.join(words)}"] if words else []
-
-
-def lowest_tip(plan: Workplan) -> float:
-    """mm: the lowest Z of the tip in the frame of the program, rotary axes at 0."""
-    return min(float((t.points @ _into_setup(plan, s.access))[:, 2].min()) for s in plan.steps for t in s.trajectories)
-
-
-def _lowest(plan: Workplan) -> str:
-    """Header line: how deep the tip goes, for a part that is set on a table."""
-    lowest = lowest_tip(plan)
-    below = float(plan.stock.lower[2]) - lowest
-    words = f", {decimal(below, 3)} below the stock box: nothing may stand there"
-    more = words if below > MIN_DEPTH_BELOW_STOCK else ""
-    return f"Lowest Z of the tip {decimal(lowest, 3)}{more}"
-
-
-def _into_setup(plan: Workplan, access: str) -> F64:
-    """(3, 3): points (n, 3) in the frame of an access, times this matrix, are in the setup frame."""
-    return np.eye(3) if plan.clamping is None else plan.clamping.frames[access].rotation
-
-
-def _tools_in_use(plan: Workplan) -> list[ToolBody]:
-    return sorted({s.tool.number: s.tool for s in plan.steps}.values(), key=lambda t: t.number)
-
-
 def step_words(step: Workingstep) -> str:
     """The comment before a step: its id, zone, strategy, tool, faces and heights."""
     zone = step.zone or "several zones"
@@ -475,4 +446,4 @@ def step_words(step: Workingstep) -> str:
     return "; ".join(words)
 
 
-__all__ = ["label_number", "lowest_tip", "path_tolerance", "step_words", "write_program"]
+__all__ = ["label_number", "path_tolerance", "step_words", "write_program"]

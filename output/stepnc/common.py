@@ -53,7 +53,7 @@ class Curve:
 class StepPath:
     """The curves of one step: rapids that lead to it, the step, rapids to where its tool is put away.
 
-    fresh : the tool is loaded before it, and reaches the first point from where the control left it
+    fresh : the tool reaches the first point from where the control left it
     """
 
     step: Workingstep
@@ -80,7 +80,7 @@ def step_paths(plan: Workplan) -> Iterator[StepPath]:
         path = tuple(Curve(*pair) for pair in grid_path(step))
         start, end = path[0].points[0], path[-1].points[-1]
         fresh = False
-        if here is None or step.fresh or plan.restart:
+        if here is None or step.fresh:
             fresh = True
             above = np.array([*start[:2], max(clearance, int(start[2]))], dtype=np.int64)
             before = _rapid(without_repeats(np.array([above, start])))
@@ -89,7 +89,10 @@ def step_paths(plan: Workplan) -> Iterator[StepPath]:
         after: tuple[Curve, ...] = ()
         here = end
         if follower is None or follower.tool != step.tool or follower.fresh or plan.restart:
-            after = _rapid(without_repeats(np.array([end, [*end[:2], max(clearance, int(end[2]))]], dtype=np.int64)))
+            above = np.array([*end[:2], max(clearance, int(end[2]))], dtype=np.int64)
+            after = _rapid(without_repeats(np.array([end, above])))
+            here = above
+        if follower is not None and (follower.tool != step.tool or follower.fresh):
             here = None
         yield StepPath(step, fresh, before, path, after)
 

@@ -20,7 +20,8 @@ from geometry.mesh import F64, TriangleMesh
 from geometry.setup_frame import SetupFrame
 from geometry.tool_body import ToolBody
 from output.gcode.dialects import DIALECTS, Switches
-from output.gcode.program_writer import label_number, lowest_tip
+from output.gcode.program_header import lowest_tip
+from output.gcode.program_writer import label_number
 from output.workplan import Workplan
 from service.delivery.result_files import Files, listed
 from service.delivery.written_program import WrittenProgram

@@ -12,7 +12,7 @@
 11 ; Stock box X 0 to 30, Y 0 to 20, Z 0 to 15
 12 ; Clearance plane Z 25: above it rapids in XY are free
 13 ; Lowest Z of the tip 4.5
-14 ; Every step can be started at its label: it states tool, length, zero, speed and coolant again
+14 ; Every step can be started at its label: tool, length, zero, speed and coolant stand there
 15 ; Start at a label only when all steps before it have been cut: no way was proved through their
 16 ; stock
 17 ; Path mode cycle 32 T0.001: the control may leave the written path by that much, in mm

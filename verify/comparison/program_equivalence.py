@@ -72,7 +72,8 @@ def difference(proved: Program, other: Program) -> str:
 
 
 def _careless(p: Program) -> str:
-    """First tool change, stop or end at which the spindle is not home, in words; '' where there is none.
+    """First tool change, stop or end at which the spindle is not home, or length that is counted twice, in words; ''
+    where there is none.
 
     Our own programs send the spindle home there, since the operator inserts a new cutter by hand. On LinuxCNC they
     empty the spindle before they stop for a fresh cutter, because the control does not load a tool that it holds.
@@ -88,6 +89,8 @@ def _careless(p: Program) -> str:
         if pause.event == "M0" and control is None and pause.tool:
             return f"line {pause.line} of {p.name}: M0 for a fresh cutter while T{pause.tool} is in the spindle"
         changes += pause.event == "tool change"
+    if p.kept_on:
+        return f"line {p.kept_on[0]} of {p.name} turns tool centre point control on while it is on"
     return ""
 
 

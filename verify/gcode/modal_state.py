@@ -249,6 +249,8 @@ class Modes(ToolChanges):
     def _length_offset(self, g: float, values: dict[str, float]) -> None:
         """G43 and G49 end the tool centre point control of G43.4: one modal group."""
         s = self.s
+        if g == 43.4 and s.tcp_word:
+            self.log.kept_on.append(self.log.line)
         self._control(g == 43.4, s.tcp_switch)
         self.tip_told |= g == 43.4
         if g == 49:

@@ -30,7 +30,7 @@ class Log:
     path_stated : number of moves before the first word of a path mode (G61, G64), None without one
     functions : first line of each M word that counts as a function of the machine
     speeds, unknown, stops, blend, leaves, changes, unbounded, pauses, places, dwells, swaps, unplaced,
-    by_joints, lifts : as in ``Program``
+    by_joints, lifts, kept_on : as in ``Program``
     rows : latest moves as (start x, y, z, end x, y, z, kind, feed, tool, line), mm and mm/min; call ``flush`` at 65 536
     """
 
@@ -59,6 +59,7 @@ class Log:
         self.unplaced: list[int] = []
         self.lifts: list[tuple[int, bool]] = []
         self.by_joints: set[int] = set()
+        self.kept_on: list[int] = []
         self.unbounded = False
         self.cools = False
         self.path_stated: int | None = None

@@ -153,6 +153,7 @@ class Program:
     own_speed : whether a word of the program makes each axis go at its own speed in a rapid
     lifts   : rows of no length that stand for a way home in Z from a known place: row, and whether it goes along the
               tool, not along Z of the machine
+    kept_on : lines that turn tool centre point control on by G43.4 while it is on
     unbounded : whether, somewhere, no word bounds the deviation from the path: ``leaves`` does not hold there
     pauses  : in order
     """
@@ -193,6 +194,7 @@ class Program:
     by_joints: frozenset[int] = frozenset()
     own_speed: bool = False
     lifts: tuple[tuple[int, bool], ...] = ()
+    kept_on: tuple[int, ...] = ()
 
     def __len__(self) -> int:
         return len(self.start)

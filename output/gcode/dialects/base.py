@@ -19,6 +19,9 @@ from geometry.mesh import F64
 from output.header_text import ascii_text, decimal
 from output.program_grid import PER_MM, GridArc
 
+LABELS = 99
+"""Labels of parts of a step count from 0 on, the places behind the words for a start there from this number down."""
+
 UP_THE_TOOL = 50.0
 """mm above the tip; there the smoothing of the tool axis may move the tool by the path tolerance."""
 
@@ -90,6 +93,8 @@ class Dialect:
     bounds_path : whether a word of the program bounds that deviation
     needs   : header lines on conditions of the machine that no word of the program sets
     needs_restart : the same, for programs of three axes with restart points
+    needs_jumps : the same, for programs that jump over words
+    restates : a program from the top executes ``ready`` of ``begun_again`` too
     """
 
     name = title = ending = ""
@@ -100,6 +105,8 @@ class Dialect:
     bounds_path = True
     needs: tuple[str, ...] = ()
     needs_restart: tuple[str, ...] = ()
+    needs_jumps: tuple[str, ...] = ()
+    restates = False
 
     def __init__(self, switches: Switches) -> None:
         self.switches = switches
@@ -213,7 +220,36 @@ class Dialect:
 
     def stop(self) -> list[str]:
         """Spindle and coolant off, and the tool to where it can be changed."""
-        return ["M5", "M9"]
+        return ["M5", "M9", *self.lift()]
+
+    def lift(self) -> list[str]:
+        """The tool to where it can be changed, while spindle and coolant stay on."""
+        return []
+
+    def lowered(self) -> list[str]:
+        """After ``lift``, before the tool that stayed in the spindle goes down: its length, if ``arrive`` lacks it."""
+        return []
+
+    def jump(self, step: str, number: int) -> list[str]:
+        """A jump to ``target``."""
+        return [f"GOTO {number}"]
+
+    def target(self, step: str, number: int) -> list[str]:
+        """Where a program goes on that has run through the step before, and one that has been started at its label."""
+        return [f"N{number}"]
+
+    def begun_again(self, step: str, number: int, modes: list[str], load: list[str], ready: list[str]) -> list[str]:
+        """Lines between two steps with one tool: the label of the second, and words that only a start there needs.
+
+        step   : its id;  number : of its label
+        modes  : lines of the modes and the zero
+        load   : lines that bring the tool into the spindle
+        ready  : lines of its length, speed, coolant and first height
+
+        A program that runs from the top jumps over them.
+        """
+        behind = number // 100 * 100 + LABELS - number % 100
+        return [*self.jump(step, behind), *self.label(step, number), *modes, *load, *ready, *self.target(step, behind)]
 
     def tcp_on(self, number: int, zero: str) -> list[str]:
         """Tool centre point control on; rotary axes stand at 0, the tip above the part."""

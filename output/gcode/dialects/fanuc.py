@@ -2,8 +2,9 @@
 
 G43 activates the tool length in the block of the first approach. On machines with rotary axes G43.4 does so, and it
 keeps the tip too; G43 alone may move Z by the tool length (parameter 5006). For the same reason G49 stands after the
-return home (G28), never above the part. No word of a program bounds the rounding of corners: parameters do, and G05.1
-Q1 where the option exists. Numbers have a decimal point, since X10 may mean 0.010 mm (parameter 3401).
+return home (G28), never above the part. GOTO jumps over the words of a restart point. No word of a program bounds the
+rounding of corners: parameters do, and G05.1 Q1 where the option exists. Numbers have a decimal point, since X10 may
+mean 0.010 mm (parameter 3401).
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ class Fanuc(Dialect):
     needs: tuple[str, ...] = ("Machine zero of Z is taken to be the top of its travel",
                               "Needed: parameters 1401#1 LRP 1 and, on five axes, 19696#5 WKP 0 and, of rotary axes "
                               "that roll over, 1008#1 RAB 0")
+    needs_jumps: tuple[str, ...] = ("Needed: custom macros, for GOTO, and the program in the memory of the control: "
+                                    "DNC does not jump",)
     zeros = ("G54", "G55", "G56", "G57", "G58", "G59", "G54.1 P1", "G54.1 P2", "G54.1 P3")
     tcp_words = "G43.4: the control keeps the tool tip on the part while axes turn; G49: it does not any more"
     tcp_word = "G43.4"
@@ -73,6 +76,10 @@ class Fanuc(Dialect):
         """With the word that activates the tool length."""
         return [f"G0 {self.tcp_word if tcp else 'G43'} {row} H{number}"]
 
-    def stop(self) -> list[str]:
+    def lift(self) -> list[str]:
         """Home first, then the tool length off."""
-        return ["M5", "M9", *self.home(), "G49", *(["G05.1 Q0"] if self.switches.high_speed else [])]
+        return [*self.home(), "G49"]
+
+    def stop(self) -> list[str]:
+        """Fast contouring ends last."""
+        return [*super().stop(), *(["G05.1 Q0"] if self.switches.high_speed else [])]

@@ -99,9 +99,17 @@ class Heidenhain(Dialect):
         """In machine coordinates."""
         return ["L Z+0 R0 FMAX M91"]
 
-    def stop(self) -> list[str]:
+    def lift(self) -> list[str]:
         """Up in machine coordinates."""
-        return ["M5", "M9", "L Z+0 R0 FMAX M91"]
+        return self.up()
+
+    def jump(self, step: str, number: int) -> list[str]:
+        """A condition that always holds."""
+        return [f'FN 9: IF +0 EQU +0 GOTO LBL "GO {step}"']
+
+    def target(self, step: str, number: int) -> list[str]:
+        """A label like those of steps."""
+        return [f'LBL "GO {step}"']
 
     def tcp_on(self, number: int, zero: str) -> list[str]:
         """It needs its own block."""

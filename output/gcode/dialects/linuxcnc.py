@@ -5,6 +5,10 @@ without P rounds corners as far as the acceleration needs. Q0 is stated because 
 within P and then rounds the corners of the rest by P again. Tool centre point control is a switch of the kinematics
 (M428, M429). T and M6 do not change a tool that is already in the spindle, so the program first puts it away to get a
 fresh cutter.
+
+Run from line reads all lines before it without moving, then takes tool, spindle and place from the machine. So no
+jump tells a start at a step from a run through it, but the tool in the spindle does: it is called only where it is not
+in the spindle. Speed, coolant, length and modes are stated at every step; stated again they change nothing.
 """
 
 from __future__ import annotations
@@ -22,7 +26,8 @@ class LinuxCnc(Dialect):
     name, title, ending = "linuxcnc", "LinuxCNC", "ngc"
     tcp_words = "M428: the control keeps the tool tip on the part while axes turn; M429: it does not any more"
 
-    needs_restart = ("Every step begins at machine zero of Z, which is taken to be the top of its travel",)
+    needs_restart = ("Tools are changed at machine zero of Z, which is taken to be the top of its travel",)
+    restates = True
 
     def comment(self, text: str) -> list[str]:
         """Never one of the active comments."""
@@ -56,6 +61,12 @@ class LinuxCnc(Dialect):
     def before_change(self) -> list[str]:
         """The control changes the tool where the spindle stands unless its configuration names a place."""
         return self.rise()
+
+    def begun_again(self, step: str, number: int, modes: list[str], load: list[str], ready: list[str]) -> list[str]:
+        """The tool is loaded where it is not in the spindle. G49 is left out, because a length follows in any case."""
+        tool = load[-1].split()[0].removeprefix("T")
+        called = [f"o{number} if [#<_current_tool> NE {tool}]", *(f"  {x}" for x in load), f"o{number} endif"]
+        return [*self.label(step, number), *(x.replace(" G49", "") for x in modes), *called, *ready]
 
     def tcp_on(self, number: int, zero: str) -> list[str]:
         """A switch of the kinematics."""

@@ -83,9 +83,21 @@ class Siemens(Dialect):
         """Without frames and tool lengths."""
         return ["SUPA G0 Z0 D0"]
 
-    def stop(self) -> list[str]:
+    def lift(self) -> list[str]:
         """Up without frames and tool lengths."""
-        return ["M5", "M9", "SUPA G0 Z0 D0"]
+        return self.up()
+
+    def lowered(self) -> list[str]:
+        """D0 was for the way up."""
+        return ["D1"]
+
+    def jump(self, step: str, number: int) -> list[str]:
+        """Forwards, to a label with a name."""
+        return [f"GOTOF GO_{step}"]
+
+    def target(self, step: str, number: int) -> list[str]:
+        """A label like those of steps."""
+        return [f"GO_{step}:"]
 
     def tcp_on(self, number: int, zero: str) -> list[str]:
         """Zero and length are stated again after it."""

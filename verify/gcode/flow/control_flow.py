@@ -100,7 +100,7 @@ class Flow:
                 if label := _LABEL.fullmatch(line):
                     self._programs.setdefault(int(label[1]), []).append(k)
         plain, steps = self.structure.plain, self.structure.steps
-        if not all(plain):
+        if not all(plain) and not steps:  # O-words with a keyword are LinuxCNC's alone
             self.machine.log.note("parameters, expressions and O-words are read as in LinuxCNC; other controls differ")
         while at < len(plain):
             runs += 1

@@ -39,6 +39,8 @@ JOBS = {
     "restart": replace(plan(), restart=True), "3+2": TURNED, "five axes": clamped(),
     "head": clamped("head-table-BC"), "restart on five axes": replace(clamped(), restart=True),
     "speeds": faster(plan()), "speeds on five axes": faster(clamped()),
+    "speeds and restart": faster(replace(plan(), restart=True)),
+    "speeds and restart on five axes": faster(replace(clamped(), restart=True)),
     "arcs": round_plan(), "arcs of a clamping": fitted(round_clamped(), HALF),
     "arcs and restart": replace(round_plan(), restart=True),
     "dry": replace(plan(), restart=True, coolant=False),
@@ -542,6 +544,7 @@ def test_a_whole_number_of_inverse_time_has_its_point():
         assert DIALECTS[dialect](SHOPS["plain"]).timed(["X1. A2."], [60.0]) == ["G93", f"G1 X1. A2. {word}", "G94"]
 
 
+LABELS = {"siemens": r"^STEP_S\d+:$", "heidenhain": r'^\d+ LBL "S\d+"$'}
 HOME = {"linuxcnc": "G53 G0 Z0.", "fanuc": "G91 G28 Z0.", "haas": "G91 G28 Z0.", "siemens": "SUPA G0 Z0 D0",
         "heidenhain": "L Z+0 R0 FMAX M91"}
 
@@ -551,12 +554,11 @@ HOME = {"linuxcnc": "G53 G0 Z0.", "fanuc": "G91 G28 Z0.", "haas": "G91 G28 Z0.",
 def test_behind_every_label_the_spindle_goes_to_machine_zero(job, dialect):
     """Wherever it stands: before a tool is changed or turns, and the header says what that takes for granted."""
     text = write(JOBS[job], dialect)
-    mark = {"siemens": r"^STEP_S\d+:$", "heidenhain": r'^\d+ LBL "S\d+"$'}.get(dialect, r"^N\d+$")
-    head, *parts = re.split(mark, text, flags=re.MULTILINE)
+    head, *parts = re.split(LABELS.get(dialect, r"^N\d+00$"), text, flags=re.MULTILINE)
     assert len(parts) == len(JOBS[job].steps)
     for part in parts:
-        before = re.split(r"^(?:\d+ )?(?:T\d+ M6|TOOL CALL.*)$", part, flags=re.MULTILINE)[0]
-        assert HOME[dialect] in before
+        before, *behind = re.split(r"^(?:\d+ )?(?: *T\d+ M6|TOOL CALL.*)$", part, flags=re.MULTILINE)
+        assert HOME[dialect] in before and behind
     assert "machine zero of z" in " ".join(head.lower().split()) or "up to machine zero" in head
 
 
@@ -577,15 +579,14 @@ def test_comments_have_signs_that_controls_know():
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)
-@pytest.mark.parametrize("job", ["restart", "restart on five axes", "arcs and restart"])
+@pytest.mark.parametrize("job", ["restart", "restart on five axes", "arcs and restart", "speeds and restart"])
 def test_a_program_can_be_started_at_every_step(job, dialect):
     """From each label on, after whatever the header states, the moves are those of the whole program from there."""
     work = JOBS[job]
     text = write(work, dialect)
     whole = read(work, text, dialect)
     lines = text.splitlines(keepends=True)
-    mark = {"siemens": r"STEP_S\d+:", "heidenhain": r'\d+ LBL "S\d+"'}.get(dialect, r"N\d+$")
-    labels = [k for k, line in enumerate(lines) if re.match(mark, line.strip())]
+    labels = [k for k, line in enumerate(lines) if re.match(LABELS.get(dialect, r"^N\d+00$"), line.strip())]
     assert len(labels) == len(work.steps)
     head = lines[:1] if dialect != "siemens" else []
     for k in labels:
@@ -597,16 +598,60 @@ def test_a_program_can_be_started_at_every_step(job, dialect):
         assert np.array_equal(part.speed, whole.speed[-n:]) and np.array_equal(part.tool, whole.tool[-n:])
 
 
+@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("job", ["restart", "restart on five axes", "dry", "speeds and restart on five axes",
+                                 "speeds on five axes"])
+def test_a_tool_in_the_spindle_is_not_called_and_the_spindle_does_not_stop(job, dialect):
+    """From the top: a tool change for each change of tool, as many starts and stops of the spindle, one end."""
+    work = JOBS[job]
+    p = read(work, write(work, dialect), dialect)
+    tools = [s.tool.number for s in work.steps]
+    turns = [a for a, b in zip(tools, [0, *tools], strict=False) if a != b]
+    assert len(turns) < len(tools)
+    changes = [e for e in p.pauses if e.event == "tool change" and e.tool]
+    assert [e.tool for e in changes] == turns and not any(e.speed for e in changes)
+    assert [e.event for e in p.pauses if e not in changes] == ["end of the program"]
+    lines = write(work, dialect).splitlines()
+    assert sum(re.fullmatch(r"(?:\d+ )?M5", line) is not None for line in lines) == len(turns)
+    if dialect == "linuxcnc":  # unlike jumps, its words are indented
+        assert sum(re.fullmatch(r"T[0-9]+ M6", line) is not None for line in lines) == len(turns)
+
+
+@pytest.mark.parametrize("job", ["restart", "restart on five axes"])
+def test_linuxcnc_calls_the_tool_only_where_another_is_in_the_spindle(job):
+    """Started at a label with its tool in the spindle, or with another one, or none; the spindle stands."""
+    work = JOBS[job]
+    text = write(work, "linuxcnc")
+    whole = read(work, text, "linuxcnc")
+    labels = [(int(m[1]) // 100 - 1, m.start()) for m in re.finditer(r"^N(\d+)$", text, flags=re.MULTILINE)]
+    kept = [(k, at) for k, at in labels if k and work.steps[k].tool == work.steps[k - 1].tool]
+    assert kept
+    for k, at in kept:
+        number = work.steps[k].tool.number
+        for before, calls in ((number, 0), (next(t.number for t in work.tools if t.number != number), 1), (0, 1)):
+            first = f"G53 G0 Z0.\nT{before} M6\n" if before else ""
+            part = read(work, f"%\nG21\nG53 G0 Z0.\n{first}M5\n" + text[at:], "linuxcnc")
+            rest = [e.tool for e in whole.pauses if e.line > text.count("\n", 0, at) and e.event == "tool change"]
+            made = [e.tool for e in part.pauses if e.event == "tool change"]
+            assert made[bool(before):] == [*[number] * calls, *rest]
+            n = len(part)
+            assert np.array_equal(part.speed, whole.speed[-n:]) and np.array_equal(part.tool, whole.tool[-n:])
+            assert np.array_equal(part.end[1:], whole.end[-n + 1:])
+            assert np.array_equal(part.coolant[1:], whole.coolant[-n + 1:])
+
+
 def test_labels_are_the_numbers_of_the_steps():
     steps = [replace(s, id=name) for s, name in zip(plan().steps, ("S01", "S02", "S02b", "S12", "S120"), strict=True)]
     text = write(replace(plan(), steps=tuple(steps), restart=True), "fanuc")
-    assert re.findall(r"^N(\d+)$", text, flags=re.MULTILINE) == ["100", "200", "201", "1200", "12000"]
+    assert re.findall(r"^N(\d+)$", text, flags=re.MULTILINE) == [
+        "100", "200", "201", "1200", "1299", "12000"]  # N1299 is behind the words for a start at N1200
     part = write(replace(plan(), steps=tuple(steps[2:]), restart=True), "fanuc")
-    assert re.findall(r"^N(\d+)$", part, flags=re.MULTILINE) == ["201", "1200", "12000"]  # as the sheet has them
+    assert re.findall(r"^N(\d+)$", part, flags=re.MULTILINE) == ["201", "1200", "1299", "12000"]  # as on the sheet
     names = ("S03y", "S03z", "S03bb", "S03bc", "S04")
     late = [replace(s, id=name) for s, name in zip(plan().steps, names, strict=True)]
     text = write(replace(plan(), steps=tuple(late), restart=True), "fanuc")
-    assert re.findall(r"^N(\d+)$", text, flags=re.MULTILINE) == ["324", "325", "326", "327", "400"]
+    assert re.findall(r"^N(\d+)$", text, flags=re.MULTILINE) == [
+        "324", "325", "326", "327", "372", "400"]
 
 
 @pytest.mark.parametrize("dialect", OTHERS)
