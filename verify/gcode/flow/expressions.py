@@ -244,6 +244,20 @@ def power(left: float, right: float) -> float:
     return small_enough(f"{left:g} ** {right:g}", lambda: math.pow(left, right))
 
 
+def apart(a: float, b: float) -> tuple[float, float]:
+    """Both numbers of a comparison of a control that counts with fewer digits than the reader.
+
+    Raises
+    ------
+    BlockError
+        They differ by less than the rounding of such a control: it may take them for equal or not.
+    """
+    if a != b and abs(a - b) <= max(1e-9, 1e-8 * max(abs(a), abs(b))):
+        raise BlockError(f"{a!r} is compared with {b!r}: the rounding of the control decides",
+                         "compare with a number between two values, or count in whole numbers")
+    return a, b
+
+
 def small_enough(name: str, compute: Callable[[], float]) -> float:
     """The computed number.
 

@@ -13,7 +13,7 @@ import operator
 from collections.abc import Callable
 
 from verify.gcode.block_words import BlockError
-from verify.gcode.flow.expressions import Grammar, divided, modulo, power, rounded, small_enough, within
+from verify.gcode.flow.expressions import Grammar, apart, divided, modulo, power, rounded, small_enough, within
 from verify.gcode.flow.parameters import Parameters
 
 LOCALS = 33
@@ -117,14 +117,15 @@ def _whole(number: float) -> int:
 
 
 def _equal(a: float, b: float) -> float:
-    return float((a != a and b != b) or abs(a - b) < 1e-9)
+    a, b = apart(a, b)
+    return float((a != a and b != b) or a == b)
 
 
 def _ordered(compare: Callable[[float, float], bool]) -> Callable[[float, float], float]:
     def compared(a: float, b: float) -> float:
         if a != a or b != b:
             raise BlockError("a comparison with a variable that has no value yet; set it first")
-        return float(compare(a, b))
+        return float(compare(*apart(a, b)))
     return compared
 
 

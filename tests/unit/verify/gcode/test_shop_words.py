@@ -363,3 +363,15 @@ def test_the_spindle_stands_behind_rigid_tapping(dialect, tap, stands):
             p = read(f"{before}{tap}{again}G1 X1. F100.\n", dialect)
             told = sum("spindle standing" in r.message for r in p.remarks)
             assert told == (stands and not again), (before, again, p.remarks)
+
+
+@pytest.mark.parametrize("word", ["EQ", "NE", "GT", "GE", "LT", "LE"])
+@pytest.mark.parametrize("dialect", ["fanuc", "haas"])
+def test_a_comparison_that_rounding_decides_is_refused(dialect, word):
+    body = "#1=0.1+0.2\nIF[#1{}{}]THEN #2=1.\nG1 X1. F9.\n"
+    with pytest.raises(ProgramError, match="the rounding of the control decides"):
+        read(body.format(word, "0.3"), dialect)
+    with pytest.raises(ProgramError, match="the rounding of the control decides"):
+        read(f"#1=0.3-0.1-0.1-0.1\nIF[#1{word}0]THEN #2=1.\nG1 X1. F9.\n", dialect)
+    for number in ("0.30001", "5.", "#1"):
+        assert len(read(body.format(word, number), dialect))

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from verify.gcode.dialects.base import BlockError
+from verify.gcode.flow.expressions import apart
 
 NUM = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)"
 VALUE = rf"(?:[+-]\s*)?(?:{NUM}|Q[LR]?[0-9]+)"
@@ -98,7 +99,7 @@ class QParameters:
         m = _JUMP.fullmatch(text)
         if m is None:
             return None
-        a, b = self.value(m[2]), self.value(m[4])
+        a, b = apart(self.value(m[2]), self.value(m[4]))
         holds = {"EQU": a == b, "NE": a != b, "GT": a > b, "LT": a < b}[m[3]]
         return m[5] if holds else ""
 

@@ -13,8 +13,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
 
 from verify.gcode.dialects.base import ZEROS, BlockError, Machine, zero_word
 from verify.gcode.dialects.orientation import needed
@@ -42,7 +41,6 @@ from verify.gcode.dialects.siemens.siemens_words import (
     VALUES,
     factor_of_feeds,
 )
-from verify.gcode.dialects.stated_places import digits
 from verify.gcode.machine_words import SIEMENS_M
 
 _MARKS = re.compile(r"^\s*(?:N[0-9]+\s+)?[^;(\n]*\b(?:TRAORI|TRAFOOF|CYCLE8[0-9]{1,2}\s*\(|SUPA|G710|G700|G641|G642"
@@ -89,24 +87,6 @@ class SiemensReader(SiemensCalls):
         for number, raw in flow.run(lambda: self.moved):
             self.number = number
             yield number, raw
-
-    def _modes(self) -> Callable[[], str]:
-        """A call that restores the modes and the programmable frame of now; it gives the words for what is left."""
-        s = self.machine.s
-        kept, frames, named = replace(s), (self.swivel, self.programmed), (self.motion, self.circle, self.style)
-
-        def restore() -> str:
-            if self.swivel is not frames[0] or (s.work_offset, s.side) != (kept.work_offset, kept.side):
-                raise BlockError("a subprogram with SAVE changes the work offset, the plane of CYCLE800 or cutter "
-                                 "radius compensation: machine data decide whether its return brings it back")
-            if self.programmed is not frames[1]:
-                self.program_again(frames[1])
-            self.motion, self.circle, self.style = named
-            words = [f"G{kept.plane}", "G91" if kept.relative else "G90"]
-            words += [f"G{kept.feed_mode}"] if s.feed_mode != kept.feed_mode else []
-            words += ["G710" if kept.scale == 1.0 else "G700"] if s.scale != kept.scale else []
-            return " ".join([*words, *([f"G{self.motion}"] if isinstance(self.motion, int) else [])])
-        return restore
 
     def _served(self, name: str, index: str) -> Value:
         """A value of the control."""
@@ -355,12 +335,6 @@ class SiemensReader(SiemensCalls):
                                                                       641):
             raise BlockError(f"unknown word G{n}")
 
-    def _compensated(self, n: int) -> str:
-        """Compensation by the radius of the tool in the spindle; D0 has none."""
-        if self.edge and self.tool not in self.machine.radii:
-            return f"G{n} D{self.tool}"
-        return f"G{n}.1 D{digits(2 * self.machine.radii[self.tool] / self.unit) if self.edge else 0}"
-
     def _value(self, name: str, reader: ValueReader, line: Line) -> None:
         """NAME = value: a word of the block, a parameter or a variable."""
         if name in ("T", "T1") and not self.variables.known(name):
@@ -442,6 +416,8 @@ class SiemensReader(SiemensCalls):
             line.frame = word
         elif word in COMPRESSORS:
             line.values["COMPRESS"] = 1.0
+        elif word in ("CUT2D", "CUT2DF"):
+            self.in_frame = word == "CUT2DF"
         elif word == "RTLIOF":
             self.own_speed = True
         elif word in CURVES:

@@ -1,17 +1,19 @@
-"""Calls of Siemens cycles that drill, and that set how near the path is followed."""
+"""Calls of Siemens cycles that drill, and that set how near the path is followed; compensation, and modes of SAVE."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from verify.gcode.dialects.base import NUMBER, BlockError
+from verify.gcode.dialects.orientation import needed
 from verify.gcode.dialects.siemens.siemens_cycles import DrillingCall, drilling_blocks, row_of_holes
 from verify.gcode.dialects.siemens.siemens_expressions import ValueReader, Variables
 from verify.gcode.dialects.siemens.siemens_moves import Line, SiemensMoves
 from verify.gcode.dialects.siemens.siemens_swivel import is_number
-from verify.gcode.dialects.stated_places import digits
+from verify.gcode.dialects.stated_places import digits, level
 from verify.program.arc_chords import PLANE_AXES
 
 SMALL = 0.01
@@ -23,10 +25,14 @@ class SiemensCalls(SiemensMoves):
 
     variables : Variables of the program
     loose     : note for the first turning tool axis, empty for none
+    tool, edge : T number in the spindle and the number of its edge, 0 without a length
+    in_frame  : whether cutter radius compensation counts in the plane of the frame (CUT2DF)
     """
 
     variables: Variables
     loose = ""
+    tool, edge = 0, 1
+    in_frame = False
 
     def _number(self, text: str) -> float:
         reader = ValueReader(text, self.variables)
@@ -82,3 +88,34 @@ class SiemensCalls(SiemensMoves):
             return
         amount = f"of {parts[2]} deg" if stated else "that setting data decide"
         self.loose = f"CYCLE832 allows the tool axis a deviation {amount}: the error bound does not include it"
+
+    def _compensated(self, n: int) -> str:
+        """Compensation by the radius of the tool in the spindle; D0 has none.
+
+        It counts in the plane of G17 to G19 of the machine, with CUT2DF in that of the frame.
+        """
+        turned = self.swung and not needed(self.machine.machine, "CYCLE800").tilts_head  # the part with its frame
+        if self.frame is not None and not level(self.frame) and not self.in_frame and not turned:
+            raise BlockError(f"G{n} in tilted coordinates without CUT2DF: the control offsets in the plane that is "
+                             "not tilted", "program CUT2DF before it")
+        if self.edge and self.tool not in self.machine.radii:
+            return f"G{n} D{self.tool}"
+        return f"G{n}.1 D{digits(2 * self.machine.radii[self.tool] / self.unit) if self.edge else 0}"
+
+    def _modes(self) -> Callable[[], str]:
+        """A call that restores the modes and the programmable frame of now; it gives the words for what is left."""
+        s = self.machine.s
+        kept, frames, named = replace(s), (self.swivel, self.programmed), (self.motion, self.circle, self.style)
+
+        def restore() -> str:
+            if self.swivel is not frames[0] or (s.work_offset, s.side) != (kept.work_offset, kept.side):
+                raise BlockError("a subprogram with SAVE changes the work offset, the plane of CYCLE800 or cutter "
+                                 "radius compensation: machine data decide whether its return brings it back")
+            if self.programmed is not frames[1]:
+                self.program_again(frames[1])
+            self.motion, self.circle, self.style = named
+            words = [f"G{kept.plane}", "G91" if kept.relative else "G90"]
+            words += [f"G{kept.feed_mode}"] if s.feed_mode != kept.feed_mode else []
+            words += ["G710" if kept.scale == 1.0 else "G700"] if s.scale != kept.scale else []
+            return " ".join([*words, *([f"G{self.motion}"] if isinstance(self.motion, int) else [])])
+        return restore

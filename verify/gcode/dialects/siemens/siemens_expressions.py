@@ -287,6 +287,11 @@ def _rounded(value: float) -> float:
     return math.copysign(math.floor(abs(value) + 0.5), value)
 
 
+def _same(a: float, b: float) -> bool:
+    """Whether a comparison with equality takes both for one number: Job Planning, TRUNC, within 1e-12 of it."""
+    return abs(a - b) <= 1e-12 * max(abs(a), abs(b))
+
+
 def _bits(function: Callable[[int, int], int]) -> Callable[[float, float], float]:
     return lambda a, b: float(function(_whole(a), _whole(b)))
 
@@ -294,8 +299,9 @@ def _bits(function: Callable[[int, int], int]) -> Callable[[float, float], float
 _OPERATIONS: dict[str, Callable[[float, float], float]] = {
     "*": operator.mul, "/": operator.truediv, "+": operator.add, "-": operator.sub,
     "DIV": lambda a, b: float(math.trunc(a / b)), "MOD": math.fmod,
-    "==": lambda a, b: float(a == b), "<>": lambda a, b: float(a != b), "<": lambda a, b: float(a < b),
-    ">": lambda a, b: float(a > b), "<=": lambda a, b: float(a <= b), ">=": lambda a, b: float(a >= b),
+    "==": lambda a, b: float(_same(a, b)), "<>": lambda a, b: float(not _same(a, b)), "<": lambda a, b: float(a < b),
+    ">": lambda a, b: float(a > b), "<=": lambda a, b: float(a < b or _same(a, b)),
+    ">=": lambda a, b: float(a > b or _same(a, b)),
     "AND": lambda a, b: float(a != 0 and b != 0), "OR": lambda a, b: float(a != 0 or b != 0),
     "XOR": lambda a, b: float((a != 0) != (b != 0)), "B_AND": _bits(operator.and_), "B_OR": _bits(operator.or_),
     "B_XOR": _bits(operator.xor),

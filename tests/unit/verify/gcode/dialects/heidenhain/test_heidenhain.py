@@ -254,3 +254,10 @@ def test_sizes_of_tool_def_are_those_of_the_proof(defs, said):
 def test_tool_def_makes_a_tool_ready():
     for line in ("TOOL DEF 2", 'TOOL DEF "drill 8"', "TOOL DEF 1 L+50 R+5", 'TOOL DEF "SOMETHING"'):
         assert not read([line, line, "L X+1 F100"], "heidenhain").remarks
+
+
+@pytest.mark.parametrize("jump", ["FN 9: IF +Q1 EQU +0.3", "FN 10: IF +Q1 NE +0.3", "FN 11: IF +Q1 GT +0.3"])
+def test_a_comparison_that_rounding_decides_is_refused(jump):
+    with pytest.raises(ProgramError, match="the rounding of the control decides"):
+        read(["Q1 = 0.1 + 0.2", f"{jump} GOTO LBL 1", "L X+1 F100", "LBL 1"], "heidenhain")
+    assert len(read(["Q1 = 0.1 + 0.2", f"{jump}1 GOTO LBL 1", "L X+1 F100", "LBL 1"], "heidenhain"))

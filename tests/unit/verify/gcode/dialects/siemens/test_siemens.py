@@ -299,3 +299,28 @@ def test_a_corner_behind_more_than_three_blocks_without_a_move_is_told(between, 
     """MD20250: with more blocks than that the control gives alarm 10762 and stands in the cut."""
     p = read(f"G0 X-30\nG41 G1 X0 Y0 F100\nX20\n{between}\nY20\nG40 X-9", "siemens")
     assert any("without a move in the plane stand before this corner" in r.message for r in p.remarks) == told
+
+
+@pytest.mark.parametrize(("condition", "holds"), [
+    ("R1==0.3", True), ("R1<>0.3", False), ("R1<=0.3", True), ("0.3>=R1", True), ("R1>0.3", True), ("0.3<R1", True),
+    ("R1==0.3000001", False), ("R1<=0.2999999", False)])
+def test_comparisons_with_equality_are_relative(condition, holds):
+    """Job Planning, precision correction on comparison errors: 1e-12; < and > compare all digits."""
+    p = read(f"R1=0.1+0.2\nIF {condition}\nG1 X5\nELSE\nG1 X7\nENDIF", "siemens")
+    assert p.end[-1, 0] == (5.0 if holds else 7.0)
+
+
+@pytest.mark.parametrize(("kind", "lines", "right"), [
+    ("table-table-AC", "TRAORI\nG54\nG0 A30 C0\nTRANS Z12\nAROT X-30", False),
+    ("table-table-AC", "TRAORI\nG54\nG0 A30 C0\nCUT2D\nROT X-30", False),
+    ("table-table-AC", "TRAORI\nG54\nG0 A30 C0\nCUT2DF\nROT X-30", True), ("table-table-AC", "ROT Z30", True),
+    ("table-table-AC", 'CYCLE800(1,"",0,57,0,0,0,30,0,0,0,0,0,-1,,1)', True),
+    ("head-head-AC", 'CYCLE800(1,"",0,57,0,0,0,30,0,0,0,0,0,-1,,1)', False),
+    ("head-head-AC", 'CUT2DF\nCYCLE800(1,"",0,57,0,0,0,30,0,0,0,0,0,-1,,1)', True)])
+def test_compensation_in_a_tilted_frame_needs_cut2df(kind, lines, right):
+    text = f"{lines}\nG0 X0 Y0 Z90\nG1 G41 X20 F100\nX30\nG40 X50"
+    if right:
+        assert len(read(text, "siemens", kind))
+        return
+    with pytest.raises(ProgramError, match="in tilted coordinates without CUT2DF"):
+        read(text, "siemens", kind)
