@@ -99,14 +99,17 @@ class Measured:
 class FinishedPlanes:
     """Planes of the part that a run of feed moves finishes.
 
-    run   : (m,) int64, index, run of each move: moves without a rapid between them
-    width : mm, how far from a plane a place counts as in it
-    keys  : run, normal in thousandths and distance from the origin in widths of every finished sample
+    run    : (m,) int64, index, run of each move: moves without a rapid between them
+    width  : mm, how far from a plane a place counts as in it
+    own    : (k,) int64, index, the run that finished each finished sample
+    points, normals : (k, 3) float64, mm and unit, of these, frame of the proof
     """
 
     run: INT
     width: float
-    keys: frozenset[tuple[int, ...]]
+    own: INT
+    points: F64
+    normals: F64
 
     @classmethod
     def of(cls, samples: SurfaceSamples, residual: F64, mover: I32, cutting: Cutting) -> FinishedPlanes:
@@ -118,8 +121,7 @@ class FinishedPlanes:
         setup, run = cutting.setup, np.cumsum(~cutting.moves.feed).astype(np.int64)
         width = max(setup.scallop_height, setup.gouge_tolerance)
         rows = np.flatnonzero((mover >= 0) & proved_samples(residual, setup))
-        keys = _plane_keys(run[mover[rows]], samples.points[rows], samples.normals[rows], width)
-        return cls(run, width, frozenset(map(tuple, np.unique(keys, axis=0).tolist())))
+        return cls(run, width, run[mover[rows]], samples.points[rows], samples.normals[rows])
 
     def holds(self, points: F64, normals: F64, height: F64, mover: I32) -> BOOL:
         """Whether what a move leaves above a place lies in a plane that its run finishes.
@@ -131,12 +133,15 @@ class FinishedPlanes:
         """
         out = np.zeros(len(points), np.bool_)
         rows = np.flatnonzero((mover >= 0) & (height > self.width) & np.isfinite(height))
-        if not self.keys or not len(rows):
+        if not len(rows):
             return out
         ends = points[rows] + height[rows, None] * normals[rows]
         keys, of = np.unique(_plane_keys(self.run[mover[rows]], ends, normals[rows], self.width), axis=0,
                              return_inverse=True)
-        known = np.array([any((*k[:4], k[4] + d) in self.keys for d in (-1, 0, 1)) for k in map(tuple, keys.tolist())])
+        mine = np.isin(self.own, keys[:, 0])  # of few runs anything is asked
+        planes = _plane_keys(self.own[mine], self.points[mine], self.normals[mine], self.width)
+        finished = frozenset(map(tuple, np.unique(planes, axis=0).tolist()))
+        known = np.array([any((*k[:4], k[4] + d) in finished for d in (-1, 0, 1)) for k in map(tuple, keys.tolist())])
         out[rows] = known[of.reshape(-1)]
         return out
 
