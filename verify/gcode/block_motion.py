@@ -63,6 +63,8 @@ class BlockMotion(FrameWords):
         if s.motion is None or s.motion == 80:
             return self.log.error("coordinates without a motion word")
         self.incremental_moved = True
+        if self.turned:
+            self._check_turned(axes)
         if s.motion in CYCLES:
             if turn is not None and turn != s.turn:
                 return self.log.error("a drilling cycle turns a rotary axis in its block: turn it in a block before")

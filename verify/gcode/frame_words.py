@@ -10,14 +10,18 @@ import math
 from verify.gcode.block_words import MOTION_CODES, Block, BlockError
 from verify.gcode.contour_motion import ContourMotion
 from verify.gcode.frames import Frame, rotation, scaling
+from verify.program.arc_chords import PLANE_AXES
 
 Axes = list[float | None]
+SAME = 1e-9  # mm
 
 
 class FrameWords(ContourMotion):
     """Rotation, scale and mirrors in force; together they are the frame of the state.
 
     mirrors : mm by axis, 0 to 2, the programmed coordinate that stays
+    turned  : the word that began or ended a rotation, until a move names both axes of the plane; '' for none
+    numbers : (3,) mm, the programmed place before that word
     """
 
     def __init__(self, *arguments: object, **named: object) -> None:
@@ -25,6 +29,7 @@ class FrameWords(ContourMotion):
         self.rotated: Frame | None = None
         self.scaled: Frame | None = None
         self.mirrors: dict[int, float] = {}
+        self.turned, self.numbers = "", [math.nan] * 3
 
     def _unturn(self, word: float) -> None:
         """G69 and G50: no rotation, no scale."""
@@ -32,6 +37,7 @@ class FrameWords(ContourMotion):
             return
         self._settled(f"G{word:g}")
         if word == 69:
+            self.turned, self.numbers = "G69", self._here()
             self.rotated = None
         else:
             self.scaled = None
@@ -59,7 +65,21 @@ class FrameWords(ContourMotion):
                              "be read")
         if self.rotated is not None:
             raise BlockError("G68 while a rotation is in force: end it with G69 first")
+        self.turned, self.numbers = "G68", self._here()
         self.rotated = rotation(self.s.plane, math.radians(values["R"]), self._centre(axes, "G68"))
+
+    def _check_turned(self, axes: Axes) -> None:
+        """Refuse the first move behind a rotation that names one axis of the plane, where the other may go two ways.
+
+        Fanuc: parameter 11600#5 (AX1) takes it where the tool stands, or at its number of before, turned.
+        """
+        others = [k for k in PLANE_AXES[self.s.plane][:2] if axes[k] is None]
+        if self.s.relative or len(others) == 2:
+            return
+        if others and abs(self._here()[others[0]] - self.numbers[others[0]]) > SAME:
+            raise BlockError(f"a move with one axis of the plane behind {self.turned}: a parameter decides where the "
+                             "other one goes", "name both axes in the first move")
+        self.turned = ""
 
     def _scale(self, values: dict[str, float], axes: Axes) -> None:
         if self.scaled is not None:

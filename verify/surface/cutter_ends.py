@@ -153,12 +153,13 @@ def _placed(moves: Moves, row: INT, share: F64, tool: ToolBody, bounds: F64) -> 
 def _pressed(tree: TriangleTree, tip: F64, axis: F64, tool: ToolBody, lift: float, least: float) -> Feet:
     """The deepest place of each pose (n, 3) that presses in by more than ``least`` mm, on a rim ``lift`` mm up.
 
-    An end presses in nowhere where its middle is in air and no surface comes as near to it as its rim does.
+    An end presses in nowhere by ``least`` where its middle is in air and no surface comes nearer to it than its rim is
+    by as much: the way from the middle to a place so deep in the part goes through the surface before.
     """
-    middle = tip + (tool.corner_radius + lift) * axis
-    alone = np.flatnonzero(nearest(tree, middle, tool.radius + SPARE)[1] < 0)
+    middle, reach = tip + (tool.corner_radius + lift) * axis, tool.radius - least + SPARE
+    alone = np.flatnonzero(nearest(tree, middle, reach)[1] < 0) if reach > 0.0 else np.arange(len(tip))
     may = np.ones(len(tip), np.bool_)
-    may[alone] = _inside_alone(tree, middle[alone], tool.radius)
+    may[alone] = _inside_alone(tree, middle[alone], max(reach, SPARE))
     tip, axis = tip[may], axis[may]
     return _joined([_deepest(tree, tip[i:i + BATCH], axis[i:i + BATCH], tool, lift, least)
                     for i in range(0, len(tip), BATCH)])

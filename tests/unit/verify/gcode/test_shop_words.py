@@ -375,3 +375,15 @@ def test_a_comparison_that_rounding_decides_is_refused(dialect, word):
         read(f"#1=0.3-0.1-0.1-0.1\nIF[#1{word}0]THEN #2=1.\nG1 X1. F9.\n", dialect)
     for number in ("0.30001", "5.", "#1"):
         assert len(read(body.format(word, number), dialect))
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas"])
+def test_the_first_move_behind_a_rotation_names_both_axes(dialect):
+    """Fanuc 30i, 11600#5: an axis that is not named counts where it stands, or at its number of before, turned."""
+    for body in ("G68 X0. Y0. R90.\nG1 X20. F9.\n", "G68 X0. Y0. R90.\nG1 Z5. F9.\nX20.\n",
+                 "G68 X0. Y0. R90.\nG0 X1. Y2.\nG69\nX5.\n", "G68 X0. Y0. R90.\nG98 G81 X5. Z-3. R2. F9.\nG80\n"):
+        with pytest.raises(ProgramError, match="with one axis of the plane behind G6[89]"):
+            read("G0 X-20. Y-20.\n" + body, dialect)
+        read(body.replace("X5.\n", ""), dialect)  # at the centre of the rotation both are one
+    p = read("G68 X0. Y0. R90.\nG0 X1. Y2.\nX5.\nG69\nG0 Z50.\nX1. Y1.\nX3.\n", dialect)
+    assert p.end[-4:, :2].round(9).tolist() == [[-2, 5], [-2, 5], [1, 1], [3, 1]]
