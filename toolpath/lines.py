@@ -5,6 +5,7 @@ Places are in mm, access frame.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from toolpath.kernels.contour import thin
 
 SAME_PLACE = 1e-6  # mm
 BESIDE = 0.1234  # share of that by which the borders between keys are shifted
+CORNER = math.radians(30.0)
 SHORTEST = 0.11  # mm, a part of a move down that is parted, at least
 
 
@@ -61,6 +63,21 @@ def place_keys(points: F64) -> list[bytes]:
     points : (n, k) float64, mm
     """
     return [row.tobytes() for row in np.floor(points / SAME_PLACE + BESIDE).astype(np.int64)]
+
+
+def legs(points: F64) -> F64:
+    """Lengths of a polyline from corner to corner, (k,) float64, mm; it turns by more than ``CORNER`` there.
+
+    points : (n, 3) float64, mm, access frame
+    """
+    way = np.diff(points, axis=0)
+    size = np.linalg.norm(way, axis=1)
+    way, size = way[size > 1e-9], size[size > 1e-9]
+    if not len(size):
+        return size
+    unit = way / size[:, None]
+    turns = (unit[1:] * unit[:-1]).sum(axis=1) < math.cos(CORNER)
+    return np.asarray(np.add.reduceat(size, np.concatenate([[0], np.flatnonzero(turns) + 1])))
 
 
 def dense(points: F64, spacing: float) -> F64:

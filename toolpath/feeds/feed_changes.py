@@ -4,10 +4,7 @@ A change of feed takes time and way, because acceleration and jerk are limited, 
 on the surface. Where the feed between two rapids changes often, a lower feed over several stretches is nearly as fast.
 The feed of a place never rises, so no bound on load, ramp or deflection is touched. Lengths are mm, feeds mm/min.
 
-Notation
-    v0, v1 : slower and faster speed of a change, mm/s
-    a, j   : acceleration, mm/s², and jerk, mm/s³
-    t      : s, duration of a change; the machine accelerates within the faster stretch
+Changes are those of ``toolpath.feeds.speed_changes``; the machine accelerates within the faster stretch.
 """
 
 from __future__ import annotations
@@ -21,10 +18,10 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.move_timing import Rates
+from toolpath.feeds.speed_changes import change_seconds, change_way, peak_speed
 from toolpath.lines import SHORTEST, stretch
 from toolpath.workingsteps import Trajectory, TrajectoryKind
 
-JERK = 20000.0  # mm/s³, of a machining centre; shop practice
 LEAST = 0.26  # mm, shortest stretch of one feed: a quarter of a millimetre after rounding
 PRICE = 0.08  # s, what a change may cost before it is left out
 MOST_LEVELS = 48  # feeds considered between two rapids
@@ -37,35 +34,6 @@ class _Stretch:
 
     length: float
     feed: float
-
-
-def change_seconds(slow: float, fast: float, acceleration: float) -> float:
-    """Duration of a change between two speeds, at the limits of acceleration and jerk.
-
-    slow, fast   : mm/s
-    acceleration : mm/s²
-
-    Returns s.
-
-    Notes
-    -----
-    t = 2 sqrt(dv / j) while the acceleration stays below a, that is for dv <= a² / j, else dv / a + a / j.
-    """
-    dv = abs(fast - slow)
-    if dv <= acceleration ** 2 / JERK:
-        return 2.0 * math.sqrt(dv / JERK)
-    return dv / acceleration + acceleration / JERK
-
-
-def change_way(slow: float, fast: float, acceleration: float) -> float:
-    """Way of a change between two speeds: (v0 + v1) / 2 t.
-
-    slow, fast   : mm/s
-    acceleration : mm/s²
-
-    Returns mm.
-    """
-    return 0.5 * (slow + fast) * change_seconds(slow, fast, acceleration)
 
 
 def with_few_changes(trajectories: Sequence[Trajectory], rates: Rates) -> tuple[Trajectory, ...]:
@@ -181,11 +149,8 @@ def _too_short(parts: Sequence[_Stretch], k: int, acceleration: float) -> bool:
 
 def _peaked(length: float, base: float, most: float, acceleration: float) -> float:
     """Seconds from a speed up along a length, mm, as fast as the machine gets there; speeds in mm/s."""
-    low, high = base, most
-    for _ in range(30):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if change_way(base, middle, acceleration) <= length else (low, middle)
-    return change_seconds(base, low, acceleration) + (length - change_way(base, low, acceleration)) / low
+    peak = peak_speed(length, base, most, acceleration)
+    return change_seconds(base, peak, acceleration) + (length - change_way(base, peak, acceleration)) / peak
 
 
 def _applied(run: Sequence[Trajectory], lengths: F64, parts: Sequence[_Stretch]) -> list[Trajectory]:
@@ -229,4 +194,4 @@ def _parted(t: Trajectory, places: F64, rises: NDArray[np.bool_]) -> list[tuple[
             for low, high in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True)]
 
 
-__all__ = ["LEAST", "PRICE", "change_seconds", "change_way", "with_few_changes"]
+__all__ = ["LEAST", "PRICE", "with_few_changes"]

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.feeds.feed_scheduling import Pace, paced
-from toolpath.lines import Line, dense, pieces_where, thinned
+from toolpath.lines import Line, dense, legs, pieces_where, thinned
 from toolpath.linking.lead_arcs import arcs_along
 from toolpath.linking.ramp_entry import RAMP_SHARE, head_of, way_down
 from toolpath.linking.rapid_travel import Motions, Travel
@@ -358,8 +358,7 @@ class Linker:
             steps = np.flatnonzero(np.linalg.norm(np.diff(way, axis=0), axis=1) > 1e-9)
             if not len(steps):
                 return True
-            length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
-            if length / self.motions.link_feed > self.go.by_plane(way[0], way[-1]):
+            if self.motions.link_seconds(legs(way).tolist()) > self.motions.plane_seconds(way[0], way[-1]):
                 continue
             known = self.gone.were_cut(way) | self.depths.were_cut(way)
             if int(known.sum()) > MAX_AGAIN:

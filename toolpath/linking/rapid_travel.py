@@ -10,7 +10,7 @@ Arrays are float64; places are tips in mm, access frame.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from dataclasses import field as fresh
 
@@ -18,7 +18,9 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from geometry.mesh import F64
+from geometry.move_timing import RATES
 from toolpath.feeds.feed_scheduling import GUARD
+from toolpath.feeds.speed_changes import leg_seconds
 from toolpath.lines import dense, stretch
 from toolpath.stock.stock_map import AIR_TOLERANCE, SURE_RIM, StockMap
 from toolpath.workingsteps import Trajectory, TrajectoryKind
@@ -36,6 +38,7 @@ class Motions:
 
     plunge_feed : straight down, and vertical limit of a way down along a pass
     front_feed  : limit in cut where the whole front of the cutter is in stock that no engaged angle limits
+    acceleration : mm/s²
     """
 
     feed: float
@@ -48,6 +51,30 @@ class Motions:
     step_down: float
     tolerance: float
     front_feed: float = math.inf
+    acceleration: float = RATES.acceleration
+
+    def link_seconds(self, lengths: Sequence[float]) -> float:
+        """Time of straight moves at the feed of links, with a stop at each corner.
+
+        lengths : mm
+
+        Returns s.
+        """
+        return sum(leg_seconds(a, self.link_feed / 60.0, self.acceleration) for a in lengths)
+
+    def plane_seconds(self, here: F64, to: F64) -> float:
+        """Time from a place to another by the clearance plane: up, across and down.
+
+        Feed moves reach the height of rapids. The control stops where feed moves and rapids meet, and at corners.
+
+        here, to : (3,) float64, mm, access frame
+
+        Returns s.
+        """
+        lift = max(self.clearance - self.rapid_floor, 0.0)
+        rapids = (lift, float(np.hypot(*(to - here)[:2])), lift)
+        return self.link_seconds([self.rapid_floor - float(here[2]), self.rapid_floor - float(to[2])]) + sum(
+            leg_seconds(a, self.rapid_feed / 60.0, self.acceleration) for a in rapids)
 
 
 @dataclass
@@ -141,8 +168,8 @@ class Travel:
         here, low = self.at, start[2] + self._in_front
         run = float(np.hypot(*(start - here)[:2]))
         level = max(float(here[2]), low)
-        by_plane = self.by_plane(here, np.array([*start[:2], low]))
-        if (2.0 * level - here[2] - low + run) / m.link_feed >= by_plane:
+        by_plane = m.plane_seconds(here, np.array([*start[:2], low]))
+        if m.link_seconds([level - here[2], run, level - low]) >= by_plane:
             return None
         n = max(2, int(run / (0.5 * self.stock.lattice.step)) + 1)
         t = np.linspace(0.0, 1.0, n)[:, None]
@@ -152,22 +179,13 @@ class Travel:
         stands = np.maximum(self.stock.overlap(lane, tool, SURE_RIM, lower_bound=0.0),
                             self.stock.under_end(lane, tool, lower_bound=0.0))
         level += float(stands.max()) + OVER
-        if (2.0 * level - here[2] - low + run) / m.link_feed >= by_plane or level >= m.rapid_floor:
+        if level >= m.rapid_floor or m.link_seconds([level - here[2], run, level - low]) >= by_plane:
             return None
         lane[:, 2] = level
         if not (self.free_move(here[:2], start[:2], level) and bool(self.stock.in_air(lane, tool).all())):
             return None
         way = np.array([here, [*here[:2], level], [*start[:2], level], [*start[:2], low]])
         return np.ascontiguousarray(way[np.r_[True, np.linalg.norm(np.diff(way, axis=0), axis=1) > 1e-9]])
-
-    def by_plane(self, here: F64, to: F64) -> float:
-        """Minutes from a place to another by the clearance plane: up, across and down.
-
-        here, to : (3,) float64, mm, access frame
-        """
-        m, run = self.motions, float(np.hypot(*(to - here)[:2]))
-        return float((2.0 * m.rapid_floor - here[2] - to[2]) / m.link_feed
-                     + (2.0 * (m.clearance - m.rapid_floor) + run) / m.rapid_feed)
 
     def _onto_feed(self, start: F64) -> float:
         """Feed of the last part of the way down to a place (3,), mm: that of the cut where no stock stands there,

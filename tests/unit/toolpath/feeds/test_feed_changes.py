@@ -9,7 +9,8 @@ import pytest
 
 from geometry.move_timing import Rates
 from toolpath.feeds import feed_changes
-from toolpath.feeds.feed_changes import LEAST, PRICE, change_seconds, change_way, with_few_changes
+from toolpath.feeds.feed_changes import LEAST, PRICE, with_few_changes
+from toolpath.feeds.speed_changes import change_seconds
 from toolpath.lines import SHORTEST
 from toolpath.workingsteps import Trajectory, TrajectoryKind
 
@@ -43,20 +44,6 @@ def seconds(pieces):
     lost = [change_seconds(a, b, 1000.0) * abs(a - b) / (2 * max(a, b)) + PRICE
             for a, b in itertools.pairwise(speeds) if a != b]
     return sum(length / v for (length, _), v in zip(pieces, speeds, strict=True)) + sum(lost)
-
-
-def test_a_change_keeps_the_limits_of_jerk_and_acceleration():
-    """Integrated in small steps of time: jerk up, acceleration held, jerk down."""
-    for slow, fast, most in ((4.0, 7.0, 1000.0), (4.0, 50.0, 1000.0), (10.0, 90.0, 500.0), (50.0, 4.0, 4905.0)):
-        dv, j = abs(fast - slow), feed_changes.JERK
-        peak = min(most, np.sqrt(dv * j))
-        up, held = peak / j, max(dv / peak - peak / j, 0.0)
-        t = np.linspace(0.0, 2 * up + held, 200_001)
-        a = np.minimum(np.minimum(j * t, peak), j * (t[-1] - t))
-        v = np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(t))]) + min(slow, fast)
-        assert v[-1] == pytest.approx(max(slow, fast), rel=1e-6)
-        assert change_seconds(slow, fast, most) == pytest.approx(t[-1])
-        assert change_way(slow, fast, most) == pytest.approx(float(np.sum(0.5 * (v[1:] + v[:-1]) * np.diff(t))))
 
 
 def test_a_short_fast_stretch_takes_the_feed_of_its_neighbours():

@@ -13,7 +13,8 @@ from output.program_grid import to_grid
 from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
 from toolpath.counterexamples import BARRED, CARE, Counterexamples
 from toolpath.feeds.feed_scheduling import GUARD, Pace
-from toolpath.lines import Line, dense
+from toolpath.feeds.speed_changes import leg_seconds
+from toolpath.lines import Line, dense, legs
 from toolpath.linking.linker import FLUTE_SHARE, Linker
 from toolpath.linking.rapid_travel import OVER, Motions
 from toolpath.passes.pass_order import nearest_order
@@ -579,3 +580,24 @@ def test_back_in_air_the_tool_goes_the_same_way_but_once():
     assert link.add(straight(5, 20, 12, 1.0))
     long = np.column_stack([np.tile([20.0, 4.0], 20), np.linspace(12.0, 13.0, 40), np.ones(40)])
     assert not link.keep_down([long])  # by the clearance plane it is sooner
+
+
+def test_the_clearance_plane_costs_the_stops_between_rapids_and_feed_moves():
+    """30 mm apart: as the feeds go the plane would be 0.3 s sooner, but the machine stops four times more on it."""
+    link = linker(top=-1.0)
+    link.motions = replace(link.motions, clearance=12.0, rapid_floor=11.0)
+    here, to = np.array([0.0, 15.0, 10.0]), np.array([30.0, 15.0, 10.0])
+    m = link.motions
+    assert 30.0 / m.link_feed > 2.0 / m.link_feed + 32.0 / m.rapid_feed + 0.3 / 60.0
+    assert m.link_seconds([30.0]) < m.plane_seconds(here, to)
+    assert m.link_seconds([90.0]) > m.plane_seconds(here, to + [60.0, 0.0, 0.0])
+    alone = m.link_seconds([1.0]) + m.link_seconds([1.0]) + 2.0 * leg_seconds(1.0, 10000 / 60, m.acceleration)
+    assert m.plane_seconds(here, to) == pytest.approx(alone + leg_seconds(30.0, 10000 / 60, m.acceleration))
+
+
+def test_legs_end_at_corners():
+    turn = np.linspace(0.0, 0.5 * np.pi, 10)
+    arc = np.column_stack([5.0 * np.sin(turn), 5.0 * (1.0 - np.cos(turn)), np.zeros(10)])
+    way = np.vstack([[-3.0, 0.0, 0.0], arc, [5.0, 5.0, 7.0], [5.0, 5.0, 7.0], [1.0, 5.0, 7.0]])
+    assert legs(way) == pytest.approx([3.0 + 5.0 * 0.5 * np.pi, 7.0, 4.0], rel=2e-3)
+    assert len(legs(way[:1])) == 0
