@@ -9,7 +9,7 @@ Changes are those of ``toolpath.feeds.speed_changes``; the machine accelerates w
 
 from __future__ import annotations
 
-import math
+import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -107,37 +107,73 @@ def _joined(parts: Sequence[_Stretch]) -> list[_Stretch]:
     return out
 
 
-def _long_enough(parts: list[_Stretch], acceleration: float) -> list[_Stretch]:
+def _long_enough(parts: Sequence[_Stretch], acceleration: float) -> list[_Stretch]:
     """Stretches of at least ``LEAST``, the shortest corrected first.
 
     A stretch takes the feed of a slower neighbour, or is lengthened at the expense of a faster one, whichever takes
     less time.
     """
-    while len(parts) > 1:
-        k = min(range(len(parts)), key=lambda i: parts[i].length if _too_short(parts, i, acceleration) else math.inf)
-        if not _too_short(parts, k, acceleration):
-            break
-        own, beside = parts[k], [parts[i] for i in (k - 1, k + 1) if 0 <= i < len(parts)]
-        slower = max((p.feed for p in beside if p.feed < own.feed), default=0.0)
-        faster = min((p for p in beside if p.feed > own.feed), key=lambda p: p.feed, default=None)
-        lacking = max(LEAST - own.length, 0.0)
-        if faster is not None and (not slower or lacking * (1.0 / own.feed - 1.0 / faster.feed)
-                                   < own.length * (1.0 / slower - 1.0 / own.feed)) and lacking > 0.0:
-            taken = min(lacking, faster.length)
-            faster.length -= taken
-            own.length += taken
-        else:
-            own.feed = slower
-        parts = _joined(parts)
-    return parts
+    chain = _Chain(parts)
+    heap = [(p.length, k) for k, p in enumerate(chain.parts)]
+    heapq.heapify(heap)
+    while heap:
+        length, k = heapq.heappop(heap)
+        own = chain.parts[k]
+        if length != own.length or not _too_short(own, chain.beside(k), acceleration):
+            continue
+        _correct(own, chain.beside(k))
+        chain.join(k)
+        for i in (chain.before[k], k, chain.after[k]):
+            if i >= 0:
+                heapq.heappush(heap, (chain.parts[i].length, i))
+    return [p for p in chain.parts if p.length > 0.0]
 
 
-def _too_short(parts: Sequence[_Stretch], k: int, acceleration: float) -> bool:
+class _Chain:
+    """Stretches in order, of which neighbours of one feed are joined; those joined to another have length 0."""
+
+    def __init__(self, parts: Sequence[_Stretch]) -> None:
+        self.parts = list(parts)
+        self.before = list(range(-1, len(parts) - 1))
+        self.after = [*range(1, len(parts)), -1]
+
+    def beside(self, k: int) -> list[_Stretch]:
+        """The neighbours of a stretch."""
+        return [self.parts[i] for i in (self.before[k], self.after[k]) if i >= 0]
+
+    def join(self, k: int) -> None:
+        """Join neighbours of the same feed, and those without length, to a stretch."""
+        own = self.parts[k]
+        for ways, back in ((self.before, self.after), (self.after, self.before)):
+            while (i := ways[k]) >= 0 and (self.parts[i].feed == own.feed or self.parts[i].length <= ALIKE):
+                own.length += self.parts[i].length
+                self.parts[i].length = 0.0
+                ways[k] = ways[i]
+                if ways[k] >= 0:
+                    back[ways[k]] = k
+
+
+def _correct(own: _Stretch, beside: Sequence[_Stretch]) -> None:
+    """Lower the feed of a stretch that is too short to that of a neighbour, or lengthen it."""
+    slower = max((p.feed for p in beside if p.feed < own.feed), default=0.0)
+    faster = min((p for p in beside if p.feed > own.feed), key=lambda p: p.feed, default=None)
+    lacking = max(LEAST - own.length, 0.0)
+    if faster is not None and lacking > 0.0 and (not slower or lacking * (1.0 / own.feed - 1.0 / faster.feed)
+                                                 < own.length * (1.0 / slower - 1.0 / own.feed)):
+        taken = min(lacking, faster.length)
+        faster.length -= taken
+        own.length += taken
+    else:
+        own.feed = slower
+
+
+def _too_short(own: _Stretch, beside: Sequence[_Stretch], acceleration: float) -> bool:
     """Whether a stretch is shorter than ``LEAST``, or than the ways of its changes and saves no time worth them."""
-    own = parts[k]
+    if not beside or own.length <= 0.0:
+        return False
     if own.length < LEAST - ALIKE:
         return True
-    slower = [parts[i].feed / 60.0 for i in (k - 1, k + 1) if 0 <= i < len(parts) and parts[i].feed < own.feed]
+    slower = [p.feed / 60.0 for p in beside if p.feed < own.feed]
     speed = own.feed / 60.0
     ways = sum(change_way(v, speed, acceleration) for v in slower)
     if not slower or own.length >= ways:
