@@ -211,7 +211,12 @@ def machine_kinematics(machine: Machine) -> Kinematics | None:
         return None
     pivots = machine.pivots_mm
     return Kinematics(machine.kinematics, None if pivots is None else tuple((x, y, z) for x, y, z in pivots),
-                      _sense(machine))
+                      _sense(machine), None if machine.rotary_deg is None else _pair(machine.rotary_deg))
+
+
+def _pair(limits: Sequence[Sequence[float]]) -> tuple[tuple[float, float], tuple[float, float]]:
+    (low, high), (least, most) = limits
+    return (low, high), (least, most)
 
 
 def _sense(machine: Machine) -> tuple[int, int]:

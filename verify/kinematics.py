@@ -40,6 +40,7 @@ class Kinematics:
              the turning axis. Head-head: (0, 0, spindle face up to the swivel).
     sense  : of the words of the two axes. 1: as above. -1: a positive angle of a table axis turns the tool right-handed
              as seen from the table [ISO841], so the table turns the other way.
+    limits : deg, least and greatest angle of the tilting and the turning axis, or None
 
     Raises
     ------
@@ -50,6 +51,7 @@ class Kinematics:
     kind: str
     pivots: tuple[Point, ...] | None = None
     sense: tuple[int, int] = (1, 1)
+    limits: tuple[tuple[float, float], tuple[float, float]] | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:

@@ -59,7 +59,7 @@ class FanucPlanes(DialectReader):
         machine = needed(self.machine.machine, "G53.1")
         s = self.machine.s
         sign = {1.0: 1, 2.0: -1}.get(float(values.get("P", "0")), 0)
-        angles = angles_of(machine, self.frame.matrix[:, 2].tolist(), s.turn, sign)
+        angles = angles_of(machine, self.frame.matrix[:, 2].tolist(), s.turn, sign, machine.limits)
         self.notes.append(CHOICE)
         self.tilted = True
         words = " ".join(f"{c}{a:.9f}" for c, a in zip(machine.letters, angles, strict=True))

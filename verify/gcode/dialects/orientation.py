@@ -15,6 +15,7 @@ from geometry.mesh import F64
 from verify.gcode.block_words import NO_MACHINE, BlockError
 from verify.kinematics import Kinematics
 
+Limits = tuple[tuple[float, float], tuple[float, float]]
 POLE = 1e-7
 """rad from +Z: a tool axis nearer than this is upright, and the turning axis may stand anywhere."""
 CLOSE = 1e-5
@@ -37,12 +38,14 @@ def needed(machine: Kinematics | None, word: str) -> Kinematics:
     return machine
 
 
-def angles_of(machine: Kinematics, axis: Sequence[float], near: Sequence[float], sign: int = 0) -> list[float]:
+def angles_of(machine: Kinematics, axis: Sequence[float], near: Sequence[float], sign: int = 0,
+              limits: Limits | None = None) -> list[float]:
     """The two rotary angles, deg, that give the tool this axis.
 
     axis : (3,) dimensionless, tip to spindle, setup frame, of any length
     near : (2,) deg; of the two solutions the one that turns less from here
     sign : 1 or -1: the solution whose tilting angle has this sign, however far
+    limits : deg, least and greatest angle of both axes: what is outside of them counts only where all is
 
     Notes
     -----
@@ -63,7 +66,18 @@ def angles_of(machine: Kinematics, axis: Sequence[float], near: Sequence[float],
         found.append(turn)
     if sign:
         found = [t for t in found if t[0] * sign > 0] or found
+    if limits is not None:
+        found = [[t[0], _wound(t[1], limits[1])] for t in found]
+        found = [t for t in found if all(low - CLOSE <= a <= high + CLOSE
+                                         for a, (low, high) in zip(t, limits, strict=True))] or found
     return min(found, key=lambda t: abs(t[0] - near[0]) + abs(t[1] - near[1]))
+
+
+def _wound(angle: float, limits: tuple[float, float]) -> float:
+    """The same angle, deg, by whole turns within limits where it can be."""
+    if angle < limits[0] - CLOSE:
+        return angle + 360.0 * math.ceil((limits[0] - CLOSE - angle) / 360.0)
+    return angle - 360.0 * math.ceil(max(angle - limits[1] - CLOSE, 0.0) / 360.0)
 
 
 def great_circle(machine: Kinematics, start: Sequence[float], end: Sequence[float] | None,

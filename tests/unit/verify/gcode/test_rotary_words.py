@@ -265,3 +265,15 @@ def test_tip_control_that_no_word_states_is_told(body, line):
     """LinuxCNC starts in the first kinematics of its configuration, which may control the tip or not."""
     p = read(body)
     assert [(str(a.what), f"line {line})" in str(a.value)) for a in p.open] == [("tip_control", True)] * bool(line)
+
+
+@pytest.mark.parametrize(("limits", "turn"), [
+    (None, [-30.0, 0.0]), (((-10.0, 110.0), (-360.0, 360.0)), [30.0, 180.0]),
+    (((-10.0, 110.0), (-360.0, 0.0)), [30.0, -180.0]), (((-5.0, 5.0), (-360.0, 360.0)), [-30.0, 0.0])])
+def test_a_plane_takes_the_position_of_the_axes_that_is_within_their_range(limits, turn):
+    """Fanuc, parameters 19741 to 19744: G53.1 takes the solution within the range; outside of it only where none is."""
+    machine = Kinematics("table-table-AC", ((0.0, 0.0, -20.0), (0.0, 0.0, 0.0)), limits=limits)
+    text = ("%\nO1\nG21 G90 G17 G94 G54\nT1 M6\nS900 M3\nG0 G43 H1 Z90.\nX0. Y0. A0. C0.\n"
+            "G68.2 X0. Y0. Z0. I0. J30. K0.\nG53.1\nG0 X1. Y1.\nZ80.\nG69\nM30\n%\n")
+    p = read_program(text, dialect="fanuc", kinematics=machine, gauge_length={1: 60.0})
+    assert np.degrees(p.poses.end_turn[p.line == 9][-1]) == pytest.approx(turn)

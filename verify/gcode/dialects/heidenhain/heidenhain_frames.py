@@ -241,7 +241,8 @@ class HeidenhainFrames(OrientedMoves):
             self._reframe()
             return []
         now = self.machine.s.turn
-        angles = angles_of(machine, axis.tolist(), now, {"+": 1, "-": -1}.get(options.get("seq", ""), 0))
+        angles = angles_of(machine, axis.tolist(), now, {"+": 1, "-": -1}.get(options.get("seq", ""), 0),
+                           machine.limits)
         if upright:
             angles = [0.0, 0.0]
         self._state_angles(machine, angles)

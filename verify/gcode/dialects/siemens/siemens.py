@@ -141,7 +141,8 @@ class SiemensReader(SiemensCalls):
     def _is_plain(self) -> bool:
         """Whether a straight move needs nothing but its words now."""
         return (not self.lost and self.frame is None and not self.cornering and self.motion not in CURVES
-                and self.cycle is None and self.machine.s.motion in (self.motion, None) and self.circle is not True)
+                and self.cycle is None and not self.shifted
+                and self.machine.s.motion in (self.motion, None) and self.circle is not True)
 
     def _definition(self, text: str) -> list[str]:
         """DEF: new variables, with their first values."""
@@ -200,6 +201,7 @@ class SiemensReader(SiemensCalls):
             stated = [w for w in line.out if w.startswith(("G43 H", "G49"))]
             line.out = [w for w in line.out if w not in stated]
             self.tool, self.edge = self.selected, self.edge if stated else 1
+            self.shifted.add("Z")
             self.forget()
             line.after.insert(0, f"G43 H{self.tool}" if self.edge else "G49")
         if line.frame:

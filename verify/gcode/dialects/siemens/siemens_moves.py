@@ -180,6 +180,8 @@ class SiemensMoves(SiemensCorners):
         here = self.here()
         words: dict[str, str] = {}
         for letter, (number, kind) in line.places.items():
+            if letter in "XYZ":
+                self.counts(letter, not machine_place and kind != "AC" and (kind == "IC" or self.relative))
             if kind in ("DC", "ACP", "ACN") or (kind and letter in "ABC"):
                 words[letter] = digits(self._rotary(letter, number, kind))
             elif not kind or (kind == "IC") == self.relative:

@@ -19,6 +19,7 @@ from verify.gcode.frames import Frame, about, rotation, scaling, translation
 SWINGS = {1: ("G0 G53 Z0",), 2: ("G0 G53 Z0", "G0 G53 X0 Y0")}
 """Retracts of CYCLE800 before it turns axes, in words of the reader."""
 _ORIGIN = (0.0, 0.0, 0.0)
+SAME = 1e-9  # mm
 
 
 class SiemensFrames(OrientedMoves):
@@ -27,6 +28,7 @@ class SiemensFrames(OrientedMoves):
     programmed : the programmable frame, None for none
     swivel     : the plane of CYCLE800, None for none
     swung      : whether that plane has its rotary axes turned, the tip kept by the reader
+    shifted    : axes whose coordinates have changed since their last absolute word
     """
 
     vector_words, tcp_word = "a tool vector (A3, B3, C3)", "TRAORI"
@@ -36,6 +38,7 @@ class SiemensFrames(OrientedMoves):
         self.programmed: Frame | None = None
         self.swivel: Frame | None = None
         self.swung = False
+        self.shifted: set[str] = set()
 
     def _reframe(self) -> None:
         """State the frame of the blocks that follow."""
@@ -43,8 +46,23 @@ class SiemensFrames(OrientedMoves):
         whole = self.swivel
         if self.programmed is not None:
             whole = self.programmed if whole is None else whole @ self.programmed
-        self.frame = whole
+        before, self.frame = self.here(), whole
         self.forget()
+        self.shifted |= {k for k, a, b in zip("XYZ", before, self.here(), strict=True) if not abs(a - b) <= SAME}
+
+    def counts(self, letter: str, relative: bool) -> None:
+        """Take a word of an axis.
+
+        Raises
+        ------
+        BlockError
+            It is an increment, and the coordinates of its axis have changed since its last absolute word.
+        """
+        if relative and letter in self.shifted:
+            raise BlockError(f"an increment of {letter} behind a change of its coordinates (a frame, a tool length): "
+                             "setting data 42440 and 42442 decide whether the control goes the change too",
+                             f"program {letter} in absolute coordinates first")
+        self.shifted.discard(letter)
 
     def program_frame(self, word: str, places: Mapping[str, float], values: Mapping[str, float]) -> None:
         """TRANS, ROT, MIRROR or SCALE (which replace the frame) or ATRANS, AROT, AMIRROR, ASCALE (which add to it).
@@ -153,7 +171,8 @@ class SiemensFrames(OrientedMoves):
             return out
         machine = needed(self.machine.machine, "CYCLE800")
         near = self.machine.s.turn
-        angles = [0.0, 0.0] if upright else angles_of(machine, matrix[:, 2].tolist(), near, int(direction))
+        angles = [0.0, 0.0] if upright else angles_of(machine, matrix[:, 2].tolist(), near, int(direction),
+                                                            machine.limits)
         out.append("G0 " + " ".join(f"{k}{digits(v)}" for k, v in zip(machine.letters, angles, strict=True)))
         self.swung = not upright
         if self.swung:

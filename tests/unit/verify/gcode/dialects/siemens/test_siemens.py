@@ -324,3 +324,19 @@ def test_compensation_in_a_tilted_frame_needs_cut2df(kind, lines, right):
         return
     with pytest.raises(ProgramError, match="in tilted coordinates without CUT2DF"):
         read(text, "siemens", kind)
+
+
+@pytest.mark.parametrize(("lines", "axis"), [
+    ("TRANS Z-0.5\nG91\nG1 X24 Z0", "Z"), ("TRANS X12\nG1 X=IC(2)", "X"), ("ROT Z30\nG91 G1 X5", "X"),
+    ("TRANS X3\nG1 X9\nTRANS\nG91\nX5", "X"), ("T2 D1\nM6\nM3\nG91 G1 Z-1", "Z")])
+def test_an_increment_behind_a_change_of_coordinates_is_refused(lines, axis):
+    """SD42440 and SD42442: with 1 the control goes the change of the frame or the length with the next increment."""
+    with pytest.raises(ProgramError, match=f"an increment of {axis} behind a change of its coordinates"):
+        read(f"G0 X1 Y1 Z9\n{lines}", "siemens")
+
+
+@pytest.mark.parametrize("lines", [
+    "TRANS Z-0.5\nG1 Z8\nG91\nX24 Z1", "TRANS X12\nG1 X5\nX=IC(2)", "TRANS Z1\nG91 G1 X5", "TRANS Z0\nG91\nG1 Z1",
+    "TRANS X3\nG1 X9\nTRANS\nX5\nG91\nX5"])
+def test_an_increment_that_no_change_precedes_is_read(lines):
+    assert len(read(f"G0 X1 Y1 Z9\n{lines}", "siemens"))
