@@ -17,6 +17,7 @@ class AssumedKind(StrEnum):
     ROTARY_SENSE = "rotary_sense"
     TIP_CONTROL = "tip_control"
     LENGTH_AXIS = "length_axis"
+    RADIUS_REGISTER = "radius_register"
     GAUGE_LENGTH = "gauge_length"
     HOLDER = "holder"
     ABOVE_HOLDER = "above_holder"

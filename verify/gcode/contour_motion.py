@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from verify.assumptions import Assumed, AssumedKind
 from verify.gcode.block_words import BlockError
 from verify.gcode.cutter_compensation import (
     FANUC_STYLE,
@@ -160,6 +161,11 @@ class ContourMotion(Origins):
             s.d = int(values["D"]) if "D" in values else s.tool
         written = self._written_radius(s.d, self.radii.get(s.tool))
         if written is not None:
+            if self.control is not None:
+                self.control.leave_open(Assumed(
+                    AssumedKind.RADIUS_REGISTER, f"D{s.d} stands for a radius of {written:g} mm", "where the control "
+                    "counts the register the other way, as radius or diameter, the tool is aside by half or all of it",
+                    "setting 40 (Haas) or parameter 5004#2 (Fanuc): check it on the machine"))
             return written
         if s.d == 0 and "D" in values and self.style is not LINUXCNC_STYLE:
             return 0.0

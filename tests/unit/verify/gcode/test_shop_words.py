@@ -387,3 +387,11 @@ def test_the_first_move_behind_a_rotation_names_both_axes(dialect):
         read(body.replace("X5.\n", ""), dialect)  # at the centre of the rotation both are one
     p = read("G68 X0. Y0. R90.\nG0 X1. Y2.\nX5.\nG69\nG0 Z50.\nX1. Y1.\nX3.\n", dialect)
     assert p.end[-4:, :2].round(9).tolist() == [[-2, 5], [-2, 5], [1, 1], [3, 1]]
+
+
+@pytest.mark.parametrize(("words", "told"), [("G10 L12 P1 R5.\n", True), ("G10 L12 P1 R10.\n", True),
+                                             ("G10 L13 P1 R0.1\n", True), ("", False)])
+@pytest.mark.parametrize("dialect", ["fanuc", "haas"])
+def test_radius_or_diameter_of_a_register_is_told(dialect, words, told):
+    p = read(f"{words}G42 D1 G1 X20. Y5. F9.\nX40.\nG40 X60.\n", dialect, radii={1: 5.0})
+    assert [str(a.what) for a in p.open] == ["radius_register"] * told

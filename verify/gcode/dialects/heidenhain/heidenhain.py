@@ -111,7 +111,7 @@ class HeidenhainReader(HeidenhainPaths):
     def is_simple(self) -> bool:
         """Whether a straight move needs nothing but its words now."""
         return (self.frame is None and self.held is None and self.approach is None and self.side == 0 and not self.spat
-                and self.wanted is None and not self.modal_call and self.circle is not True
+                and self.wanted is None and self.unspun is None and not self.modal_call and self.circle is not True
                 and not any(self.wound.values()))
 
     def _simple(self, places: str, feed: str | None, ms: list[int]) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from verify.gcode.frames import Frame, about, rotation, scaling, translation
 from verify.kinematics import Kinematics
 
 _ORIGIN = (0.0, 0.0, 0.0)
+SAME = 1e-9  # mm
 SAME_AXIS = 1e-6
 """Largest distance of two unit tool axes that count as one."""
 _PLANE = re.compile(r"PLANE (SPATIAL|EULER|VECTOR|RELATIV|AXIAL|RESET|PROJECTED|POINTS)\s*(.*)")
@@ -36,6 +37,7 @@ class HeidenhainFrames(OrientedMoves):
     plane  : (3, 3) axes of the tilted plane in the columns, None for none
     swung  : whether its rotary axes are turned by PLANE or after it, the tip kept by the reader
     wanted : tool axis that the plane needs before a move in it, None where it stands there
+    unspun : (3,) mm, the place before the rotation changed, until a move names X and Y; None for none
     longer : mm, by which TOOL CALL says that the tool is longer (DL)
     spat   : whether rotary words are spatial angles (FUNCTION TCPM ... AXIS SPAT)
     """
@@ -50,6 +52,7 @@ class HeidenhainFrames(OrientedMoves):
         self.plane: F64 | None = None
         self.swung = self.spat = False
         self.wanted: F64 | None = None
+        self.unspun: list[float] | None = None
         self.longer = 0.0
         self.value: Callable[[str], float] = float
 
@@ -125,10 +128,32 @@ class HeidenhainFrames(OrientedMoves):
         BlockError
             With a mirror.
         """
-        self.spun = angle + (self.spun if adds else 0.0)
+        turned = angle + (self.spun if adds else 0.0)
+        if turned != self.spun:
+            self.unspun = self.here()
+        self.spun = turned
         if self.spun and self.mirrored:
             raise BlockError("a rotation with a mirror: which comes first is not certain")
         self._reframe()
+
+    def settle(self, words: Mapping[str, str], rapid: bool) -> dict[str, str] | None:
+        """As ``StatedPlaces.settle``; the first move behind a rotation names both axes, where it matters.
+
+        The control turns an axis when it is named first. Where one that is not named goes is not said.
+
+        Raises
+        ------
+        BlockError
+            It names one of both, or as there.
+        """
+        others = [k for k in "XY" if k not in words]
+        if self.unspun is not None and len(others) < 2:
+            k = "XYZ".index(others[0]) if others else 0
+            if others and abs(self.here()[k] - self.unspun[k]) > SAME:
+                raise BlockError(f"a move without {others[0]} behind a rotation (cycle 10): it is not certain where "
+                                 "the control takes it", "name X and Y in the first move")
+            self.unspun = None
+        return super().settle(words, rapid)
 
     def scale(self, factor: float) -> None:
         """Cycle 11: one scale for all axes.

@@ -261,3 +261,15 @@ def test_a_comparison_that_rounding_decides_is_refused(jump):
     with pytest.raises(ProgramError, match="the rounding of the control decides"):
         read(["Q1 = 0.1 + 0.2", f"{jump} GOTO LBL 1", "L X+1 F100", "LBL 1"], "heidenhain")
     assert len(read(["Q1 = 0.1 + 0.2", f"{jump}1 GOTO LBL 1", "L X+1 F100", "LBL 1"], "heidenhain"))
+
+
+@pytest.mark.parametrize("moves", [("L X+20 F500",), ("L Z+4 F500", "L Y+20"), ("L IX+3 F500",)])
+def test_the_first_move_behind_a_rotation_names_both_axes(moves):
+    """Cycle 10: both axes of the plane have to be moved to activate the rotation for all axes."""
+    turn = ("L X-20 Y-3 R0 FMAX", "CYCL DEF 10.0 ROTATION", "CYCL DEF 10.1 ROT+90")
+    with pytest.raises(ProgramError, match="behind a rotation"):
+        read([*turn, *moves], "heidenhain")
+    with pytest.raises(ProgramError, match="behind a rotation"):
+        read([*turn, "L X+1 Y+2 FMAX", "CYCL DEF 10.0 ROTATION", "CYCL DEF 10.1 ROT+0", *moves], "heidenhain")
+    assert len(read([*turn, "L X+1 Y+2 FMAX", *moves], "heidenhain"))
+    assert len(read(["L X+0 Y+0 R0 FMAX", *turn[1:], *moves], "heidenhain"))
