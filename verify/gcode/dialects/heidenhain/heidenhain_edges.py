@@ -66,6 +66,7 @@ class HeidenhainEdges(HeidenhainWords):
         self._keep_heading(move)
         self.end = list(move.end)
         turns = dict(move.turns)
+        self._check_turn(bool(turns), move.rapid)
         if move.vector is not None or (self.circle and turns and self.tcp):
             return self._numbered_blocks(move, [*blocks, *self._oriented_move(move, words, turns), *move.after])
         settled = self.settle(words, move.rapid)

@@ -37,6 +37,7 @@ class HeidenhainPaths(HeidenhainEdges):
         rate = self.feed_word(float(feed[1:])) if feed and not rapid else ""
         self.rate, self.last_rapid = rate or self.rate, rapid
         ms = self._switch(ms)
+        self._check_turn(any(w[0] in "ABC" for w in words.split()), rapid)
         machine = "G53 " if 91 in ms else ""
         if machine:
             self.forget()

@@ -122,6 +122,7 @@ class HeidenhainWords(HeidenhainFrames):
         super().__init__()
         self.q = QParameters(self._served)
         self.value = self.q.value
+        self.in_mm = False  # whether F counts in mm where a rotary axis turns (M116)
         self.inch = self.shortest = self.modal_call = self.calls = self.last_rapid = False
         self.tool = self.side = self.number = 0
         self.wider = 0.0
@@ -191,6 +192,12 @@ class HeidenhainWords(HeidenhainFrames):
                                  "turn by half a turn or less in a block")
         self.turned.update(angles)
 
+    def _check_turn(self, turns: bool, rapid: bool) -> None:
+        """Refuse a feed move that turns an axis under M116 and without tool centre point control."""
+        if turns and self.in_mm and not rapid and not self.tcp:
+            raise BlockError("a feed move that turns an axis under M116: F counts in mm at the tool, which is not "
+                             "followed", "end it with M117, and program F in degrees")
+
     def _switch(self, ms: list[int]) -> list[int]:
         """The M words without M126 and M127; tool centre point control is kept as state.
 
@@ -204,6 +211,7 @@ class HeidenhainWords(HeidenhainFrames):
                 self.wanted = None
             self.forget()
         self.shortest = 127 not in ms and (self.shortest or 126 in ms)
+        self.in_mm = 117 not in ms and (self.in_mm or 116 in ms)
         if 128 in ms:
             needed(self.machine.machine, "M128")
         idle = (126, 127, 129) if self.machine.machine is None else (126, 127)

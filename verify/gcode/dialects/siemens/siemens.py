@@ -24,6 +24,7 @@ from verify.gcode.dialects.siemens.siemens_flow import LABEL, NUMBERED, PLAIN, S
 from verify.gcode.dialects.siemens.siemens_moves import CURVES, Line
 from verify.gcode.dialects.siemens.siemens_words import (
     COMPRESSORS,
+    DEGREE_IS_MM,
     ENVELOPES,
     IDLE,
     IDLE_CALLS,
@@ -239,7 +240,10 @@ class SiemensReader(SiemensCalls):
             return self._system(name, reader, end)
         if name in IDLE_VALUES:
             reader.at = end
-            reader.value()
+            value = reader.value()
+            if name == "FGREF" and isinstance(value, float) and value < DEGREE_IS_MM:
+                raise BlockError(f"FGREF[ ]={value:g} is not followed: a rotary axis turns faster than the degrees of "
+                                 "F", "leave FGREF as it is")
             return None
         if name in REFUSED:
             raise BlockError(f"{name} ({REFUSED[name]}) is not followed")
@@ -467,6 +471,9 @@ class SiemensReader(SiemensCalls):
             line.after += self.swivelled(parts, self._number)
         elif name in ENVELOPES:
             self._drill(DrillingCall(name, tuple(self._number(p) if p else None for p in parts)), line)
+        elif name == "FGROUP" and parts != [""] and not {"X", "Y", "Z"} <= {p.strip() for p in parts}:
+            raise BlockError("FGROUP( ) without X, Y and Z: F does not count along the whole path",
+                             "name X, Y and Z in it")
         elif name == "SETMS" and parts not in ([""], ["1"]):
             raise BlockError(f"SETMS({','.join(parts)[:20]}): another spindle becomes the master, and S and M3 turn "
                              "that one")

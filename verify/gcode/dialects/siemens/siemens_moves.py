@@ -350,7 +350,10 @@ class SiemensMoves(SiemensCorners):
             self.bound(True)
             return [f"G64 P{self.tolerance:.6f}"]
         if rounds:
-            return ["G64"]
+            self.notes.append("G64 or G642 to G645 without a tolerance (ADIS, CTOL): machine data decide how far the "
+                              "control rounds corners; the error bound does not include it")
+            self.bound(False)
+            return []
         if "COMPRESS" in values:
             self.notes.append("a compressor (COMPON, COMPCURV, COMPCAD, COMPSURF) without CTOL: machine data decide "
                               "how far it "

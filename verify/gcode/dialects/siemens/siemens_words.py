@@ -47,6 +47,9 @@ IDLE_VALUES = frozenset("""
     VELOLIMA""".split())
 """Names with a value that change speed, smoothing or outputs only."""
 
+DEGREE_IS_MM = 57.2957
+"""mm, FGREF of a rotary axis at which one degree counts as 1 mm: as delivered."""
+
 IDLE_CALLS = frozenset("""
     BRISKA CLRINT DELETE DISABLE DRIVEA ENABLE FGREF FGROUP GROUP_ADDEND GROUP_BEGIN GROUP_END MSG NEWCONF SETAL
     SETMS SOFTA SPCOF SPCON SPI WAITP WORKPIECE WRITE""".split())
@@ -122,6 +125,6 @@ def factor_of_feeds(percent: float) -> float:
     return percent / 100.0
 
 
-__all__ = ["COMPRESSORS", "ENVELOPES", "IDLE", "IDLE_CALLS", "IDLE_CODES", "IDLE_VALUES", "LENGTH_BY_PLANE", "MOVES",
-           "NOT_FOLLOWED", "REFUSED", "SAME", "SHARP_STYLE", "SIEMENS_STYLE", "UNBOUNDED", "UNITS", "VALUES",
-           "factor_of_feeds"]
+__all__ = ["COMPRESSORS", "DEGREE_IS_MM", "ENVELOPES", "IDLE", "IDLE_CALLS", "IDLE_CODES", "IDLE_VALUES",
+           "LENGTH_BY_PLANE", "MOVES", "NOT_FOLLOWED", "REFUSED", "SAME", "SHARP_STYLE", "SIEMENS_STYLE", "UNBOUNDED",
+           "UNITS", "VALUES", "factor_of_feeds"]

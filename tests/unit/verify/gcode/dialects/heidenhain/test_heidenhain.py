@@ -273,3 +273,11 @@ def test_the_first_move_behind_a_rotation_names_both_axes(moves):
         read([*turn, "L X+1 Y+2 FMAX", "CYCL DEF 10.0 ROTATION", "CYCL DEF 10.1 ROT+0", *moves], "heidenhain")
     assert len(read([*turn, "L X+1 Y+2 FMAX", *moves], "heidenhain"))
     assert len(read(["L X+0 Y+0 R0 FMAX", *turn[1:], *moves], "heidenhain"))
+
+
+@pytest.mark.parametrize("lines", [("L C+30 F2000 M116",), ("L X+1 F200 M116", "L C+30 F2000"), ("M116", "L A+5 F900")])
+def test_feeds_of_rotary_axes_in_mm_are_refused(lines):
+    with pytest.raises(ProgramError, match="under M116"):
+        read(lines, "heidenhain", "table-table-AC")
+    assert len(read([*lines[:-1], "M117", "L C+30 F2000"], "heidenhain", "table-table-AC"))
+    assert len(read(["M116", "L C+30 FMAX"], "heidenhain", "table-table-AC"))

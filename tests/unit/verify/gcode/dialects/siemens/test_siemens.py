@@ -340,3 +340,19 @@ def test_an_increment_behind_a_change_of_coordinates_is_refused(lines, axis):
     "TRANS X3\nG1 X9\nTRANS\nX5\nG91\nX5"])
 def test_an_increment_that_no_change_precedes_is_read(lines):
     assert len(read(f"G0 X1 Y1 Z9\n{lines}", "siemens"))
+
+
+@pytest.mark.parametrize(("line", "said"), [("FGROUP(X)", "FGROUP( ) without X, Y and Z"), ("FGROUP(Z)", "FGROUP"),
+                                            ("FGREF[C]=11", "turns faster than the degrees of F")])
+def test_feeds_that_count_along_a_part_of_the_path_are_refused(line, said):
+    with pytest.raises(ProgramError, match=re.escape(said)):
+        read(f"{line}\nG1 X1", "siemens")
+    for right in ("FGROUP()", "FGROUP(X,Y,Z)", "FGROUP(X, Y, Z, C)", "FGREF[C]=57.296", "FGREF[C]=100"):
+        assert len(read(f"{right}\nG1 X1", "siemens"))
+
+
+@pytest.mark.parametrize("word", ["G64", "G642", "G645"])
+def test_rounding_that_machine_data_decide_is_a_note(word):
+    p = read(f"{word}\nG1 X1", "siemens")
+    assert not p.remarks and p.unbounded
+    assert any("machine data decide how far the control rounds" in n for n in p.notes)
