@@ -21,6 +21,7 @@ from toolpath.tool_deflection import (
     BENT_SHARE,
     LAYER_LIMIT,
     MIN_FEED,
+    THINNEST,
     DeflectionModel,
     left_by_layers,
 )
@@ -184,6 +185,22 @@ def bending(setup: Setup, tool: Tool, body: ToolBody, data: CuttingData, depth: 
                            tool.feed_mm_min is not None, tool.plunge_feed_mm_min is not None)
 
 
+def layer_depth(setup: Setup, tool: Tool, body: ToolBody, engaged: float) -> float:
+    """Deepest layer of a tool, mm.
+
+    body    : the shape of the tool
+    engaged : rad, largest engaged angle of the front of the cutter
+
+    ``STEP_DOWN`` of the diameter; less where the tool would bend too far even at its least chip
+    (``DeflectionModel.bearable``). The limit is that of the thinnest layer, which leaves the least stock.
+    """
+    depth = STEP_DOWN[tool.kind] * tool.diameter_mm
+    data = cutting_data(setup.material, tool, setup.machine, depth)
+    model = bending(setup, tool, body, data, THINNEST * depth)
+    width = 0.5 * effective_diameter(body.diameter, body.corner_radius, depth) * (1.0 - math.cos(engaged))
+    return depth if model is None else model.bearable(data.feed, depth, width)
+
+
 def rates_of(setup: Setup) -> Rates:
     """Rates of the machine of a setup; corners are rounded by the tolerance of the programs (``path_tolerance``)."""
     machine, quality = setup.machine, setup.quality
@@ -193,4 +210,4 @@ def rates_of(setup: Setup) -> Rates:
 
 __all__ = ["DEFAULT_MAX_FEED_MM_MIN", "DEFAULT_MAX_RPM", "MATERIALS", "MAX_CHIP_THINNING",
            "PLUNGE_FACTOR", "STEP_DOWN", "CuttingData", "bending", "chip_thinning", "cutting_data", "cutting_words",
-           "feed_per_tooth", "find_material", "rates_of"]
+           "feed_per_tooth", "find_material", "layer_depth", "rates_of"]

@@ -70,6 +70,14 @@ class CutData:
         down = self.plunge_feed if self.bending.ways_fixed else min(self.plunge_feed, feed)
         return replace(self, feed=feed, plunge_feed=down, bend=bend)
 
+    def bearable(self, depth: float, width: float) -> float:
+        """The largest depth of cut, mm, at which the least chip does not bend the tool too far
+        (``DeflectionModel.bearable``).
+
+        depth, width : mm, of the deepest cut
+        """
+        return depth if self.bending is None else self.bending.bearable(self.feed, depth, width)
+
     def feed_under(self, tool: ToolBody, depth: float, angle: float) -> float:
         """Feed, mm/min, at which a cut of a depth, mm, and an engaged angle, rad, deflects the tool no more than its
         limit.

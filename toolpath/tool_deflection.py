@@ -20,15 +20,19 @@ from dataclasses import dataclass
 from geometry.cutting_mechanics import cutting_force, engaged_angle
 from geometry.tool_body import ToolBody
 
-MIN_SHARE = 0.2
-"""Least share to which a feed is reduced: below it, edges rub and the tool wears without cutting."""
+MIN_SHARE, LEAST_CHIP = 0.2, 0.002
+"""Least share to which a feed is reduced, and least feed per tooth, of the diameter; the greater counts. Below it,
+edges rub and the tool wears without cutting."""
+THINNEST = 1.0 / 3.0
+"""Of a depth, to which it is reduced where a tool bends too far at its least chip."""
 LAYER_LIMIT = 0.05
 """mm, largest deflection of a tool in layers, unless ``BENT_SHARE`` of the stock they leave is less."""
 BENT_SHARE = 0.55
-LEFT_SHARE, LEFT_STEPS = 0.1, 1.3
-"""Stock that layers leave for the finish: share of the deepest layer, and lattice steps; the greater counts."""
+LEFT_SHARE, LEFT_STEPS, LEAST_LEFT = 0.04, 0.5, 0.06
+"""Stock that layers leave for the finish: share of the deepest layer, lattice steps, and mm; the greatest counts."""
 MIN_FEED = 0.1
 """mm/min."""
+HALVINGS = 20
 
 
 @dataclass(frozen=True)
@@ -80,17 +84,43 @@ class DeflectionModel:
 
         depth, width : mm, of the cut
 
-        The force grows with feed^(1 - mc), so the share is (limit / full)^(1 / (1 - mc)), at least ``MIN_SHARE``.
+        The force grows with feed^(1 - mc), so the share is (limit / full)^(1 / (1 - mc)), at least ``least_share``.
         """
-        tool = self.tool
-        force = cutting_force(self.kc, self.mc, feed / (self.flutes * self.rpm), depth, width, tool, self.flutes)
-        if self.finishing:
-            force *= math.sin(min(engaged_angle(tool, depth, width), 0.5 * math.pi))
-        full = force * self.compliance
-        share = 1.0
+        full, share = self.deflection(feed, depth, width), 1.0
         if full > self.limit and not self.fixed:
-            share = max(MIN_SHARE, (self.limit / full) ** (1.0 / (1.0 - self.mc)))
+            share = max(self.least_share(feed), (self.limit / full) ** (1.0 / (1.0 - self.mc)))
         return DeflectionEstimate(full, self.limit, share, full * share ** (1.0 - self.mc), self.fixed)
+
+    def deflection(self, feed: float, depth: float, width: float) -> float:
+        """Deflection under a cut, mm. feed : mm/min; depth, width : mm, of the cut."""
+        force = cutting_force(self.kc, self.mc, feed / (self.flutes * self.rpm), depth, width, self.tool, self.flutes)
+        if self.finishing:
+            force *= math.sin(min(engaged_angle(self.tool, depth, width), 0.5 * math.pi))
+        return force * self.compliance
+
+    def least_share(self, feed: float) -> float:
+        """Least share to which a feed, mm/min, is reduced; 1 where it gives no more than the least chip itself."""
+        least = LEAST_CHIP * self.tool.diameter * self.flutes * self.rpm
+        return min(1.0, max(MIN_SHARE, least / feed))
+
+    def bearable(self, feed: float, depth: float, width: float) -> float:
+        """The largest depth at which a cut with the least chip does not bend the tool too far, mm.
+
+        feed         : mm/min, of which ``least_share`` is taken
+        depth, width : mm; the result is no more than this depth and no less than ``THINNEST`` of it
+
+        Too far is past the limit, and past what ``MIN_SHARE`` of the feed does at the full depth. A stiffer tool has
+        less of both. Thinner cuts at more feed bend it as far and take as much time, since the force grows with the
+        feed less than in proportion, and their chips are none too thin.
+        """
+        least, limit = self.least_share(feed) * feed, max(self.limit, self.deflection(MIN_SHARE * feed, depth, width))
+        if self.fixed or self.deflection(least, depth, width) <= limit:
+            return depth
+        low, high = THINNEST * depth, depth
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self.deflection(least, middle, width) <= limit else (low, middle)
+        return low
 
 
 def left_by_layers(step_down: float, spacing: float) -> float:
@@ -99,8 +129,8 @@ def left_by_layers(step_down: float, spacing: float) -> float:
     step_down : mm, deepest layer
     spacing   : mm, of the lattice
     """
-    return max(LEFT_SHARE * step_down, LEFT_STEPS * spacing)
+    return max(LEFT_SHARE * step_down, LEFT_STEPS * spacing, LEAST_LEFT)
 
 
-__all__ = ["BENT_SHARE", "LAYER_LIMIT", "MIN_FEED", "MIN_SHARE", "DeflectionEstimate", "DeflectionModel",
-           "left_by_layers"]
+__all__ = ["BENT_SHARE", "LAYER_LIMIT", "LEAST_CHIP", "MIN_FEED", "MIN_SHARE", "THINNEST",
+           "DeflectionEstimate", "DeflectionModel", "left_by_layers"]

@@ -357,7 +357,7 @@ class _Layers:
 
     def _walk(self, linker: Linker, z: float, area: NDArray[np.bool_]) -> None:
         """Cut the stock above a height, mm, in an area, down to it."""
-        settings, side, fine = self.settings, 0.8 * self.field.tool.radius, 0.1 * self.field.lattice.step
+        settings, side, fine = self.settings, depth_layers.ring_spacing(self.field.tool), 0.1 * self.field.lattice.step
         if self.bounded:
             Clearing(linker, z, area, self.allowance, side, settings.cut_direction,
                      depth_layers.STOCK_WORTH, fine).walk()
@@ -372,7 +372,7 @@ class _Layers:
         step_id, tool, ids = f"S{number:02d}", self.field.tool, " ".join(z.id for z in self.zones)
         kind, cut = ("depth_layers", self.cut) if operation == "roughing" else ("between layers", self._thinner())
         return [step_of(step_id, f"{step_id} {kind} {tool.id} {ids}", None, self.zones, operation, "depth_layers", tool,
-                        cut, 0.8 * tool.radius, linker.finish(), self.settings)]
+                        cut, depth_layers.ring_spacing(tool), linker.finish(), self.settings)]
 
 
 def _left_alone(faces: LeftAlone | None, field: TipField, tips: F64) -> tuple[F64, float]:

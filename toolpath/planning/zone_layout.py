@@ -210,6 +210,7 @@ def _strategy(zone: ZoneArea, checks: FinishTarget, field: TipField, cut: CutDat
     cusp = settings.budget.cusp
     if zone.form is AreaForm.STEEP:
         step = waterline.level_step(tool, normals, cusp, cut.step_down)
+        step = cut.bearable(step, left_by_layers(cut.step_down, field.lattice.step))
 
         def waterlines(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
             tips = checks.tips[failing]

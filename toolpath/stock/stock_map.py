@@ -27,6 +27,7 @@ from zones.lattice import Lattice
 from zones.reach.assembly import Disc
 
 SURE_RIM = 0.7  # lattice steps: half a cell diagonal
+SURE_EDGE = 1.05  # lattice steps: sqrt((r + 1)^2 + 0.5^2) - r is less for every body of 2.5 steps or more
 POOLED = 12  # nodes a side of the squares whose highest stock is stored
 AIR_TOLERANCE = 0.01  # mm
 UPRIGHT = 1e-12  # Z of the normal of an upright face of a block, at most
@@ -318,7 +319,8 @@ class StockMap:
         tips   : (n, 3) float64, mm, access frame
         bodies : cylinders with their clearance
 
-        The radius is half a cell diagonal greater, so that it holds wherever stock stands in its cell.
+        The radius is greater by ``SURE_EDGE``: stock that ends along a line shows at a node no more than a step behind
+        it, and no more than half a step aside.
         """
         out = np.zeros(len(tips), np.bool_)
         if not len(tips):
@@ -328,8 +330,8 @@ class StockMap:
         lowest = float(tips[:, 2].min())
         for body in bodies:
             if lowest + body.height < float(self._pooled.max()):
-                meets(self.top, self._pooled, POOLED, lat.frame, tips, body.height,
-                      body.radius + HALF_DIAGONAL * lat.step, out)
+                meets(self.top, self._pooled, POOLED, lat.frame, tips, body.height, body.radius + SURE_EDGE * lat.step,
+                      out)
         return out
 
     def in_air(self, tips: F64, tool: ToolBody) -> NDArray[np.bool_]:

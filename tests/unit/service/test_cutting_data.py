@@ -123,9 +123,26 @@ def test_the_sweep_notices_what_it_should(monkeypatch):
     assert faults(job) == ["T1 finishing: feed F101 of 100"]
 
 
-def test_layers_leave_a_share_of_the_deepest_or_lattice_steps_whichever_is_more():
-    assert left_by_layers(0.7, 0.08) == pytest.approx(1.3 * 0.08)
-    assert left_by_layers(2.0, 0.1) == pytest.approx(0.2)
+def test_layers_leave_a_share_of_the_deepest_or_lattice_steps_or_the_least_whichever_is_most():
+    assert left_by_layers(0.7, 0.08) == 0.06
+    assert left_by_layers(1.0, 0.15) == pytest.approx(0.075)
+    assert left_by_layers(3.0, 0.15) == pytest.approx(0.12)
+
+
+def test_a_slender_tool_takes_thinner_layers_with_chips_none_too_thin():
+    """At the least chip it bends no more than at a fifth of its feed in the deepest layer, and removes no less."""
+    slim = {"id": "T1", "kind": "ball", "diameter_mm": 1.0, "flutes": 2, "flute_length_mm": 3, "neck_diameter_mm": 0.9,
+            "neck_length_mm": 13, "shank_diameter_mm": 4, "stickout_mm": 29}
+    found = setup(slim, material="Ti-6Al-4V")
+    cut = JobInputs.of(found).cut_table["T1"]
+    full = cutting_data(found.material, found.tools[0], found.machine, 0.3).feed
+    assert cut.bending is not None and cut.step_down < 0.3
+    assert cut.feed / (2 * cut.spindle_rpm) == pytest.approx(0.002)
+    worst = cut.bending.deflection(0.2 * full, 0.3, 0.5)
+    assert worst > cut.bend.limit and cut.bend.deflection == pytest.approx(worst, rel=0.03)
+    assert cut.step_down * cut.feed > 0.3 * 0.2 * full
+    stout = JobInputs.of(setup({**slim, "neck_length_mm": 4, "stickout_mm": 12}, material="AlMgSi1 6082"))
+    assert stout.cut_table["T1"].step_down == 0.3
 
 
 def test_a_tool_that_bends_too_far_is_named_with_its_worst_step():

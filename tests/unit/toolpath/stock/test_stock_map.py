@@ -12,7 +12,8 @@ from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, joined, tool
 from toolpath.kernels.ramp import ease
 from toolpath.kernels.stock import HALF_DIAGONAL
-from toolpath.stock.stock_map import SKIN, StockMap
+from toolpath.stock.stock_map import SKIN, SURE_EDGE, StockMap
+from zones.lattice import Lattice
 from zones.reach.access_view import access_rotation
 from zones.reach.assembly import Disc
 
@@ -130,10 +131,24 @@ def test_what_stands_in_the_way_of_shank_and_holder_is_found_before_and_after_a_
         met = stock.meets_bodies(tips, bodies)
         for tip, said in zip(tips, met, strict=True):
             rho = np.hypot(*(nodes - tip[:2]).transpose(2, 0, 1))
-            near = [rho <= b.radius + HALF_DIAGONAL * STEP for b in bodies]
+            near = [rho <= b.radius + SURE_EDGE * STEP for b in bodies]
             assert said == any((stock.top[n] > tip[2] + b.height).any() for n, b in zip(near, bodies, strict=True))
         shares.append(met.mean())
     assert shares[0] > shares[1] > shares[2] > 0.05
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, 0.6, 0.78])
+def test_stock_that_ends_along_a_line_is_seen_wherever_the_line_lies_between_nodes(angle):
+    """The planner cleared half a cell diagonal round a shank; an edge just behind a row of nodes was 6 um too near."""
+    x, y = np.meshgrid(0.1 * np.arange(200), 0.1 * np.arange(200))
+    body, aside = Disc("shank", 4.0, 1.0), np.array([np.cos(angle), np.sin(angle)])
+    for edge in np.linspace(14.0, 14.2, 41):
+        top = np.where(x * aside[0] + y * aside[1] >= edge, 5.0, -np.inf)
+        stock = StockMap(Lattice(0.0, 0.0, 0.1, 200, 200), top)
+        for gap, met in ((-1e-6, True), (0.12, False)):
+            foot = np.array([9.0, 9.0]) - (np.array([9.0, 9.0]) @ aside) * aside
+            tip = foot + (edge - 4.0 - gap) * aside
+            assert stock.meets_bodies(np.array([[*tip, 0.0]]), [body])[0] == met
 
 
 def test_an_eased_ramp_is_never_steeper_than_its_slope_less_the_rounding():
