@@ -24,7 +24,7 @@ from schemas.machine import Machine
 from schemas.materials import Material
 from schemas.setup import Access, Operations, Quality, Setup, Stock, setup_sha256
 from schemas.tools import Tool
-from service.cutting_data import bending, cutting_data, cutting_words, layer_depth, rates_of
+from service.cutting_data import bending, cutting_data, cutting_words, layer_depth, lightly_finished, rates_of
 from service.from_wire import (
     gauge_lengths,
     machine_kinematics,
@@ -192,7 +192,8 @@ def _cut_table(setup: Setup, bodies: Sequence[ToolBody]) -> dict[str, CutData]:
         link = min(LINK_FEED, setup.machine.max_feed_mm_min or LINK_FEED)
         engaged = math.radians(SLOT_DEG if tool.max_engagement_deg is None else tool.max_engagement_deg)
         depth = layer_depth(setup, tool, body, engaged)
-        rough, fine = (cutting_data(setup.material, tool, setup.machine, d) for d in (depth, None))
+        rough = cutting_data(setup.material, tool, setup.machine, depth)
+        fine = cutting_data(setup.material, tool, setup.machine, light=lightly_finished(setup, tool, body))
         finish = CutData(fine.spindle_rpm, fine.feed, fine.plunge_feed, link, depth, engaged,
                          bending=bending(setup, tool, body, fine, None))
         layers = CutData(rough.spindle_rpm, rough.feed, rough.plunge_feed, link, depth, engaged, finish,

@@ -129,6 +129,20 @@ def test_layers_leave_a_share_of_the_deepest_or_lattice_steps_or_the_least_which
     assert left_by_layers(3.0, 0.15) == pytest.approx(0.12)
 
 
+def test_a_finish_behind_layers_goes_faster_where_the_setup_gives_no_speed():
+    def finish(*tools, **changes):
+        return [c.finish.spindle_rpm for c in JobInputs.of(setup(*tools, **changes)).cut_table.values()]
+
+    usual = math.floor(130e3 / (math.pi * 4.0))
+    assert finish(FLAT) == [math.floor(1.4 * 130e3 / (math.pi * 4.0))]
+    assert finish(FLAT, operations={"roughing": False}) == [usual]
+    assert finish({**FLAT, "spindle_rpm": 3000}) == [3000]
+    own = {"name": "C45", "cutting_speed_m_min": 130, "feed_per_tooth": [{"diameter_mm": 4, "feed_per_tooth_mm": 0.02}]}
+    assert finish(FLAT, material=own) == [usual]
+    thin = {"id": "T1", "kind": "ball", "diameter_mm": 0.5}  # layers leave 0.06 mm, more than a tenth of it
+    assert finish(thin, machine={"max_rpm": 1e6}) == [math.floor(130e3 / (math.pi * 0.5))]
+
+
 def test_a_slender_tool_takes_thinner_layers_with_chips_none_too_thin():
     """At the least chip it bends no more than at a fifth of its feed in the deepest layer, and removes no less."""
     slim = {"id": "T1", "kind": "ball", "diameter_mm": 1.0, "flutes": 2, "flute_length_mm": 3, "neck_diameter_mm": 0.9,
