@@ -147,6 +147,9 @@ class TimeSpent(ReportModel):
     rapid_s: Annotated[float, Field(description="Rapids, s; part of in_air_s.")]
     retracts: Annotated[int, Field(description="How often a rapid follows a feed move.")]
     tool_changes: Annotated[int, Field(description="Number of tool changes within programs.")]
+    link_feed_mm_min: Annotated[float | None, Field(
+        description="Feed of links in air between the passes of a planned program, mm/min. null: a verified program, "
+                    "which does not say which of its moves are links.")] = None
 
 
 class Assumption(ReportModel):

@@ -219,7 +219,8 @@ def job_report(ready: Prepared, known: ComputedAhead[dict[str, Any]], made: Plan
         "proposal": known.value(PROPOSAL), "findings": findings,
         "finding_counts": counted(proof, unmet), "coverage": r(coverage, 6),
         "reach_coverage": r(done / reach, 6) if reach > 0 else 0.0,
-        "machining_time_s": r(proof.spent.seconds, 1), "time": time_of(proof),
+        "machining_time_s": r(proof.spent.seconds, 1),
+        "time": time_of(proof, max(cut.link_feed for cut in ready.inputs.cut_table.values())),
         "gouge_max_mm": r(proof.gouge_max, 5), "proof": {
             "samples": len(dense), "error_bound_mm": proof.error_bound, "stock_line_spacing_mm": proof.line_spacing,
             "cutting_length_mm": r(proof.cutting_length, 1), "notes": list(proof.notes), "support": support_of(proof),
@@ -330,11 +331,11 @@ def support_of(proof: Proof) -> dict[str, Any]:
             "places_over": s.over, "at_mm": None if s.at is None else [r(v) for v in s.at]}
 
 
-def time_of(proof: Proof) -> dict[str, Any]:
-    """Shares of the machining time."""
+def time_of(proof: Proof, link_feed: float | None = None) -> dict[str, Any]:
+    """Shares of the machining time. link_feed : mm/min, of the links of a plan; None: a program of others."""
     t = proof.spent
     return {"in_cut_s": r(t.in_cut, 1), "in_air_s": r(t.seconds - t.in_cut, 1), "rapid_s": r(t.rapid, 1),
-            "retracts": t.retracts, "tool_changes": t.tool_changes}
+            "retracts": t.retracts, "tool_changes": t.tool_changes, "link_feed_mm_min": link_feed}
 
 
 def deviation(proof: Proof) -> list[dict[str, Any]]:
