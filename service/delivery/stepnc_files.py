@@ -34,7 +34,7 @@ Stream = Callable[[Workplan, Callable[[str], object]], None]
 FORMS: tuple[tuple[str, str, Stream], ...] = (
     ("stepnc", "stpnc", stream_stepnc_aim), ("stepnc-arm", "arm.stpnc", stream_stepnc_arm))
 """Kind and file ending of both forms, and the function that writes each."""
-LONG = 1_000_000  # characters of programs; from there on another process saves more than its start costs
+LONG = 400_000  # characters of programs; from there on another process saves more than its start costs
 TIME_LIMIT, MEMORY_LIMIT = 7200.0, 8e9  # s, bytes
 
 
