@@ -37,7 +37,7 @@ def wall(tmp_path_factory):
 
 
 def setup(tools=(FLAT,), **changes) -> Setup:
-    plain = setup_with(list(tools), scallop=0.05)
+    plain = setup_with(list(tools), scallop=0.02)  # layers leave more than two of it
     plain |= {"stock": {"kind": "box", "margin_mm": 1.0}, "material": "AlMgSi1 6082", **changes}
     return Setup.model_validate(plain)
 

@@ -121,7 +121,7 @@ def test_the_scallop_left_is_within_the_request(name):
 
 
 def test_what_stock_of_another_zone_was_in_the_way_of_is_finished_after_that_zone():
-    c = case("walls with holder")
+    c = plan_part(low_walls(), [held()], roughing=False)
     finish = [s for s in c.plan.steps if s.zone]
     first, again = (s for s in finish if s.zone == "Z1")
     assert [s.zone for s in finish] == ["Z1", "Z2", "Z1"] and first.strategy == again.strategy == "zigzag"
