@@ -29,6 +29,7 @@ class Modes(ToolChanges):
     spindle_tool : T number in the spindle, its length offset on, before the first line; 0 for none
     fits        : whether the control drops points by the P of a G64 without Q
     before_cycle : the motion before the cycle in force or the latest one, None for none
+    register     : number of the latest H word, None before the first
     """
 
     fits = True
@@ -46,6 +47,7 @@ class Modes(ToolChanges):
         self.incremental_after_cuts = self.incremental_moved = self.cut_absolute = False
         self.stated: set[float] = set()
         self.before_cycle: float | None = None
+        self.register: int | None = spindle_tool or None
         self.assumed: tuple[str, ...] = ()
 
     def _set_modes(self, block: Block) -> None:
@@ -256,7 +258,12 @@ class Modes(ToolChanges):
         if g == 49:
             s.offset, s.length = None, 0.0
             return
-        number = int(values["H"]) if "H" in values else s.tool
+        if "H" in values:
+            self.register = int(values["H"])
+        elif not self.fits and self.register is None:
+            self.log.remark("no_length_offset", f"G{g:g} without H: the control takes the H that it had before the "
+                            "program, or none", s.tool)
+        number = s.tool if self.register is None or ("H" not in values and self.fits) else self.register
         s.length = self._length_error(number)
         if number != s.tool and self.tools is not None and number not in self.tools and self._own_register(number):
             self.log.note(f"H{number} counts as the length of T{s.tool}: the setup has no tool of that number")

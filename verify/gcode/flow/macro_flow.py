@@ -337,7 +337,7 @@ class MacroFlow:
         if len(self.calls) >= MAX_CALLS:
             raise BlockError(f"more than {MAX_CALLS} nested calls")
         if times < 1:
-            return section, at + 1
+            raise BlockError(f"{kind} L{times}: a call that runs no times, or once, is not certain", "leave it out")
         if kind == "G65":
             self.scope.frames.append(CallFrame(_arguments(call.written)))
         self.calls.append(_Call(at + 1, section, start, target, times - 1, kind == "G65"))

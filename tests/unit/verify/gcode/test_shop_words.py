@@ -395,3 +395,20 @@ def test_the_first_move_behind_a_rotation_names_both_axes(dialect):
 def test_radius_or_diameter_of_a_register_is_told(dialect, words, told):
     p = read(f"{words}G42 D1 G1 X20. Y5. F9.\nX40.\nG40 X60.\n", dialect, radii={1: 5.0})
     assert [str(a.what) for a in p.open] == ["radius_register"] * told
+
+
+@pytest.mark.parametrize(("dialect", "first", "again"), [("fanuc", 1, 1), ("haas", 1, 1), ("linuxcnc", 0, 0)])
+def test_a_length_offset_without_h_is_that_of_before(dialect, first, again):
+    """Fanuc and Haas keep H, which is 0 after power on; LinuxCNC takes the length of the tool."""
+    p = read_program("G21 G90 G17 G94 G54 G61\nT1 M6\nS1000 M3\nG0 X0 Y0\nG43 Z15.\nG1 Z9. F9.\nM30\n", dialect=dialect)
+    assert sum("G43 without H" in r.message for r in p.remarks) == first
+    p = read("T2 M6\nS900 M3\nG43 Z15.\nG1 Z9. F9.\n", dialect)
+    assert any("length offset H1 with tool T2" in r.message for r in p.remarks) == again
+    p = read("G49\nG43 Z15.\nG1 Z9. F9.\n", dialect)
+    assert not any("length offset" in r.message or "without H" in r.message for r in p.remarks)
+
+
+@pytest.mark.parametrize("call", ["M98 P10 L0", "G65 P10 L0"])
+def test_a_call_of_no_times_is_refused(call):
+    with pytest.raises(ProgramError, match="a call that runs no times, or once"):
+        read(f"{call}\nM30\nO10\nG1 X1. F9.\nM99\n")
