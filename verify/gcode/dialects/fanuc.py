@@ -249,6 +249,10 @@ class FanucReader(FanucPlanes):
             return [f"P{float(digits) if self._in_seconds(digits) else float(digits) / 1000.0:.6f}"]
         if self.hole and letter == "Q" and "." not in digits and float(digits) >= 100:
             return [f"Q{float(digits) / 1000.0:.6f}"]
+        if letter == "P" and 30 in codes:
+            if float(digits) != 2:
+                raise BlockError(f"G30 P{digits}: the proof does not know where that reference point is")
+            return []
         if letter == "P" and 51 in codes and "." not in digits:
             raise BlockError(f"G51 P{digits} without a decimal point counts thousandths or hundred-thousandths, "
                              "depending on a parameter of the machine",

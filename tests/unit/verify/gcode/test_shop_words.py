@@ -412,3 +412,12 @@ def test_a_length_offset_without_h_is_that_of_before(dialect, first, again):
 def test_a_call_of_no_times_is_refused(call):
     with pytest.raises(ProgramError, match="a call that runs no times, or once"):
         read(f"{call}\nM30\nO10\nG1 X1. F9.\nM99\n")
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas"])
+def test_the_second_reference_point_is_that_of_g30_alone(dialect):
+    first, second = (read(f"G91 G30 {p}Z0.\nG90\n", dialect) for p in ("", "P2 "))
+    assert not any("P2" in r.message for r in second.remarks)
+    assert [s.event for s in first.stops] == [s.event for s in second.stops]
+    with pytest.raises(ProgramError, match="G30 P3: the proof does not know"):
+        read("G91 G30 P3 Z0.\nG90\n", dialect)

@@ -279,6 +279,9 @@ class SiemensMoves(SiemensCorners):
             names = {k for k in "XYZABC" if k in places or k + "1" in line.values}
             if not names:
                 raise BlockError("G74 or G75 needs the axes that go")
+            if line.values.get("FP", 1.0) != 1.0:
+                raise BlockError(f"G75 FP={line.values['FP']:g}: the proof does not know where that fixed point is",
+                                 "go to the first fixed point (FP=1), or to a place of the program")
             self.forget()
             turned = sorted(names & set("ABC"))
             way = " ".join(["G0 G53", *(f"{k}0" for k in sorted(names))])

@@ -356,3 +356,9 @@ def test_rounding_that_machine_data_decide_is_a_note(word):
     p = read(f"{word}\nG1 X1", "siemens")
     assert not p.remarks and p.unbounded
     assert any("machine data decide how far the control rounds" in n for n in p.notes)
+
+
+def test_a_further_fixed_point_is_refused():
+    with pytest.raises(ProgramError, match="G75 FP=2: the proof does not know"):
+        read("G75 FP=2 Z0", "siemens")
+    assert len(read("G1 X1\nG75 FP=1 Z0", "siemens"))
