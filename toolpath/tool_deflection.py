@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from geometry.cutting_mechanics import cutting_force, engaged_angle
 from geometry.tool_body import ToolBody
 
-MIN_SHARE, LEAST_CHIP = 0.2, 0.002
+MIN_SHARE, MIN_CHIP = 0.2, 0.002
 """Least share to which a feed is reduced, and least feed per tooth, of the diameter; the greater counts. Below it,
 edges rub and the tool wears without cutting."""
 THINNEST = 1.0 / 3.0
@@ -28,7 +28,7 @@ THINNEST = 1.0 / 3.0
 LAYER_LIMIT = 0.05
 """mm, largest deflection of a tool in layers, unless ``BENT_SHARE`` of the stock they leave is less."""
 BENT_SHARE = 0.55
-LEFT_SHARE, LEFT_STEPS, LEAST_LEFT = 0.04, 0.5, 0.06
+LEFT_SHARE, LEFT_STEPS, MIN_LEFT = 0.04, 0.5, 0.06
 """Stock that layers leave for the finish: share of the deepest layer, lattice steps, and mm; the greatest counts."""
 MIN_FEED = 0.1
 """mm/min."""
@@ -100,7 +100,7 @@ class DeflectionModel:
 
     def least_share(self, feed: float) -> float:
         """Least share to which a feed, mm/min, is reduced; 1 where it gives no more than the least chip itself."""
-        least = LEAST_CHIP * self.tool.diameter * self.flutes * self.rpm
+        least = MIN_CHIP * self.tool.diameter * self.flutes * self.rpm
         return min(1.0, max(MIN_SHARE, least / feed))
 
     def bearable(self, feed: float, depth: float, width: float) -> float:
@@ -129,8 +129,8 @@ def left_by_layers(step_down: float, spacing: float) -> float:
     step_down : mm, deepest layer
     spacing   : mm, of the lattice
     """
-    return max(LEFT_SHARE * step_down, LEFT_STEPS * spacing, LEAST_LEFT)
+    return max(LEFT_SHARE * step_down, LEFT_STEPS * spacing, MIN_LEFT)
 
 
-__all__ = ["BENT_SHARE", "LAYER_LIMIT", "LEAST_CHIP", "MIN_FEED", "MIN_SHARE", "THINNEST",
+__all__ = ["BENT_SHARE", "LAYER_LIMIT", "MIN_CHIP", "MIN_FEED", "MIN_SHARE", "THINNEST",
            "DeflectionEstimate", "DeflectionModel", "left_by_layers"]

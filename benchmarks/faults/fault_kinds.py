@@ -20,7 +20,7 @@ from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 
 LEAST = 0.006  # mm, a gouge that must be found; the tolerance of the cases is 0.004
-LEAST_LEFT = 0.012  # mm, the same for what is left; 0.008 is allowed
+MIN_LEFT = 0.012  # mm, the same for what is left; 0.008 is allowed
 REFUSED = "refused"
 
 
@@ -316,8 +316,8 @@ def _left(bad: Case, zone: str, steps: list[Step]) -> Planted:
     deep = s.points[few[np.argsort(-left)[:20]]]
     close = rows[(np.linalg.norm(s.points[rows][:, None] - deep, axis=2) < 0.4).any(axis=1)]
     most = max(float(left.max()), float(twin.left(s.points[close], s.normals[close]).max()))
-    if most < LEAST_LEFT:
-        raise Redraw(f"no {LEAST_LEFT} mm are left by it")
+    if most < MIN_LEFT:
+        raise Redraw(f"no {MIN_LEFT} mm are left by it")
     return Planted(bad, ("residual",), None, most, zone)
 
 

@@ -24,7 +24,7 @@ from toolpath.workingsteps import Trajectory, TrajectoryKind
 
 LEAST = 0.26  # mm, shortest stretch of one feed: a quarter of a millimetre after rounding
 PRICE = 0.08  # s, what a change may cost before it is left out
-MOST_LEVELS = 48  # feeds considered between two rapids
+MAX_LEVELS = 48  # feeds considered between two rapids
 ALIKE = 1e-7  # mm
 
 
@@ -75,8 +75,8 @@ def _cheapest(lengths: F64, feeds: F64, acceleration: float) -> list[_Stretch]:
     against the programmed feeds.
     """
     levels = np.unique(feeds)
-    if len(levels) > MOST_LEVELS:
-        levels = levels[np.unique(np.linspace(0, len(levels) - 1, MOST_LEVELS).astype(np.int64))]
+    if len(levels) > MAX_LEVELS:
+        levels = levels[np.unique(np.linspace(0, len(levels) - 1, MAX_LEVELS).astype(np.int64))]
     speed = levels / 60.0
     lost = np.array([[change_seconds(a, b, acceleration) * abs(a - b) / (2.0 * max(a, b)) for b in speed.tolist()]
                      for a in speed.tolist()])
