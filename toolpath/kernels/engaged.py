@@ -17,9 +17,24 @@ SECTORS = 36
 """Of the half circle: an angle is known to a 36th of it."""
 
 
+EDGES = np.sin(math.pi * (np.arange(SECTORS + 1) / SECTORS - 0.5))
+BINS = 512
+FIRST = np.searchsorted(EDGES[1:-1], 2.0 * np.arange(BINS) / BINS - 1.0, side="right")
+"""Sector of the least sine of each bin; bins share the sines from -1 to 1 evenly."""
+ALL = (1 << SECTORS) - 1
+
+
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _sector(sine):
-    return max(0, min(int((math.asin(min(max(sine, -1.0), 1.0)) / math.pi + 0.5) * SECTORS), SECTORS - 1))
+    """Sector of an angle off the way by its sine; the sines at the ends of the half circle and beyond have the last."""
+    if sine <= -1.0:
+        return 0
+    if sine >= 1.0:
+        return SECTORS - 1
+    at = FIRST[int(0.5 * (sine + 1.0) * BINS)]
+    while at < SECTORS - 1 and sine >= EDGES[at + 1]:
+        at += 1
+    return at
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
@@ -37,6 +52,8 @@ def engaged(top, x0, y0, step, tips, ways, radius, corner, skin, window, out):
         i0, i1 = max(int(math.ceil((y - radius - y0) / step)), 0), min(int((y + radius - y0) / step), ny - 1)
         j0, j1 = max(int(math.ceil((x - radius - x0) / step)), 0), min(int((x + radius - x0) / step), nx - 1)
         for i in range(i0, i1 + 1):
+            if bits[k] == ALL:
+                break
             for j in range(j0, j1 + 1):
                 over = top[i, j] - z
                 if over <= skin:

@@ -75,7 +75,7 @@ class Inwards:
         free = window[rows, cols]
         if off is not None:
             free = np.logical_and(free, off[rows, cols])
-        stands = lat.mask(stock.above(z + worth))[rows, cols]
+        stands = stock.above(z + worth, lat)[rows, cols]
         if not stands.any():
             return None
         air = free & (ndimage.distance_transform_edt(~stands) * lat.step >= r - EDGE * lat.step)

@@ -298,10 +298,20 @@ class StockMap:
                  tool.corner_radius, reach + half - tool.radius, half, lower_bound, out)
         return out
 
-    def above(self, z: float) -> F64:
-        """Nodes where more than the part stands above height z, (n, 2) float64, mm, access frame."""
-        iy, ix = np.nonzero(self.top > np.maximum(self.part, z))
-        return np.column_stack([self.lattice.x0 + self.lattice.step * ix, self.lattice.y0 + self.lattice.step * iy])
+    def above(self, z: float, lattice: Lattice) -> NDArray[np.bool_]:
+        """Nodes of another lattice that are nearest to one where more than the part stands above height z, mm.
+
+        Returns (ny, nx) bool, on ``lattice``.
+        """
+        stands, lat = self.top > np.maximum(self.part, z), self.lattice
+        out = np.zeros((lattice.ny, lattice.nx), np.bool_)
+        if stands.any():
+            rows = lattice.cells(lat.nodes(np.arange(lat.ny), np.zeros(lat.ny, np.int64), z))[0]
+            cols = lattice.cells(lat.nodes(np.zeros(lat.nx, np.int64), np.arange(lat.nx), z))[1]
+            first, second = (np.flatnonzero(np.diff(k, prepend=-1)) for k in (rows, cols))
+            near = np.logical_or.reduceat(np.logical_or.reduceat(stands, first, axis=0), second, axis=1)
+            out[np.ix_(rows[first], cols[second])] = near
+        return out
 
     def standing(self, tips: F64, tool: ToolBody) -> F64:
         """Upper bound of the height of stock, not beside a wall, above tips within the cutter, (n,) float64, mm.

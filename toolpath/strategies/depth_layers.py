@@ -71,7 +71,7 @@ def layer(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], a
         The rings farthest from the walls first, so that the cutter comes from air where there is any.
     """
     lat, tool = field.lattice, field.tool
-    standing = dilated(lat.mask(stock.above(z + STOCK_WORTH)), 2.0 * tool.radius / lat.step)
+    standing = dilated(stock.above(z + STOCK_WORTH, lat), 2.0 * tool.radius / lat.step)
     active = dilated(area, tool.radius / lat.step) & standing
     # Where rings turn sharply, islands stay between them; rings half a step off take these.
     for lines in rings(field, z, active, (allowance, allowance + 0.5 * side_step), side_step):

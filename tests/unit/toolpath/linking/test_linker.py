@@ -350,7 +350,7 @@ def test_what_stands_between_two_passes_is_gone_over_and_not_through():
     before, stock = len(link.trajectories), link.stock.copied()
     link.add(straight(9.5, 20, 10, 1.0))
     over = link.trajectories[before]
-    assert over.motion is TrajectoryKind.CONNECT and not stock.above(1.0).size == 0
+    assert over.motion is TrajectoryKind.CONNECT and stock.above(1.0, stock.lattice).any()
     assert stock.overlap(dense(over.points, 0.05), link.field.tool).max() <= 0.01
     assert stock.in_air(dense(over.points[1:3], 0.05), link.field.tool).all()
     assert TOP < over.points[:, 2].max() < link.motions.rapid_floor

@@ -10,7 +10,7 @@ import pytest
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, tool
 from toolpath.counterexamples import Counterexamples
-from toolpath.kernels.engaged import SECTORS, engaged
+from toolpath.kernels.engaged import SECTORS, _sector, engaged
 from toolpath.lines import Line, dense
 from toolpath.stock.engagement import LOOK, SKIN_SHARE, UNBOUNDED, angles, over_limit, skims, within
 from toolpath.stock.stock_map import StockMap
@@ -121,3 +121,11 @@ def test_places_a_proof_named_are_over_the_limit_where_there_is_stock():
     assert not over_limit(stock, points, body, most).any()
     stock.cut(points, body)
     assert not over_limit(stock, points, body, most, found).any()
+
+
+def test_the_sector_of_a_sine_is_that_of_its_angle():
+    rng = np.random.default_rng(5)
+    drawn = [*rng.uniform(-1.0, 1.0, 3000).tolist(), *np.sin(rng.uniform(-1.57, 1.57, 3000)).tolist()]
+    for sine in [-2.0, -1.0, 1.0, 2.0, 0.0, *drawn]:
+        angle = math.asin(min(max(sine, -1.0), 1.0)) / math.pi + 0.5
+        assert _sector(sine) == min(int(angle * SECTORS), SECTORS - 1)

@@ -137,6 +137,16 @@ def test_what_stands_in_the_way_of_shank_and_holder_is_found_before_and_after_a_
     assert shares[0] > shares[1] > shares[2] > 0.05
 
 
+@pytest.mark.parametrize("step", [0.07, 0.2, 0.5])
+def test_nodes_of_another_lattice_near_standing_stock_are_those_found_one_by_one(step):
+    rng = np.random.default_rng(2)
+    top = np.where(rng.random((31, 44)) < 0.2, rng.uniform(0.0, 2.0, (31, 44)), -np.inf)
+    stock = StockMap(Lattice(0.3, -0.2, 0.2, 44, 31), top)
+    other = Lattice(1.0, 0.4, step, 23, 17)
+    i, j = np.nonzero(top > 1.0)
+    assert np.array_equal(stock.above(1.0, other), other.mask(stock.lattice.nodes(i, j, 0.0)[:, :2]))
+
+
 @pytest.mark.parametrize("angle", [0.0, 0.3, 0.6, 0.78])
 def test_stock_that_ends_along_a_line_is_seen_wherever_the_line_lies_between_nodes(angle):
     """The planner cleared half a cell diagonal round a shank; an edge just behind a row of nodes was 6 um too near."""
