@@ -258,6 +258,23 @@ def apart(a: float, b: float) -> tuple[float, float]:
     return a, b
 
 
+def certain(name: str, function: Callable[[float], float], edge: float = 0.0) -> Callable[[float], float]:
+    """A function that goes to a whole number, for a control that counts with fewer digits than the reader.
+
+    edge : from whole numbers to where the function changes, 0 or 0.5
+
+    It refuses numbers that differ from such a place by less than the rounding of the control; ``name`` stands for it in
+    the message.
+    """
+    def applied(number: float) -> float:
+        near = math.floor(number - edge + 0.5) + edge if math.isfinite(number) else number
+        if number != near and abs(number - near) <= max(1e-9, 1e-8 * abs(number)):
+            raise BlockError(f"{name}[{number!r}]: the rounding of the control decides to which whole number it goes",
+                             "add or take off a half before, so that the number lies between two whole ones")
+        return function(number)
+    return applied
+
+
 def small_enough(name: str, compute: Callable[[], float]) -> float:
     """The computed number.
 

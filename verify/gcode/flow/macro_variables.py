@@ -13,7 +13,17 @@ import operator
 from collections.abc import Callable
 
 from verify.gcode.block_words import BlockError
-from verify.gcode.flow.expressions import Grammar, apart, divided, modulo, power, rounded, small_enough, within
+from verify.gcode.flow.expressions import (
+    Grammar,
+    apart,
+    certain,
+    divided,
+    modulo,
+    power,
+    rounded,
+    small_enough,
+    within,
+)
 from verify.gcode.flow.parameters import Parameters
 
 LOCALS = 33
@@ -151,7 +161,8 @@ def _rounded(number: float) -> float:
 
 _SQRT = within("SQRT", math.sqrt, 0, math.inf)
 _FUNCTIONS: dict[str, Callable[[float], float]] = {
-    "abs": abs, "fix": _truncated, "fup": _away, "round": _rounded, "rnd": _rounded,
+    "abs": abs, "fix": certain("FIX", _truncated), "fup": certain("FUP", _away),
+    "round": certain("ROUND", _rounded, 0.5), "rnd": certain("RND", _rounded, 0.5),
     "exp": lambda v: small_enough(f"EXP[{v:g}]", lambda: math.exp(v)),
     "acos": within("ACOS", lambda v: math.degrees(math.acos(v)), -1, 1),
     "asin": within("ASIN", lambda v: math.degrees(math.asin(v)), -1, 1),

@@ -421,3 +421,12 @@ def test_the_second_reference_point_is_that_of_g30_alone(dialect):
     assert [s.event for s in first.stops] == [s.event for s in second.stops]
     with pytest.raises(ProgramError, match="G30 P3: the proof does not know"):
         read("G91 G30 P3 Z0.\nG90\n", dialect)
+
+
+@pytest.mark.parametrize(("dialect", "text", "right"), [
+    ("fanuc", "#1=FIX[0.3/0.1]\n", "#1=FIX[0.35/0.1]\n"), ("haas", "#1=FUP[0.1+0.1+0.1-0.3]\n", "#1=FUP[3.]\n"),
+    ("fanuc", "#1=ROUND[5.*0.1*3.-0.000000001]\n", "#1=ROUND[1.4]\n")])
+def test_a_whole_number_that_rounding_decides_is_refused(dialect, text, right):
+    with pytest.raises(ProgramError, match="the rounding of the control decides"):
+        read(f"{text}G1 X1. F9.\n", dialect)
+    assert len(read(f"{right}G1 X1. F9.\n", dialect))

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from verify.gcode.dialects.base import BlockError
-from verify.gcode.flow.expressions import apart
+from verify.gcode.flow.expressions import apart, certain
 
 NUM = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)"
 VALUE = rf"(?:[+-]\s*)?(?:{NUM}|Q[LR]?[0-9]+)"
@@ -227,7 +227,7 @@ _FUNCTIONS: dict[str, Callable[[float], float]] = {
     "COS": lambda v: math.cos(math.radians(v)), "TAN": lambda v: math.tan(math.radians(v)),
     "ASIN": lambda v: math.degrees(math.asin(v)), "ACOS": lambda v: math.degrees(math.acos(v)),
     "ATAN": lambda v: math.degrees(math.atan(v)), "LN": math.log, "LOG": math.log10, "EXP": math.exp, "ABS": abs,
-    "INT": math.trunc, "FRAC": lambda v: math.modf(v)[0], "NEG": operator.neg,
+    "INT": certain("INT", math.trunc), "FRAC": certain("FRAC", lambda v: math.modf(v)[0]), "NEG": operator.neg,
     "SGN": lambda v: math.copysign(1.0, v) if v else 0.0}
 
 __all__ = ["NUM", "VALUE", "QParameters"]

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from verify.gcode.block_words import BlockError
+from verify.gcode.flow.expressions import certain
 
 Value = float | str
 MAX_DEPTH = 40
@@ -287,6 +288,16 @@ def _rounded(value: float) -> float:
     return math.copysign(math.floor(abs(value) + 0.5), value)
 
 
+def _truncated(value: float) -> float:
+    """TRUNC: a number that a comparison takes for a whole one is that one (Job Planning, precision correction)."""
+    return _rounded(value) if _same(value, _rounded(value)) else float(math.trunc(value))
+
+
+def same(a: Value, b: Value) -> bool:
+    """Whether a comparison with equality, or CASE, takes two values for one."""
+    return _same(a, b) if isinstance(a, float) and isinstance(b, float) else a == b
+
+
 def _same(a: float, b: float) -> bool:
     """Whether a comparison with equality takes both for one number: Job Planning, TRUNC, within 1e-12 of it."""
     return abs(a - b) <= 1e-12 * max(abs(a), abs(b))
@@ -298,7 +309,7 @@ def _bits(function: Callable[[int, int], int]) -> Callable[[float, float], float
 
 _OPERATIONS: dict[str, Callable[[float, float], float]] = {
     "*": operator.mul, "/": operator.truediv, "+": operator.add, "-": operator.sub,
-    "DIV": lambda a, b: float(math.trunc(a / b)), "MOD": math.fmod,
+    "DIV": lambda a, b: certain("DIV", math.trunc)(a / b), "MOD": math.fmod,
     "==": lambda a, b: float(_same(a, b)), "<>": lambda a, b: float(not _same(a, b)), "<": lambda a, b: float(a < b),
     ">": lambda a, b: float(a > b), "<=": lambda a, b: float(a < b or _same(a, b)),
     ">=": lambda a, b: float(a > b or _same(a, b)),
@@ -310,8 +321,10 @@ _FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
     "SIN": (1, lambda v: math.sin(math.radians(v))), "COS": (1, lambda v: math.cos(math.radians(v))),
     "TAN": (1, lambda v: math.tan(math.radians(v))), "ASIN": (1, lambda v: math.degrees(math.asin(v))),
     "ACOS": (1, lambda v: math.degrees(math.acos(v))), "ATAN2": (2, lambda y, x: math.degrees(math.atan2(y, x))),
-    "SQRT": (1, math.sqrt), "ABS": (1, abs), "POT": (1, lambda v: v * v), "TRUNC": (1, math.trunc),
-    "ROUND": (1, _rounded), "ROUNDUP": (1, math.ceil), "LN": (1, math.log), "EXP": (1, math.exp),
+    "SQRT": (1, math.sqrt), "ABS": (1, abs), "POT": (1, lambda v: v * v),
+    "TRUNC": (1, _truncated),
+    "ROUND": (1, certain("ROUND", _rounded, 0.5)), "ROUNDUP": (1, certain("ROUNDUP", math.ceil)), "LN": (1, math.log),
+    "EXP": (1, math.exp),
     "MINVAL": (2, min), "MAXVAL": (2, max), "BOUND": (3, lambda low, high, v: min(max(v, low), high)),
 }
 

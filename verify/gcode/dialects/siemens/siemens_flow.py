@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from verify.gcode.block_words import BlockError
 from verify.gcode.dialects.base import Machine, too_many_jumps
-from verify.gcode.dialects.siemens.siemens_expressions import Value, ValueReader, Variables
+from verify.gcode.dialects.siemens.siemens_expressions import Value, ValueReader, Variables, same
 
 MAX_JUMPS = 200_000
 MAX_CALLS = 16
@@ -304,7 +304,7 @@ class SiemensFlow:
             if m is None:
                 raise BlockError(f"cannot read '{reader.text[reader.at:reader.at + 40]}' in CASE")
             reader.at = m.end()
-            if default or value == wanted:
+            if default or same(value, wanted):
                 return self._goto(m[1], ValueReader(f"{m[1]} {m[2]}", self.variables, len(m[1])), at)
 
     def _repeat(self, word: str, reader: ValueReader, at: int) -> int | None:

@@ -281,3 +281,10 @@ def test_feeds_of_rotary_axes_in_mm_are_refused(lines):
         read(lines, "heidenhain", "table-table-AC")
     assert len(read([*lines[:-1], "M117", "L C+30 F2000"], "heidenhain", "table-table-AC"))
     assert len(read(["M116", "L C+30 FMAX"], "heidenhain", "table-table-AC"))
+
+
+@pytest.mark.parametrize("function", ["INT", "FRAC"])
+def test_a_whole_number_that_rounding_decides_is_refused(function):
+    with pytest.raises(ProgramError, match="the rounding of the control decides"):
+        read([f"Q1 = {function}(0.3/0.1)", "L X+1 F100"], "heidenhain")
+    assert len(read([f"Q1 = {function}(0.35/0.1)", "L X+1 F100"], "heidenhain"))

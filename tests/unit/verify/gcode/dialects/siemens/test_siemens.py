@@ -362,3 +362,18 @@ def test_a_further_fixed_point_is_refused():
     with pytest.raises(ProgramError, match="G75 FP=2: the proof does not know"):
         read("G75 FP=2 Z0", "siemens")
     assert len(read("G1 X1\nG75 FP=1 Z0", "siemens"))
+
+
+def test_trunc_and_case_take_numbers_for_equal_as_comparisons_do():
+    """Job Planning, precision correction: 0.3/0.1 and (0.1+0.1+0.1)*10 are 3, which they miss by a last digit."""
+    assert read("R1=TRUNC(0.3/0.1)\nG1 X=R1 F100", "siemens").end[-1, 0] == 3.0
+    assert read("R1=TRUNC(-2.9)\nG1 X=R1 F100", "siemens").end[-1, 0] == -2.0
+    case = "CASE R1 OF 3 GOTOF AA DEFAULT GOTOF BB\nAA: G1 X5 F100\nGOTOF CC\nBB: G1 X7 F100\nCC: G4 F1"
+    assert read(f"R1=(0.1+0.1+0.1)*10\n{case}", "siemens").end[-1, 0] == 5.0
+
+
+@pytest.mark.parametrize(("unsure", "right"), [("ROUNDUP((0.1+0.2)*10)", "ROUNDUP(2.5)"), ("0.3 DIV 0.1", "7 DIV 2")])
+def test_a_whole_number_that_rounding_decides_is_refused(unsure, right):
+    with pytest.raises(ProgramError, match="the rounding of the control decides"):
+        read(f"R1={unsure}\nG1 X1 F9", "siemens")
+    assert len(read(f"R1={right}\nG1 X1 F9", "siemens"))
