@@ -23,12 +23,13 @@ STEP = 0.1  # mm between poses
 
 @dataclass(frozen=True)
 class Stretch:
-    """A straight feed move: line, T number, and both ends of the tip, mm."""
+    """A straight feed move, or a chord of an arc: line, T number, both ends of the tip, and how far the arc bows, mm."""
 
     line: int
     tool: int
     a: tuple[float, float, float]
     b: tuple[float, float, float]
+    bow: float = 0.0
 
 
 def stretches(text: str) -> list[Stretch]:
@@ -48,21 +49,21 @@ def stretches(text: str) -> list[Stretch]:
         if line.startswith("G1"):
             out.append(Stretch(row, tool, tuple(at.tolist()), tuple(to.tolist())))
         elif line.startswith(("G2", "G3")):
-            way = _arc(at, to, at[:2] + [words["I"], words["J"]], line.startswith("G2"))
-            out += [Stretch(row, tool, tuple(a.tolist()), tuple(b.tolist()))
+            way, bow = _arc(at, to, at[:2] + [words["I"], words["J"]], line.startswith("G2"))
+            out += [Stretch(row, tool, tuple(a.tolist()), tuple(b.tolist()), bow)
                     for a, b in zip(way[:-1], way[1:], strict=True)]
         at = to
     return out
 
 
-def _arc(a: F64, b: F64, middle: F64, clockwise: bool) -> F64:
+def _arc(a: F64, b: F64, middle: F64, clockwise: bool) -> tuple[F64, float]:
     first, last = (math.atan2(p[1] - middle[1], p[0] - middle[0]) for p in (a, b))
     sign = -1.0 if clockwise else 1.0
     turn = (sign * (last - first)) % (2.0 * math.pi) or 2.0 * math.pi
     share = np.linspace(0.0, 1.0, max(2, math.ceil(turn / math.radians(2.0))))
     angle, radius = first + sign * turn * share, float(np.hypot(*(a[:2] - middle)))
     return np.column_stack([middle[0] + radius * np.cos(angle), middle[1] + radius * np.sin(angle),
-                            a[2] + share * (b[2] - a[2])])
+                            a[2] + share * (b[2] - a[2])]), radius * (1.0 - math.cos(0.5 * turn * share[1]))
 
 
 def removed_depth(case: Case, lines: Collection[int] | None = None, seed: int = 0) -> float:

@@ -11,7 +11,7 @@ import os
 import pytest
 
 from benchmarks.adversary.adversary_parts import PARTS
-from benchmarks.adversary.adversary_twin import removed_depth
+from benchmarks.adversary.adversary_twin import removed_depth, stretches
 from benchmarks.adversary.mechanisms import GOOD, HARMFUL
 from benchmarks.adversary.run_adversary import case_of, judged
 
@@ -51,7 +51,8 @@ def test_closed_forms_are_those_of_the_twin(mechanism):
 def test_the_right_programs_take_nothing_out_of_their_parts(part):
     cases = (case_of(s, "any dialect") for s in range(400))
     case = next(c for c in cases if c.part == part and c.dialect == "linuxcnc")
-    assert removed_depth(case) < 1e-4
+    bow = max(s.bow for s in stretches(case.text))  # by which chords of arcs round a boss cut in
+    assert removed_depth(case) < 1e-4 + bow
 
 
 @pytest.mark.slow
