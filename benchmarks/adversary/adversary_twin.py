@@ -23,7 +23,7 @@ STEP = 0.1  # mm between poses
 
 @dataclass(frozen=True)
 class Stretch:
-    """A straight feed move, or a chord of an arc: line, T number, both ends of the tip, how far the arc bows, all mm."""
+    """A straight feed move, or a chord of an arc: line, T number, both ends of the tip, how far the arc bows, mm."""
 
     line: int
     tool: int
