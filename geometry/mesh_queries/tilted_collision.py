@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -17,6 +16,7 @@ from geometry.errors import GeometryError
 from geometry.kernels import tilted as kernels
 from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import one_thread
 
 
 def axis_frames(axes: ArrayLike) -> F64:
@@ -90,7 +90,7 @@ def blocked_along(tree: TriangleTree, frames: ArrayLike, which: ArrayLike, tips:
         return out
     args: tuple[Any, ...] = (tree.arrays, tree.hulls, turns, frame, points, rows, float(rows[:, 2].min()),
                              float(rows[:, 0].max()))
-    if numba.get_num_threads() == 1:
+    if one_thread(len(points)):
         kernels.along_range(*args, 0, len(points), out)  # type: ignore[call-arg]
     else:
         kernels.along_parallel(*args, out)  # type: ignore[call-arg]
