@@ -37,6 +37,7 @@ ROUNDING = "parameters of the machine set how far the control rounds corners: th
 _PLACES = "XYZABCIJKRUVW"
 ORIENTS = 19
 """The M word that stops the spindle at an angle; Haas gives the angle as P or R."""
+_AFTER_TAPS = frozenset({0.0, 1.0, 2.0, 3.0, 73.0, 76.0, 80.0, 81.0, 82.0, 83.0, 85.0, 86.0, 89.0})
 _KNOWN_M = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, ORIENTS, 30})
 IDLE_G: frozenset[float] = frozenset({9, 13.1, 22, 23, 25, 26, 40.1, 50.2, 62, 63, 67, 69.1, 94.1, 97, 113})
 """G words without effect on a move: exact stop, modes of tapping and cutting, stroke checks, ends of modes."""
@@ -160,14 +161,19 @@ class FanucReader(FanucPlanes):
         return [*before, *([f"/{block}" if deleted else block] if block else []), *self._after(codes)]
 
     def _spindle_of_taps(self, codes: list[float]) -> list[str]:
-        """Words of the spindle before a block: rigid tapping turns it itself, and leaves it standing at its end."""
-        if self.taps and not {0.0, 1.0, 2.0, 3.0, 80.0}.isdisjoint(codes):
+        """Words of the spindle before a block of G words ``codes``.
+
+        Rigid tapping turns the spindle itself, and leaves it standing at its end. Where M29 does not say so, a
+        parameter of the machine decides whether a tapping cycle is rigid: the proof counts on a spindle that stands.
+        """
+        if self.taps and not _AFTER_TAPS.isdisjoint(codes):
             self.taps = self.synchronous = False
             return ["M5"]
-        if {74.0, 84.0}.isdisjoint(codes) or not (self.synchronous or self.rigid is None):
+        if {74.0, 84.0}.isdisjoint(codes):
             return []
         begins, self.taps = not self.taps, True
-        return ["M3"] if begins and not self.machine.s.turning else []
+        rigid = self.synchronous or self.rigid is None
+        return ["M3"] if begins and rigid and not self.machine.s.turning else []
 
     def _follow(self, codes: list[float]) -> None:
         """Keep the modes that the words of later blocks depend on."""

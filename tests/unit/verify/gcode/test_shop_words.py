@@ -352,17 +352,21 @@ def test_a_destination_that_stands_twice_is_refused(dialect, calls):
         read(calls, dialect)
 
 
-@pytest.mark.parametrize(("dialect", "tap", "stands"), [
+@pytest.mark.parametrize(("dialect", "tap", "rigid"), [
     ("fanuc", "M29 S500\nG99 G84 X5. Z-3. R2. F500.\nX7.\nG80\n", True),
-    ("fanuc", "G99 G84 X5. Z-3. R2. F500.\nG80\n", False),
+    ("fanuc", "G99 G84 X5. Z-3. R2. F500.\nX7.\nG80\n", False),
+    ("fanuc", "G98 G74 X5. Z-3. R2. F500.\nG80\n", False),
     ("fanuc", "M29 S500 G84 X5. Z-3. R2. F500.\nG0 X8.\n", True),
     ("haas", "G99 G84 X5. Z-3. R2. F500.\nX7.\nG80\n", True)])
-def test_the_spindle_stands_behind_rigid_tapping(dialect, tap, stands):
-    for before in ("", "M5\n") if stands else ("",):  # a rigid cycle turns it by itself
+def test_the_spindle_stands_behind_a_tapping_cycle(dialect, tap, rigid):
+    """Without M29 a parameter of Fanuc decides whether a cycle taps rigidly and leaves the spindle standing."""
+    for before in ("", "M5\n"):
         for again in ("", "M3\n"):
             p = read(f"{before}{tap}{again}G1 X1. F100.\n", dialect)
             told = sum("spindle standing" in r.message for r in p.remarks)
-            assert told == (stands and not again), (before, again, p.remarks)
+            assert told == (not again or bool(before and not rigid)), (before, again, p.remarks)
+    p = read(f"{tap.replace('G80', 'G81 X9. Z-1. R2.')}G80\nM3\n", dialect)
+    assert ["spindle standing" in r.message for r in p.remarks] == [True] * (tap.count("G80"))
 
 
 @pytest.mark.parametrize("word", ["EQ", "NE", "GT", "GE", "LT", "LE"])

@@ -290,16 +290,13 @@ def _rounded(value: float) -> float:
 
 def _truncated(value: float) -> float:
     """TRUNC: a number that a comparison takes for a whole one is that one (Job Planning, precision correction)."""
-    return _rounded(value) if _same(value, _rounded(value)) else float(math.trunc(value))
+    return _rounded(value) if same(value, _rounded(value)) else float(math.trunc(value))
 
 
 def same(a: Value, b: Value) -> bool:
-    """Whether a comparison with equality, or CASE, takes two values for one."""
-    return _same(a, b) if isinstance(a, float) and isinstance(b, float) else a == b
-
-
-def _same(a: float, b: float) -> bool:
-    """Whether a comparison with equality takes both for one number: Job Planning, TRUNC, within 1e-12 of it."""
+    """Whether a comparison with equality, or CASE, takes both for one: numbers within 1e-12 (Job Planning, TRUNC)."""
+    if isinstance(a, str) or isinstance(b, str):
+        return a == b
     return abs(a - b) <= 1e-12 * max(abs(a), abs(b))
 
 
@@ -310,9 +307,9 @@ def _bits(function: Callable[[int, int], int]) -> Callable[[float, float], float
 _OPERATIONS: dict[str, Callable[[float, float], float]] = {
     "*": operator.mul, "/": operator.truediv, "+": operator.add, "-": operator.sub,
     "DIV": lambda a, b: certain("DIV", math.trunc)(a / b), "MOD": math.fmod,
-    "==": lambda a, b: float(_same(a, b)), "<>": lambda a, b: float(not _same(a, b)), "<": lambda a, b: float(a < b),
-    ">": lambda a, b: float(a > b), "<=": lambda a, b: float(a < b or _same(a, b)),
-    ">=": lambda a, b: float(a > b or _same(a, b)),
+    "==": lambda a, b: float(same(a, b)), "<>": lambda a, b: float(not same(a, b)), "<": lambda a, b: float(a < b),
+    ">": lambda a, b: float(a > b), "<=": lambda a, b: float(a < b or same(a, b)),
+    ">=": lambda a, b: float(a > b or same(a, b)),
     "AND": lambda a, b: float(a != 0 and b != 0), "OR": lambda a, b: float(a != 0 or b != 0),
     "XOR": lambda a, b: float((a != 0) != (b != 0)), "B_AND": _bits(operator.and_), "B_OR": _bits(operator.or_),
     "B_XOR": _bits(operator.xor),
