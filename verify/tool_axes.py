@@ -53,6 +53,12 @@ class ToolAxes:
         half = 0.5 * self.angle[:, None]
         return np.asarray(np.cos(half) * self.axis + np.sin(half) * np.cross(self.about, self.axis))
 
+    @property
+    def swing(self) -> F64:
+        """(m, 3) float64, dimensionless, setup frame: axes at the end less those at the start."""
+        turn = self.angle[:, None]
+        return np.asarray((np.cos(turn) - 1.0) * self.axis + np.sin(turn) * np.cross(self.about, self.axis))
+
     def arrays(self, bow: float) -> AxisArrays:
         """The axes for kernels. bow : mm, error allowed where the tool turns."""
         return AxisArrays(self.axis, self.about, self.angle, bow)

@@ -30,6 +30,8 @@ SPEED_TIMES = 30.0
 """Cutting speed over the recommended one that no cutter bears. High-speed cutting reaches 28 [Schulz1992]."""
 RECOMMENDED_TIMES = 2.0
 """Chip and speed over the recommended ones that give a caution: the recommendations are deliberately low."""
+BEND_TIMES = 10.0
+"""Deflection over the limit that is a finding, as in a plan: the cut is not where it should be."""
 WINDOW, SPACINGS = 0.5, 4.0  # radii of way, and spacings of the stock, over which a cut is measured; the greater counts
 DWELL_TURNS = 10.0  # turns of the spindle that a tool may stand in its cut: a spot face takes three
 ROUNDING = 1e-6
@@ -41,7 +43,8 @@ class CutSequence:
 
     moves, source, run, first : of the proof; first part of each move, as ``verify.material.stock_pass.parts``
     stretches, of : the parts as moves, and (p,) int64, index, the move of each
-    feed    : (m,) float64, mm/min of the tip; 0 for rapids and where only rotary axes turn
+    feed    : (m,) float64, mm/min of the fastest place of the flutes in the cut; 0 for rapids
+    middle  : (m,) float64, mm/min half way up the cut; both are the feed of the tip where the tool does not swing
     speed   : (m,) float64, 1/min; coolant : (m,) bool
     minutes : (m,) float64, min, time of each move
     cutter  : (m,) int64, count of tool changes and stops before each move: a fresh cutter may be in the spindle
@@ -56,6 +59,7 @@ class CutSequence:
     stretches: Moves
     of: NDArray[np.int64]
     feed: F64
+    middle: F64
     speed: F64
     coolant: NDArray[np.bool_]
     minutes: F64
@@ -78,9 +82,10 @@ def cut_sequence(read: Sequence[FramedProgram], known: NDArray[np.bool_], run: S
     took  : (m,) float64, min, time of each counted move; spacing : mm, of the stock
     """
     programs = [r.program for r in read]
-    length = np.linalg.norm(moves.end - moves.start, axis=1)
+    fast, middle = _lengths(moves, run.ways.of_moves(parts(moves, tools)).depth, tools)
     minutes = np.concatenate([np.zeros(0), *(p.minutes for p in programs)])[known]
-    feed = np.divide(length, minutes, out=np.zeros(len(moves)), where=moves.feed & (minutes > 0.0))
+    feed, half = (np.divide(length, minutes, out=np.zeros(len(moves)), where=moves.feed & (minutes > 0.0))
+                  for length in (fast, middle))
     speed = np.concatenate([np.zeros(0), *(p.speed if len(p.speed) else np.zeros(len(p)) for p in programs)])[known]
     coolant = np.concatenate([np.zeros(0, np.bool_), *(p.coolant if len(p.coolant) else np.zeros(len(p), np.bool_)
                                                        for p in programs)])[known]
@@ -94,8 +99,27 @@ def cut_sequence(read: Sequence[FramedProgram], known: NDArray[np.bool_], run: S
         dwells.extend((line, k, int(row[begun + before - 1]), seconds) for line, before, seconds in p.dwells
                       if before > 0 and row[begun + before - 1] >= 0)
         begun += len(p)
-    return CutSequence(moves, source, run, parts(moves, tools), stretches, of, feed, speed, coolant, took,
-                       np.concatenate(changed)[known], tuple(dwells), spacing)
+    return CutSequence(moves, source, run, parts(moves, tools), stretches, of, feed, half, speed, coolant,
+                       took, np.concatenate(changed)[known], tuple(dwells), spacing)
+
+
+def _lengths(moves: Moves, depth: F64, tools: Sequence[ToolBody]) -> tuple[F64, F64]:
+    """Ways of the places of cutters in their cuts.
+
+    depth : (m,) float64, mm, of the cut of each move
+
+    Returns two (m,) float64, mm: the longest of those of the tip, of the axis at the height ``depth``, and of the rim
+    of a flat end; and that of the axis half way up.
+    """
+    way, axes = moves.end - moves.start, moves.axes
+    tip = np.linalg.norm(way, axis=1)
+    if axes is None:
+        return tip, tip
+    sizes = np.array([(t.flute_length, t.radius - t.corner_radius) for t in tools]).reshape(-1, 2)[moves.tool]
+    swing = axes.swing * np.minimum(depth, sizes[:, 0])[:, None]
+    rim = (axes.angle * sizes[:, 1])[:, None] * axes.middle
+    ways = [np.linalg.norm(way + more, axis=1) for more in (swing, rim, -rim, 0.5 * swing)]
+    return np.maximum.reduce([tip, *ways[:3]]), ways[3]
 
 
 def loads(cuts: CutSequence, tools: Sequence[ToolBody],
@@ -107,8 +131,10 @@ def loads(cuts: CutSequence, tools: Sequence[ToolBody],
     Notes
     -----
     Depth and width of a cut are measured on the stock over ``WINDOW`` of the radius: the depth a is the highest stock
-    over the tip that went, the width V / (L a), known to one spacing of the stock. Force, deflection and stress follow
-    from them [Kienzle1952] [Timoshenko1955]. Moves steeper than 45 degrees have no such force.
+    over the tip that went, the width V / (L a), known to one spacing of the stock. L and the feed are those half way up
+    the cut, where the tool swings; the feed per tooth is that of the fastest place in the cut. Force, deflection and
+    stress follow from them [Kienzle1952] [Timoshenko1955]. Ways down steeper than 45 degrees have no such force; of a
+    way up, L and the feed are the shares square to the tool axis.
     """
     findings: list[Finding] = []
     cautions: list[ProgramCaution] = []
@@ -148,11 +174,16 @@ class _Judge:
 
         def text(value: float, i: int) -> str:
             return (f"T{self.tool.number}: the feed per tooth is {value:.3f} mm at F{self.cuts.feed[rows[i]]:.6g} "
-                    f"S{self.cuts.speed[rows[i]]:g} with {self.said.flutes} teeth")
+                    f"S{self.cuts.speed[rows[i]]:g} with {self.said.flutes} teeth{self._swung(rows[i])}")
         return self._over(rows, per_tooth, bound, wanted, "chip_load", text,
                           f"{bound:.3f} mm, a fifth of the diameter, is more than any cutter bears",
                           f"recommended are {self.said.per_tooth:.3f} mm", "feed slower or turn faster",
                           self.said.per_tooth)
+
+    def _swung(self, m: int) -> str:
+        """Words for a move on which the tool swings, so that the feed of its flank is not that of the program."""
+        axes = self.cuts.moves.axes
+        return ", where its edge is fastest as it swings" if axes is not None and axes.angle[m] > 0.0 else ""
 
     def speeds(self, depth: F64) -> Judged:
         """Cutting speed at the largest diameter in the cut; depth : (m,) mm."""
@@ -173,11 +204,11 @@ class _Judge:
         cuts, tool, said = self.cuts, self.tool, self.said
         if tool.along_axis_only:
             return [], []
-        last, depth, section = self._sections(k)
+        last, aside, depth, section = self._sections(k)
         _, cautions = self._over(last, section, math.inf, said.section, "depth_of_cut", lambda value, i:
                                  f"T{tool.number}: depth times width of its cut are {value:.1f} mm²", "",
                                  f"recommended are {said.section:.1f} mm²", "cut in layers, or in narrower steps")
-        per_tooth = np.divide(cuts.feed[last], cuts.speed[last] * said.flutes, out=np.full(len(last), np.inf),
+        per_tooth = np.divide(cuts.middle[last] * aside, cuts.speed[last] * said.flutes, out=np.full(len(last), np.inf),
                               where=cuts.speed[last] > 0.0)
         # a chip that no tooth can bear is a finding of its own, and no formula holds for it
         turns = per_tooth <= CHIP_SHARE * tool.diameter
@@ -185,7 +216,8 @@ class _Judge:
         if said.kc is None or said.mc is None or not len(last):
             return [], cautions
         width = section / depth
-        bend = cutting_forces(said.kc, said.mc, per_tooth[turns], depth, width, tool, said.flutes) * compliance(tool)
+        soft = compliance(tool)
+        bend = cutting_forces(said.kc, said.mc, per_tooth[turns], depth, width, tool, said.flutes) * soft
         # the stock shows a width to one spacing: a finding holds for the least
         sure = np.maximum(width - cuts.spacing, 1e-9)
         force = cutting_forces(said.kc, said.mc, per_tooth[turns], depth, sure, tool, said.flutes)
@@ -200,21 +232,31 @@ class _Judge:
                                  "cemented carbide of that diameter breaks", "", "cut in layers or feed slower")
         limit = float(strong[int(np.argmax(stress / strong))])
         findings = [replace(f, depth=f.depth * limit, limit=limit) for f in findings]
-        _, bent = self._over(last, bend, math.inf, said.bend, "deflection", lambda value, i:
-                             f"{cut(i)} would bend its tip by {value:.3f} mm", "", f"limit {said.bend:.3f} mm",
-                             "cut in layers, feed slower, or use a shorter or thicker tool")
-        return findings, [*cautions, *bent]
+        advice = "cut in layers, feed slower, or use a shorter or thicker tool"
 
-    def _sections(self, k: int) -> tuple[NDArray[np.int64], F64, F64]:
-        """Cuts by windows of way: last move, depth in mm and depth times width in mm² of each."""
+        def text(value: float, i: int) -> str:
+            return f"{cut(i)} would bend its tip by {value:.3f} mm"
+        far, _ = self._over(last, force * soft, BEND_TIMES * said.bend, math.inf, "load", text,
+                            f"{BEND_TIMES:g} times the limit of {said.bend:.3f} mm is {BEND_TIMES * said.bend:.3f} mm",
+                            "", advice)
+        _, bent = self._over(last, bend, math.inf, said.bend, "deflection", text, "", f"limit {said.bend:.3f} mm",
+                             advice)
+        return [*findings, *([] if findings else far)], [*cautions, *bent]
+
+    def _sections(self, k: int) -> tuple[NDArray[np.int64], F64, F64, F64]:
+        """Cuts by windows of way: last move, its share square to the axis, depth in mm, depth times width in mm²."""
         cuts, tool = self.cuts, self.tool
         way = cuts.stretches.end - cuts.stretches.start
+        if cuts.moves.axes is not None:
+            up_half = 0.5 * np.minimum(cuts.run.ways.depth, tool.flute_length) / np.diff(cuts.first)[cuts.of]
+            way = way + up_half[:, None] * cuts.moves.axes.swing[cuts.of]
         up = np.tile([0.0, 0.0, 1.0], (len(way), 1)) if cuts.moves.axes is None else cuts.moves.axes.middle[cuts.of]
-        length = np.linalg.norm(way, axis=1)
-        flat = np.abs(np.einsum("ij,ij->i", way, up)) <= math.sqrt(0.5) * length
-        own = np.flatnonzero(cuts.stretches.feed & (cuts.stretches.tool == k) & flat & (length > 0.0))
+        whole, rise = np.linalg.norm(way, axis=1), np.einsum("ij,ij->i", way, up)
+        length = np.where(rise > 0.0, np.sqrt(np.maximum(whole * whole - rise * rise, 0.0)), whole)
+        sideways = (rise >= -math.sqrt(0.5) * whole) & (length > ROUNDING * whole)
+        own = np.flatnonzero(cuts.stretches.feed & (cuts.stretches.tool == k) & sideways)
         if not len(own):
-            return np.zeros(0, np.int64), np.zeros(0), np.zeros(0)
+            return np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros(0)
         window = max(WINDOW * tool.radius, SPACINGS * cuts.spacing)
         begun = np.cumsum(length[own]) - length[own]
         new = np.r_[True, (np.diff(own) != 1) | (np.diff(np.floor(begun / window)) != 0.0)]
@@ -222,10 +264,10 @@ class _Judge:
         volume = np.add.reduceat(cuts.run.ways.volume[own], at)
         depth = np.minimum(np.maximum.reduceat(cuts.run.ways.depth[own], at), tool.flute_length)
         long = np.maximum(np.add.reduceat(length[own], at), SPACINGS * cuts.spacing)
-        last = cuts.of[own[np.r_[at[1:], len(own)] - 1]]
+        end = own[np.r_[at[1:], len(own)] - 1]
         cut = (volume > 0.0) & (depth > ROUNDING)
         section = np.minimum(volume[cut] / long[cut], tool.diameter * depth[cut])
-        return last[cut], depth[cut], section
+        return cuts.of[end[cut]], (length[end] / whole[end])[cut], depth[cut], section
 
     def stated(self) -> Iterator[ProgramCaution]:
         """Speed, feed, plunge feed, life and coolant, as the tool states them."""

@@ -11,8 +11,12 @@ from geometry.tool_body import ToolBody
 from schemas.tools import Tool
 from service.cutting_data import MATERIALS, cutting_words
 from tests.pocket_case import SETUP, block, program, scored, text
+from verify.kinematics import Kinematics
+from verify.material.cutting_loads import _lengths
 from verify.model import NcProgram, ScoredSamples
+from verify.moves import Moves
 from verify.prove import prove
+from verify.tool_axes import ToolAxes
 
 PART = block()
 NOBODY = ScoredSamples(scored(PART).samples, np.zeros(len(scored(PART).zone), np.int32))
@@ -79,6 +83,55 @@ def test_a_load_does_not_depend_on_how_the_program_is_divided():
     assert parts[0].depth == pytest.approx(whole[0].depth, rel=0.1)
     shallow = ["G1 X-26 Y13.9 F3000", "X26", "X-26 Y13.9"]  # a long way in air and along the edge before and after
     assert judged([*slot(6.0, 3000)[:-1], *shallow, "Y12", "X26"])[0]
+
+
+def test_a_tool_that_bends_ten_times_its_limit_is_a_load():
+    slim = replace(MILL, stickout=60.0)
+    for deep, harm in ((0.25, False), (0.6, True)):
+        _, _, bend = closed_form(deep, 4.0, 600, 8000, slim)
+        assert (bend > 0.5) == harm
+        found, cautions = judged(slot(deep, 600), tool=slim)
+        assert [(f.line, f.limit) for f in found] == [(9, 0.5)] * harm and "deflection" in cautions
+        assert not harm or 0.9 * bend < found[0].depth <= bend * 1.001  # for the least width that the stock shows
+
+
+def climbing(degrees):
+    """Up through the full height of the block, from beside it."""
+    rise = 6.0 * math.tan(math.radians(degrees))
+    return ["G0 X-25 Y0", "Z-9", "G1 X-22.6 F3000", f"G1 X-16.6 Z{rise - 9.0:.4f}"]
+
+
+@pytest.mark.parametrize("degrees", [44, 46, 65])
+def test_a_tool_that_climbs_steeply_through_stock_is_a_load(degrees):
+    found, _ = judged(climbing(degrees))
+    assert [f.line for f in found] == [9] and found[0].depth > found[0].limit
+    assert degrees == 65 or found[0].depth == pytest.approx(13400.0, rel=0.03)  # no step at 45 degrees
+
+
+@pytest.mark.parametrize(("turn", "feed", "harm"), [("B20", 1000, True), ("B-20", 1000, True), ("B20", 20, False),
+                                                    ("B-20", 5, False)])
+def test_a_tool_that_swings_about_its_tip_has_the_feed_of_its_edge(turn, feed, harm):
+    """One way the flank goes into the stock, the other way the rim of the end; the tip goes 0.01 mm."""
+    setup = replace(SETUP, kinematics=Kinematics("table-table-BC"))
+    lines = ["M428", "G0 X-26 Y-16", "Z-4", "G1 X0 F200", f"G1 X0.01 {turn} F{feed}", "G1 Y-40 F500", "G0 Z60", "B0",
+             "M429"]
+    found, _ = judged(lines, setup=setup)
+    assert [(f.line, f.depth > f.limit, "its edge is fastest" in f.message) for f in found] == [(10, True, True)] * harm
+
+
+def test_ways_of_places_of_a_tool_that_swings():
+    start, end = np.array([[0.0, 0.0, 1.0]]), np.array([[math.sin(0.1), 0.0, math.cos(0.1)]])
+    moves = Moves(np.zeros((1, 3)), np.array([[0.5, 0.0, 0.0]]), np.ones(1, np.bool_), np.zeros(1, np.int32),
+                  ToolAxes.between(start, end))
+    fast, middle = _lengths(moves, np.array([8.0]), [MILL])
+    assert fast[0] == pytest.approx(math.hypot(0.5 + 8 * math.sin(0.1), 8 * (1 - math.cos(0.1))))
+    assert middle[0] == pytest.approx(math.hypot(0.5 + 4 * math.sin(0.1), 4 * (1 - math.cos(0.1))))
+    assert _lengths(moves, np.array([40.0]), [MILL])[1] < 1.2  # no more of it than the flutes
+    fast, _ = _lengths(moves, np.array([0.0]), [MILL])
+    assert fast[0] == pytest.approx(np.hypot(0.5, 0.2), rel=0.02)  # the rim of the end, 2 mm off the axis
+    ball = replace(MILL, corner_radius=2.0)
+    assert _lengths(moves, np.array([0.0]), [ball])[0][0] == pytest.approx(0.5)
+    assert _lengths(replace(moves, axes=None), np.array([8.0]), [MILL])[0].tolist() == [0.5]
 
 
 def test_a_narrow_finish_as_deep_as_the_slot_is_no_load():
