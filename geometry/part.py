@@ -73,6 +73,23 @@ class EdgeInfo:
 
 
 @dataclass(frozen=True, eq=False)
+class OtherSolid:
+    """A solid of the file that is not the part.
+
+    number : 1-based, among the separate solids of the file
+    name   : of its products, '' for none
+    bounds : (2, 3) float64, mm, setup frame
+    """
+
+    number: int
+    name: str
+    bounds: F64
+
+    def __str__(self) -> str:
+        return f"solid {self.number}" + (f" ({self.name})" if self.name else "")
+
+
+@dataclass(frozen=True, eq=False)
 class Part:
     """A solid, ready to plan, in the setup frame (Z up, mm).
 
@@ -90,6 +107,7 @@ class Part:
     uv        : (m, 3, 2) float64, surface parameters (u, v) of the corners of every triangle on its own face, never
                 NaN. They belong to the solid after import: converted to mm, swept surfaces turned into splines. Both
                 sides of a seam have their own values, so no triangle jumps by a period. None for a part without B-rep
+    others    : the other solids of the file, where ``part.solid`` of the setup chose one of several
     """
 
     mesh: TriangleMesh
@@ -104,6 +122,7 @@ class Part:
     warnings: tuple[str, ...]
     sha256: str
     uv: F64 | None = None
+    others: tuple[OtherSolid, ...] = ()
 
     def to_bytes(self) -> bytes:
         """Serialise without pickle (an .npz in memory)."""
@@ -113,6 +132,7 @@ class Part:
                       for e in self.edges],
             "volume": self.volume, "unit": self.unit, "chord": self.chord, "angle": self.angle,
             "deviation": self.deviation, "warnings": list(self.warnings), "sha256": self.sha256,
+            "others": [(o.number, o.name, o.bounds.tolist()) for o in self.others],
         }
         sizes = np.array([len(e.points) for e in self.edges], dtype=np.int64)
         points: NDArray[np.float64] = np.concatenate([e.points for e in self.edges]) if self.edges else np.zeros((0, 3))
@@ -140,7 +160,8 @@ class Part:
             bounds = z["bounds"]
             uv = z["uv"] if "uv" in z else None
         return cls(mesh, tuple(FaceInfo(**f) for f in meta["faces"]), edges, meta["volume"], bounds, meta["unit"],
-                   meta["chord"], meta["angle"], meta["deviation"], tuple(meta["warnings"]), meta["sha256"], uv)
+                   meta["chord"], meta["angle"], meta["deviation"], tuple(meta["warnings"]), meta["sha256"], uv,
+                   tuple(OtherSolid(n, name, np.array(box)) for n, name, box in meta["others"]))
 
 
-__all__ = ["F64", "I32", "EdgeInfo", "EdgeKind", "FaceInfo", "Part"]
+__all__ = ["F64", "I32", "EdgeInfo", "EdgeKind", "FaceInfo", "OtherSolid", "Part"]

@@ -35,6 +35,10 @@ class PartChoice(WireModel):
         description="true: the products of the file are one part, and bodies that overlap or share a face are "
                     "united. false: products that an assembly places are separate solids, and so is a body that only "
                     "touches another.")] = False
+    others: Annotated[Literal["fixtures", "absent"] | None, Field(
+        description="The other solids of the file, where solid names one of several. fixtures: the bounding box of "
+                    "each, in the setup frame, is a fixture. absent: they are not on the machine. null: absent, and "
+                    "proof.assumed lists those that a tool enters.")] = None
 
 
 class Placement(WireModel):

@@ -22,6 +22,7 @@ class AssumedKind(StrEnum):
     HOLDER = "holder"
     ABOVE_HOLDER = "above_holder"
     TABLE = "table"
+    OTHER_SOLIDS = "other_solids"
     RAPID_PATH = "rapid_path"
     PATH_MODE = "path_mode"
     CHANGE_POSITION = "change_position"

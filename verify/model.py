@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64, I32, TriangleMesh
+from geometry.part import OtherSolid
 from geometry.tool_body import ToolBody
 from verify.assumptions import Assumed
 from verify.cutting_words import CuttingWords, ProgramCaution
@@ -65,6 +66,7 @@ class ProofSetup:
                     its lower end; unit vector from there to the other end, not downwards
     stock_mesh    : TriangleMesh, closed, normals outwards, mm, of a blank of kind step, or None
     fixtures      : boxes as (2, 3) float64 corners, mm; each stands down to the table
+    others        : other solids of the part's file, which the proof takes for absent; boxes in its frame
     clearance_*   : mm, radial. A body nearer than this to part, stock or fixture rubs; in a rapid it is a finding.
     clearance_rapid : mm, in every direction, also to what is below the tool
     clearance_approach : mm, to what is below the tool in a rapid straight down before a cut; not over clearance_rapid
@@ -107,6 +109,7 @@ class ProofSetup:
     stock_axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     stock_mesh: TriangleMesh | None = None
     fixtures: tuple[F64, ...] = ()
+    others: tuple[OtherSolid, ...] = ()
     clearance_neck: float = 0.05
     clearance_shank: float = 0.2
     clearance_holder: float = 1.0

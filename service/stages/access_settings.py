@@ -18,7 +18,7 @@ from service.stages.access_plan import ProofFrame
 from service.stages.job_inputs import RAMP_ANGLE, JobInputs
 from service.stages.job_part import JobPart
 from service.stages.preparation import Prepared, table_height
-from service.stages.programs import access_of, fixture_boxes, turning_of
+from service.stages.programs import access_of, fixture_boxes, other_solids, turning_of
 from service.stages.wall_support import FREE_RATIO, in_turn
 from toolpath.plan_settings import LeftAlone, Pattern, PlanSettings, ToolLean
 from toolpath.scallop_budget import ARC_SHARE
@@ -95,7 +95,7 @@ def proof_setup(job: JobPart, view: View | ProofFrame, *, foreign: bool = False)
         stock_kind=inputs.stock.kind, margin=inputs.stock.margin_mm, uncertainty=job.blank.beyond,
         stock_box=job.blank.proof_box(view.rotation), stock_cylinder=cylinder, stock_axis=upwards,
         stock_mesh=job.blank.proof_mesh(view.rotation),
-        fixtures=fixture_boxes(job, view), clearance_neck=c.neck,
+        fixtures=fixture_boxes(job, view), others=other_solids(job, view), clearance_neck=c.neck,
         clearance_shank=c.shank, clearance_holder=c.holder, clearance_rapid=c.rapid,
         clearance_approach=c.approach,
         scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,

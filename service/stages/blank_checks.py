@@ -19,6 +19,7 @@ from geometry.sampling import sample_surface
 from schemas.setup import Setup
 from service.from_wire import face_numbers
 from service.stages.blank_model import Blank
+from service.stages.job_inputs import fixtures_of
 from verify.blank.blank import stock_on_normals
 from verify.model import ProofSetup
 from zones.machinable_area import SEEN, SEEN_SHARE
@@ -225,14 +226,16 @@ def _faces_to_cut(setup: Setup, part: Part) -> np.ndarray:
 
 
 def _check_fixtures(setup: Setup, part: Part) -> None:
-    for number, fixture in enumerate(setup.fixtures):
-        lower, upper = np.array(fixture.box_mm[0], dtype=np.float64), np.array(fixture.box_mm[1], dtype=np.float64)
+    for number, (lower, upper) in enumerate(fixtures_of(setup, part.others)):
+        given = number < len(setup.fixtures)
+        name = f"fixtures[{number}]" if given else f"the box of {part.others[number - len(setup.fixtures)]}"
         shrink = np.minimum(OVERHANG, 0.25 * (upper - lower))
         point = point_of_mesh_in_box(part.mesh, lower + shrink, upper - shrink)
         if point is not None:
             where = f"({', '.join(f'{x:.3f}' for x in point + 0.0)})"
-            raise SetupError(f"fixtures[{number}] stands inside the part: the point {where} of the part is in its box",
-                             code="fixture_in_part", subjects=(f"fixtures[{number}]", where),
-                             measured=[round(float(x), 6) for x in point], limit=fixture.box_mm,
+            raise SetupError(f"{name} stands inside the part: the point {where} of the part is in its box",
+                             code="fixture_in_part", subjects=(name, where),
+                             measured=[round(float(x), 6) for x in point], limit=[lower.tolist(), upper.tolist()],
                              remedy="correct box_mm, which is in the setup frame, or placement.origin_mm; a fixture "
-                                    "may touch the part but not enter it")
+                                    "may touch the part but not enter it" if given else
+                                    "set part.others: absent, and give boxes for what stands there in fixtures")

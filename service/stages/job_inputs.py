@@ -17,6 +17,7 @@ import numpy as np
 from geometry.cutting_mechanics import effective_diameter
 from geometry.mesh import F64
 from geometry.move_timing import Rates
+from geometry.part import OtherSolid
 from geometry.setup_frame import SetupFrame
 from geometry.tool_body import ToolBody
 from output.inverse_kinematics import RotaryMachine
@@ -64,6 +65,7 @@ class JobInputs:
     machine, stock, quality, operations, material : sections of the setup
     clearances    : radial, mm
     fixtures      : (2, 3) float64 each, mm, setup frame, lower and upper corner of a box
+    others        : the other solids of the part's file, where the setup does not state what they are
     rates         : what the machine does
     """
 
@@ -80,6 +82,7 @@ class JobInputs:
     machine: Machine
     stock: Stock
     fixtures: tuple[F64, ...]
+    others: tuple[OtherSolid, ...]
     clearances: Clearances
     quality: Quality
     operations: Operations
@@ -88,13 +91,13 @@ class JobInputs:
     rates: Rates
 
     @classmethod
-    def of(cls, setup: Setup) -> JobInputs:
-        """The inputs of a job from its setup."""
+    def of(cls, setup: Setup, others: Sequence[OtherSolid] = ()) -> JobInputs:
+        """The inputs of a job from its setup; others : the other solids of the part's file."""
         c, bodies = setup.clearance_mm, tool_bodies(setup)
         return cls(setup_sha256(setup), setup.labels, setup.part.solid, setup.part.fuse, placement_of(setup),
                    tuple(setup.access), tuple(setup.tools), bodies, _cut_table(setup, bodies),
                    gauge_lengths(setup.tools, bodies), setup.machine, setup.stock,
-                   tuple(np.array(f.box_mm, dtype=np.float64) for f in setup.fixtures),
+                   fixtures_of(setup, others), () if setup.part.others else tuple(others),
                    Clearances(c.neck, c.shank, c.holder, c.rapid, c.approach), setup.quality, setup.operations,
                    setup.material, material_name(setup), rates_of(setup))
 
@@ -183,6 +186,12 @@ class JobInputs:
         """Largest spacing of the stock, mm, at which engaged angles can be told apart; inf where none is limited."""
         return min((ENGAGEMENT_SHARE * 0.5 * t.diameter_mm for t in self.tools
                     if (t.max_engagement_deg or SLOT_DEG) < SLOT_DEG), default=math.inf)
+
+
+def fixtures_of(setup: Setup, others: Sequence[OtherSolid]) -> tuple[F64, ...]:
+    """Fixtures as (2, 3) float64, mm, setup frame: those of the setup, then the other solids that it takes for some."""
+    boxes = [np.array(f.box_mm, dtype=np.float64) for f in setup.fixtures]
+    return (*boxes, *(o.bounds for o in others if setup.part.others == "fixtures"))
 
 
 def _cut_table(setup: Setup, bodies: Sequence[ToolBody]) -> dict[str, CutData]:

@@ -94,7 +94,7 @@ def read_job_part(path: Path, setup: Setup, progress: Progress, blank_path: Path
     part = load(path, setup) if reading is None else reading.part()
     blank = blank_of(setup, part, None if blank_path is None else load_blank(blank_path, setup))
     check_against_part(setup, part, blank)
-    inputs = JobInputs.of(setup)
+    inputs = JobInputs.of(setup, part.others)
     solid_warnings = () if blank.solid is None else (f"the blank: {w}" for w in blank.solid.warnings)
     return ReadPart(inputs, part, blank, inputs.accesses, (*part.warnings, *solid_warnings))
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from geometry.errors import InternalError, OutputError
 from geometry.mesh import F64
+from geometry.part import OtherSolid
 from geometry.surfaces.nurbs import NurbsSurface
 from geometry.tool_body import ToolBody
 from output.arc_fitting import fitted
@@ -47,6 +48,11 @@ NO_HOLDER = 200.0  # mm of shank above the stickout that are assumed where the s
 def fixture_boxes(job: JobPart, view: View | ProofFrame) -> tuple[np.ndarray, ...]:
     """Boxes around the fixtures, each (2, 3) float64, mm, in the frame of a view."""
     return tuple(turned_box(box, view.rotation) for box in job.inputs.fixtures)
+
+
+def other_solids(job: JobPart, view: View | ProofFrame) -> tuple[OtherSolid, ...]:
+    """The other solids of the part's file that the setup does not speak of, boxes in the frame of a view."""
+    return tuple(replace(o, bounds=turned_box(o.bounds, view.rotation)) for o in job.inputs.others)
 
 
 def access_of(job: JobPart, view: View | ProofFrame) -> Access:

@@ -1,5 +1,6 @@
 """Blanks and fixtures that contradict the part are refused before anything is planned."""
 
+from copy import copy
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,15 +8,17 @@ import pytest
 
 from geometry.errors import CamError, SetupError
 from geometry.mesh import TriangleMesh
+from geometry.part import OtherSolid
 from service.errors import problem_document
 from service.from_wire import parse_setup
 from service.stages.blank_checks import check_against_part
 from service.stages.blank_model import blank_of
+from service.stages.job_inputs import JobInputs
 from tests.unit.geometry.mesh_queries.test_box_overlap import block
 
 TOOLS = [{"id": "T1", "kind": "ball", "diameter_mm": 3}]
 PART = SimpleNamespace(mesh=block([-10, -5, 0], [10, 5, 8]), bounds=np.array([[-10.0, -5, 0], [10, 5, 8]]),
-                       volume=20.0 * 10 * 8)
+                       volume=20.0 * 10 * 8, others=())
 
 
 def checked(setup, part):
@@ -69,7 +72,7 @@ def test_no_stock():
 
 
 def test_a_box_at_finished_size_round_a_part_with_pockets_is_stock():
-    pocketed = SimpleNamespace(mesh=PART.mesh, bounds=PART.bounds, volume=0.9 * PART.volume)
+    pocketed = SimpleNamespace(mesh=PART.mesh, bounds=PART.bounds, volume=0.9 * PART.volume, others=())
     checked(parse_setup({"tools": TOOLS, "stock": {"kind": "box", "margin_mm": 0, "uncertainty_mm": 0}}), pocketed)
 
 
@@ -116,7 +119,7 @@ def test_every_side_that_holds_too_little_is_named_the_worst_first_and_the_under
 def test_only_what_is_to_be_machined_leaves_an_allowance():
     ids = np.repeat(np.arange(1, 7), 2).astype(np.int32)  # bottom, top, -Y, +Y, -X, +X as in block()
     part = SimpleNamespace(mesh=TriangleMesh(PART.mesh.vertices, PART.mesh.faces, ids), bounds=PART.bounds,
-                           volume=PART.volume)
+                           volume=PART.volume, others=())
 
     def check(side, **operations):
         checked(parse_setup({"tools": TOOLS, "stock": holding(side, 0.0), "operations": operations,
@@ -136,7 +139,7 @@ def test_an_allowance_is_measured_along_the_normal():
     turn = np.radians(30.0)
     spin = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1.0]])
     mesh = TriangleMesh(PART.mesh.vertices @ spin.T, PART.mesh.faces, PART.mesh.face_ids)
-    part = SimpleNamespace(mesh=mesh, bounds=mesh.bounds, volume=PART.volume)
+    part = SimpleNamespace(mesh=mesh, bounds=mesh.bounds, volume=PART.volume, others=())
 
     def check(room):
         box = mesh.bounds + np.array([[-room, -room, 0], [room, room, 3.0]])
@@ -158,6 +161,26 @@ def test_a_fixture_in_the_part():
     assert (abs(point) <= [2, 2, 8.001]).all() and point[2] >= 0
     accepted(fixtures=[clear, {"box_mm": [[-2, -2, 7.995], [2, 2, 30]]}])
     refused("fixture_in_part", fixtures=[{"box_mm": [[0, 0, 4], [0.001, 0.001, 4.001]]}])
+
+
+def test_the_box_of_another_solid_in_the_part_is_refused_where_it_is_a_fixture():
+    part = copy(PART)
+    part.others = (OtherSolid(1, "clamp", np.array([[10.0, -5, 0], [30, 5, 8]])),
+                   OtherSolid(3, "", np.array([[5.0, -5, 0], [30, 5, 8]])))
+    for others in (None, "absent"):
+        checked(parse_setup({"tools": TOOLS, "part": {"others": others}}), part)
+    with pytest.raises(SetupError) as caught:
+        checked(parse_setup({"tools": TOOLS, "part": {"others": "fixtures"}}), part)
+    assert caught.value.code == "fixture_in_part" and caught.value.subjects[0] == "the box of solid 3"
+    assert "part.others: absent" in caught.value.remedy
+
+
+@pytest.mark.parametrize(("others", "boxes", "open_"), [(None, 1, 1), ("absent", 1, 0), ("fixtures", 2, 0)])
+def test_other_solids_are_fixtures_absent_or_open(others, boxes, open_):
+    setup = parse_setup({"tools": TOOLS, "part": {"others": others}, "fixtures": [{"box_mm": [[0, 0, 9], [1, 1, 10]]}]})
+    inputs = JobInputs.of(setup, (OtherSolid(1, "clamp", np.array([[10.0, -5, 0], [30, 5, 8]])),))
+    assert len(inputs.fixtures) == boxes and len(inputs.others) == open_
+    assert boxes == 1 or inputs.fixtures[1].tolist() == [[10, -5, 0], [30, 5, 8]]
 
 
 def test_repeated_names_are_refused():

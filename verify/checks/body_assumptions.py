@@ -11,6 +11,7 @@ from geometry.tool_body import ToolBody
 from verify.assumptions import Assumed, AssumedKind
 from verify.checks.clear_height import top_of_all
 from verify.checks.empty_spindle import EMPTY, SMALLEST_NOSE
+from verify.checks.other_solids import other_assumptions
 from verify.checks.program_sequence import FramedProgram
 from verify.findings import Source
 from verify.material.free_width import LARGEST, free_holder_width
@@ -28,7 +29,8 @@ def body_assumptions(read: Sequence[FramedProgram], part: Part, moves: Moves, so
     part, moves : in the frame of the proof, mm; ``tools`` are those that ``moves`` refers to
     """
     return [*length_assumptions(read, setup), *_holders(part, moves, source, tools, setup, threads),
-            *_above_holders(part, moves, tools, setup), *_table(read), *_changes(read)]
+            *_above_holders(part, moves, tools, setup), *_table(read), *_changes(read),
+            *other_assumptions(moves, source, tools, setup)]
 
 
 def length_assumptions(read: Sequence[FramedProgram], setup: ProofSetup) -> Iterator[Assumed]:

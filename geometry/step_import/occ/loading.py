@@ -6,15 +6,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from OCP.gp import gp_Trsf
+from OCP.TopLoc import TopLoc_Location
 
-from geometry.part import EdgeInfo, FaceInfo, Part
+from geometry.mesh import F64
+from geometry.part import EdgeInfo, FaceInfo, OtherSolid, Part
 from geometry.setup_frame import SetupFrame
 from geometry.step_import.occ.curvature import face_info, surface_name
 from geometry.step_import.occ.edges import edge_infos
 from geometry.step_import.occ.meshing import SolidMesh, mesh_solid
 from geometry.step_import.occ.reading import StepShape, read_shape
 from geometry.step_import.occ.sizes import REFUSE_ABOVE, REFUSE_BELOW, check_size, doubts
-from geometry.step_import.occ.solid.healing import one_solid, swept_as_splines
+from geometry.step_import.occ.solid.healing import Body, one_solid, swept_as_splines
 from geometry.step_import.occ.topology import Shape, box_of, exact_volume, faces_of, quick_box
 from geometry.step_import.reader import check_tolerances
 
@@ -32,12 +35,14 @@ class LoadedSolid:
     body     : kernel solid, STEP coordinates, mm
     surfaces : kind of surface of each face in the file
     warnings : doubts and changes, as sentences; later stages append
+    others   : the other bodies of the file with their numbers
     """
 
     step: StepShape
     body: Shape
     surfaces: list[str]
     warnings: list[str]
+    others: list[tuple[int, Body]]
 
 
 def load_solid(path: str | Path, solid: int | None = None, fuse: bool = False) -> LoadedSolid:
@@ -45,10 +50,10 @@ def load_solid(path: str | Path, solid: int | None = None, fuse: bool = False) -
     step = read_shape(path)
     warnings = list(step.warnings)
     _check_size(step.shape, step)
-    body = one_solid(step.products, solid, warnings, fuse=fuse)
+    body, others = one_solid(step.products, solid, warnings, fuse=fuse)
     _check_size(body, step)
     surfaces = [surface_name(f) for f in faces_of(body)]
-    return LoadedSolid(step, swept_as_splines(body), surfaces, warnings)
+    return LoadedSolid(step, swept_as_splines(body), surfaces, warnings, others)
 
 
 def load_part(path: str | Path, *, placement: SetupFrame | None = None, solid: int | None = None,
@@ -75,7 +80,15 @@ def load_part(path: str | Path, *, placement: SetupFrame | None = None, solid: i
     moved = mesh.mesh.transformed(matrix)
     return Part(mesh=moved, faces=faces, edges=tuple(_moved(e, matrix) for e in edges), volume=volume,
                 bounds=moved.bounds, unit=step.unit, chord=chord, angle=angle, deviation=mesh.deviation,
-                warnings=tuple(dict.fromkeys(warnings)), sha256=step.text.sha256, uv=mesh.uv)
+                warnings=tuple(dict.fromkeys(warnings)), sha256=step.text.sha256, uv=mesh.uv,
+                others=tuple(OtherSolid(n, b.name, box_of(_placed(b.shape, matrix))) for n, b in loaded.others))
+
+
+def _placed(shape: Shape, matrix: F64) -> Shape:
+    """The shape in the setup frame; matrix : (4, 4) float64, mm, from STEP coordinates to it."""
+    turn = gp_Trsf()
+    turn.SetValues(*matrix[:3].ravel().tolist())
+    return shape.Moved(TopLoc_Location(turn))
 
 
 def _check_size(shape: Shape, step: StepShape) -> None:

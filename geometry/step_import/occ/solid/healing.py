@@ -60,7 +60,8 @@ class Body:
         return {p.path for p in self.products}
 
 
-def one_solid(products: Sequence[Product], solid: int | None, warnings: list[str], *, fuse: bool = False) -> Shape:
+def one_solid(products: Sequence[Product], solid: int | None, warnings: list[str], *,
+              fuse: bool = False) -> tuple[Shape, list[tuple[int, Body]]]:
     """Reduce the products of a file to the one solid to machine.
 
     products : Product each
@@ -68,7 +69,7 @@ def one_solid(products: Sequence[Product], solid: int | None, warnings: list[str
     warnings : sentences are appended for every change made
     fuse     : all products are one part: bodies that overlap or share a face are united, also those of two products
 
-    Returns a closed kernel solid with its normals outward.
+    Returns a closed kernel solid with its normals outward, and the other bodies with their numbers.
 
     Raises
     ------
@@ -88,9 +89,11 @@ def one_solid(products: Sequence[Product], solid: int | None, warnings: list[str
     if len(bodies) > 1:
         bodies, met = _united(bodies, solid, fuse, warnings)
     if solid is not None and len(bodies) > 1:
-        warnings.append(f"solid {solid} of {len(bodies)} is the part; what stands beside it in the file counts only "
-                        "where the setup has it as a fixture")
-    return _outward(_valid(_chosen(bodies, solid, met, fuse), warnings), warnings)
+        warnings.append(f"solid {solid} of {len(bodies)} is the part; the others count only where the setup has "
+                        "part.others: fixtures")
+    chosen = _chosen(bodies, solid, met, fuse)
+    others = [(n, b) for n, b in enumerate(bodies, 1) if b.shape is not chosen]
+    return _outward(_valid(chosen, warnings), warnings), others
 
 
 def _bodies(products: Sequence[Product], warnings: list[str]) -> list[Body]:

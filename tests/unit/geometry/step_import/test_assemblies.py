@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from geometry.errors import PartError
+from geometry.part import Part
+from geometry.setup_frame import SetupFrame
 from geometry.step_import.occ.loading import load_part
 from geometry.step_import.reader import read_part
 from tests.step_files import write_step
@@ -60,6 +62,16 @@ def test_each_product_can_be_chosen(tmp_path):
     assert bolt.bounds[:, 2] == pytest.approx([-3, 13])
     assert [len(p.warnings) for p in (plate, bolt)] == [1, 1] and "solid 2 of 2 is the part" in bolt.warnings[0]
     assert refused(path, solid=3).code == "no_such_solid"
+
+
+def test_the_solids_that_are_not_the_part_have_boxes_in_the_setup_frame(tmp_path):
+    path = plate_and_bolt(tmp_path / "asm.step")
+    part = load_part(path, solid=1, placement=SetupFrame((0, 0, 3), (1, 0, 0), (0, 1, 0)))
+    (other,) = Part.from_bytes(part.to_bytes()).others
+    assert str(other) == "solid 2 (bolt)" and other.number == 2
+    assert other.bounds == pytest.approx(np.array([[-4, -6, -4], [4, 10, 4]]), abs=1e-6)
+    assert str(load_part(path, solid=2).others[0]).startswith("solid 1 (plate")
+    assert not load_part(path, fuse=True).others
 
 
 def test_fuse_makes_one_part_of_all_products(tmp_path):
@@ -144,7 +156,7 @@ def test_a_group_of_bodies_beside_those_of_its_product_is_no_part_of_its_own():
     hub, blade = box(20, 20, 10).wrapped, box(4, 2, 30, (8, 5, 5)).wrapped
     notes = []
     placed = [Product("group", blade, (0, 1)), Product("root", hub, (0,))]
-    assert cq.Solid(one_solid(placed, None, notes)).Volume() == pytest.approx(4000 + 8 * 25)
+    assert cq.Solid(one_solid(placed, None, notes)[0]).Volume() == pytest.approx(4000 + 8 * 25)
     assert notes == ["2 solids (group, root) that touch or overlap were fused into 1"]
     with pytest.raises(PartError, match="solid 2 overlaps solid 1"):
         one_solid([Product("blade", blade, (0, 1)), Product("hub", hub, (0, 2))], None, [])
