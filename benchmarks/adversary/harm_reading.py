@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from benchmarks.adversary.adversary_case import REFUSED, SAFE, Case, Op, Script, made, number
-from benchmarks.adversary.adversary_parts import BALL, FEED, FLAT, OUT, PARTS, rows, spread
+from benchmarks.adversary.adversary_parts import BALL, FEED, FLAT, OUT, PARTS, R, rows, spread
 from benchmarks.adversary.harm_surface import base, choice
 
 Rng = np.random.Generator
@@ -240,6 +241,43 @@ def deep_slot(rng: Rng) -> Case:
     return made("deep slot", "plate", s, ("load", "deflection"), None, None, setup, what=f"{deep:.1f} deep")
 
 
+def bends_too_far(rng: Rng) -> Case:
+    """A tool so slender that it bends by more than half a mm in sound cuts."""
+    part, long = choice(rng, *LEVEL), float(rng.uniform(220.0, 300.0))
+    slim = {**FLAT, "stickout_mm": long}
+    return made("bends too far", part, PARTS[part].program(), ("load",), None, None, {"tools": [slim, BALL]},
+                what=f"{long:.0f} mm of D6")
+
+
+def steep_climb(rng: Rng) -> Case:
+    """Up through stock from beside it, steeper than 45 degrees and many diameters deep."""
+    long = {**FLAT, "flute_length_mm": 30, "stickout_mm": 60}
+    s, deep, angle = Script(group="harm"), float(rng.uniform(18.0, 26.0)), float(rng.uniform(47.0, 65.0))
+    x0, y0, x1, y1, top = PARTS["plate"].size
+    s.tool(1)
+    s.rapid(float(rng.uniform(4.0, 20.0)), -OUT)
+    s.rapid(z=SAFE + 20.0)
+    s.rapid(z=top + deep + 2.0)
+    s.feed(z=top, feed=3000.0)
+    s.feed(y=y0 - R - 0.1)
+    climb = s.feed(y=y0 - R - 0.1 + (deep + 1.0) / math.tan(math.radians(angle)), z=top + deep + 1.0, feed=3000.0)
+    s.rapid(z=SAFE + 20.0)
+    setup = {"tools": [long, BALL], "material": "Ti-6Al-4V",
+             "stock": {"box_mm": [[x0, y0, 0.0], [x1, y1, top + deep]]}}
+    return made("steep climb", "plate", s, ("load",), [climb], None, setup, what=f"{angle:.0f} deg, {deep:.1f} deep")
+
+
+def stands_behind_taps(rng: Rng) -> Case:
+    """A tapping cycle in the air leaves the spindle standing, and nothing starts it again."""
+    part, name = choice(rng, *LEVEL), choice(rng, "fanuc rigid", "fanuc", "haas")
+    dialect, rigid = name.split()[0], "rigid" in name
+    s = PARTS[part].program()
+    cycle = f"{choice(rng, 'G98', 'G99')} {choice(rng, 'G84', 'G74')} R{SAFE - 1.0:g}. Z{SAFE - 3.0:g}. F500."
+    s.ops[2:2] = [Op("raw", text=line) for line in (*(["M29 S500"] * rigid), cycle, "G80", f"G0 Z{SAFE:g}.")]
+    return made("stands behind taps", part, s, ("program",), None, None, {"machine": {"dialects": [dialect]}}, dialect,
+                word="spindle")
+
+
 def surface_speed(rng: Rng) -> Case:
     """A speed in titanium over 31 times the recommended one: the cutter burns."""
     part = choice(rng, "plate", "step")
@@ -269,4 +307,5 @@ MECHANISMS = {"wrong length offset": wrong_length_offset, "no length offset": no
               "sense of rotary axes": sense_of_rotary_axes, "inch for mm": inch, "wrong zero": wrong_zero,
               "G91 left on": incremental_left_on, "block delete": block_delete, "pasted twice": pasted_twice,
               "over a limit": over_limit, "chip too thick": chip_too_thick, "deep slot": deep_slot,
-              "surface speed": surface_speed, "ends in the part": below_at_end}
+              "surface speed": surface_speed, "ends in the part": below_at_end, "bends too far": bends_too_far,
+              "steep climb": steep_climb, "stands behind taps": stands_behind_taps}
