@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
+from zones.kernels.distance_transform import nearest_blocked
 from zones.kernels.lattice import LatticeFrame
 
 
@@ -20,6 +21,19 @@ def lattice_step(tool: ToolBody) -> float:
     strips are not planned; see ``touchable``.
     """
     return float(np.clip(tool.radius / 10.0, 0.05, 0.15))
+
+
+def blocked_beside(free: NDArray[np.bool_], step: float) -> tuple[F64, NDArray[np.int32]]:
+    """Distance of each node from the nearest one that is not free, and which that is.
+
+    free : (ny, nx) bool, not all of them free
+    step : mm, spacing of the nodes
+
+    Returns (ny, nx) float64, mm, and (2, ny, nx) int32, rows and columns; of several at one distance any.
+    """
+    far, near = np.empty(free.shape), np.empty((2, *free.shape), np.int32)
+    nearest_blocked(np.ascontiguousarray(free), step, far, near)
+    return far, near
 
 
 @dataclass(frozen=True)

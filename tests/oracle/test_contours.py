@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 import pytest
 
 from tests.hand_parts import ball, field_of, terraces, tool
 from tests.plan_checks import dense
-from toolpath.passes.contours import contours
+from toolpath.passes.contours import contours, wall_distance
 
 shapely = pytest.importorskip("shapely")
 
@@ -55,3 +56,21 @@ def test_every_point_of_a_waterline_is_free_touches_and_has_the_wall_on_its_righ
         probe = line.points[:-1, :2] + 0.5 * step + 0.02 * right
         inside = shapely.contains(exact, shapely.points(probe))
         assert inside[length > 0.02].mean() > 0.99
+
+
+def test_distances_from_walls_are_exact_and_the_same_on_one_thread_and_two():
+    body, threads, found = ball(2.0), numba.get_num_threads(), []
+    exact = plan().buffer(body.radius, quad_segs=400)
+    try:
+        for n in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
+            numba.set_num_threads(n)
+            field = field_of(terraces(XS, YS, np.maximum(HEIGHTS, 0.0), -2.0), body)
+            found.append(wall_distance(field, 1.0, np.ones((field.lattice.ny, field.lattice.nx), bool)))
+    finally:
+        numba.set_num_threads(threads)
+    assert np.array_equal(*found)
+    rows, cols = np.nonzero(found[0] > 0.0)
+    true = shapely.distance(shapely.points(field.lattice.nodes(rows, cols, 0.0)[:, :2]), exact)
+    # a chord is off the round by step^2 / (4 r) at the most; cusps are narrower than the lattice sees
+    off = np.abs(found[0][rows, cols] - true)
+    assert np.quantile(off, 0.97) <= field.lattice.step**2 / (4.0 * body.radius) and off.max() <= field.lattice.step

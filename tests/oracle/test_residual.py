@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 import pytest
 
@@ -112,3 +113,20 @@ def test_a_place_is_left_with_no_more_than_its_sample_says(body, upright):
     most = every.residual.reshape(n, -1).max(axis=1)
     assert (most - made.residual)[said].max() <= 1e-9
     assert made.residual.min() == pytest.approx(0.004, abs=1e-6)
+
+
+def test_the_same_bytes_on_one_thread_and_two():
+    rng = np.random.default_rng(2)
+    points = rng.random((60_000, 3)) * [20.0, 16.0, 2.0]
+    normals = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.6, 0.0, 0.8]])[rng.integers(0, 3, len(points))]
+    path = np.cumsum(rng.normal(size=(60, 3)) * [3.0, 3.0, 0.1], axis=0) % [20.0, 16.0, 2.0]
+    threads, found = numba.get_num_threads(), []
+    try:
+        for n in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
+            numba.set_num_threads(n)
+            made = ResidualMap(points, normals, covers=np.full(len(points), 0.02))
+            made.cut(path, ball(3.0))
+            found.append(made.residual)
+    finally:
+        numba.set_num_threads(threads)
+    assert np.array_equal(*found) and (found[0] < UNTOUCHED).mean() > 0.2

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 
 SECTORS = 36
 """Of the half circle: an angle is known to a 36th of it."""
@@ -38,46 +38,66 @@ def _sector(sine):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def engaged(top, x0, y0, step, tips, ways, radius, corner, skin, window, out):
-    """Angle in stock, rad, at tips (n, 3), mm, on their ways (n, 2), unit, into ``out`` (n,).
-
-    top    : (ny, nx) mm, at nodes ``step`` mm apart from (x0, y0) on
-    skin   : mm of stock over the cutter that is not counted
-    window : mm of way before a tip, over which sectors are put together
-    """
+def _sectors(k, top, x0, y0, step, tips, ways, radius, corner, skin, bits):
+    """The sectors of tip k in stock, as bits, into ``bits`` (n,) int64; parameters as in ``sectors``."""
     ny, nx = top.shape
-    bits = np.zeros(len(tips), np.int64)
+    x, y, z = tips[k]
+    i0, i1 = max(int(math.ceil((y - radius - y0) / step)), 0), min(int((y + radius - y0) / step), ny - 1)
+    j0, j1 = max(int(math.ceil((x - radius - x0) / step)), 0), min(int((x + radius - x0) / step), nx - 1)
+    for i in range(i0, i1 + 1):
+        if bits[k] == ALL:
+            break
+        for j in range(j0, j1 + 1):
+            over = top[i, j] - z
+            if over <= skin:
+                continue
+            wx, wy = x0 + step * j - x, y0 + step * i - y
+            if ways[k, 0] * wx + ways[k, 1] * wy < -step:
+                continue
+            rho = math.sqrt(wx * wx + wy * wy)
+            bottom = 0.0
+            if rho > radius - corner:
+                run = min(rho - radius + corner, corner)
+                bottom = corner - math.sqrt(max(corner * corner - run * run, 0.0))
+            if rho > radius or over - bottom <= skin:
+                continue
+            edge = radius
+            if over < corner:
+                edge = radius - corner + math.sqrt(max(over * (2.0 * corner - over), 0.0))
+            side = ways[k, 0] * wy - ways[k, 1] * wx
+            low, high = _sector((side - 0.5 * step) / edge), _sector((side + 0.5 * step) / edge)
+            if over >= corner and side + step > edge:
+                high = SECTORS - 1
+            if over >= corner and side - step < -edge:
+                low = 0
+            bits[k] |= (np.int64(2) << high) - (np.int64(1) << low)
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True, parallel=True)
+def sectors_parallel(top, x0, y0, step, tips, ways, radius, corner, skin, bits):
+    """``sectors`` on the threads numba has."""
+    for k in prange(len(tips)):
+        _sectors(k, top, x0, y0, step, tips, ways, radius, corner, skin, bits)
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def sectors(top, x0, y0, step, tips, ways, radius, corner, skin, bits):
+    """Sectors in stock, as bits, at tips (n, 3), mm, on their ways (n, 2), unit, into ``bits`` (n,) int64, zeros.
+
+    top  : (ny, nx) mm, at nodes ``step`` mm apart from (x0, y0) on
+    skin : mm of stock over the cutter that is not counted
+    """
     for k in range(len(tips)):
-        x, y, z = tips[k]
-        i0, i1 = max(int(math.ceil((y - radius - y0) / step)), 0), min(int((y + radius - y0) / step), ny - 1)
-        j0, j1 = max(int(math.ceil((x - radius - x0) / step)), 0), min(int((x + radius - x0) / step), nx - 1)
-        for i in range(i0, i1 + 1):
-            if bits[k] == ALL:
-                break
-            for j in range(j0, j1 + 1):
-                over = top[i, j] - z
-                if over <= skin:
-                    continue
-                wx, wy = x0 + step * j - x, y0 + step * i - y
-                if ways[k, 0] * wx + ways[k, 1] * wy < -step:
-                    continue
-                rho = math.sqrt(wx * wx + wy * wy)
-                bottom = 0.0
-                if rho > radius - corner:
-                    run = min(rho - radius + corner, corner)
-                    bottom = corner - math.sqrt(max(corner * corner - run * run, 0.0))
-                if rho > radius or over - bottom <= skin:
-                    continue
-                edge = radius
-                if over < corner:
-                    edge = radius - corner + math.sqrt(max(over * (2.0 * corner - over), 0.0))
-                side = ways[k, 0] * wy - ways[k, 1] * wx
-                low, high = _sector((side - 0.5 * step) / edge), _sector((side + 0.5 * step) / edge)
-                if over >= corner and side + step > edge:
-                    high = SECTORS - 1
-                if over >= corner and side - step < -edge:
-                    low = 0
-                bits[k] |= (np.int64(2) << high) - (np.int64(1) << low)
+        _sectors(k, top, x0, y0, step, tips, ways, radius, corner, skin, bits)
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def joined(bits, tips, window, out):
+    """Angles, rad, of the sectors met over ``window`` mm of way before each tip and there, into ``out`` (n,).
+
+    bits : (n,) int64, of ``sectors``; tips : (n, 3) mm
+    """
+    for k in range(len(tips)):
         joint, way, m = bits[k], 0.0, k
         while m > 0 and joint != 0:
             way += math.sqrt((tips[m, 0] - tips[m - 1, 0]) ** 2 + (tips[m, 1] - tips[m - 1, 1]) ** 2)

@@ -18,12 +18,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 from numpy.typing import NDArray
 
 from geometry.kernels.cutter_sizes import CutterSizes
 
 FAR = 1e3
+BANDS = 16  # of the rows of cells, shared among the threads
 BELOW = 1e-6  # mm that a sharp-cornered end may stand over a place of a wall, whose tip a program has rounded
 LEVEL_PLANE, UPRIGHT = 1, 2
 
@@ -116,7 +117,23 @@ def lower(points, level, squares: PlaceSquares, cells: SampleCells, path, cutter
 
     level (n,): 1 on a level plane, 2 on a wall, else 0; margin: mm beyond the cutter within which it is measured.
     """
-    cell_start, cell_items, gx, gy, cell, ncx, ncy = cells
+    _lower_rows(points, level, squares, cells, path, cutter, margin, 0, cells.ncy, residual)
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True, parallel=True)
+def lower_parallel(points, level, squares: PlaceSquares, cells: SampleCells, path, cutter: CutterSizes, margin,
+                   residual):
+    """``lower`` on the threads numba has, each over bands of rows of cells; the same bytes on any number of them."""
+    for band in prange(BANDS):
+        _lower_rows(points, level, squares, cells, path, cutter, margin, cells.ncy * band // BANDS,
+                    cells.ncy * (band + 1) // BANDS, residual)
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _lower_rows(points, level, squares: PlaceSquares, cells: SampleCells, path, cutter: CutterSizes, margin, first, end,
+                residual):
+    """``lower`` for the samples in the rows of cells from ``first`` to before ``end``."""
+    cell_start, cell_items, gx, gy, cell, ncx, _ncy = cells
     radius, corner, flute, _cone = cutter
     for k in range(len(path) - 1):
         a, b = path[k], path[k + 1]
@@ -125,8 +142,8 @@ def lower(points, level, squares: PlaceSquares, cells: SampleCells, path, cutter
         r = radius + margin
         j0 = max(int((min(a[0], b[0]) - r - gx) / cell), 0)
         j1 = min(int((max(a[0], b[0]) + r - gx) / cell), ncx - 1)
-        i0 = max(int((min(a[1], b[1]) - r - gy) / cell), 0)
-        i1 = min(int((max(a[1], b[1]) + r - gy) / cell), ncy - 1)
+        i0 = max(int((min(a[1], b[1]) - r - gy) / cell), first)
+        i1 = min(int((max(a[1], b[1]) + r - gy) / cell), end - 1)
         z_lo, z_hi = min(a[2], b[2]) - margin, max(a[2], b[2]) + flute
         for i in range(i0, i1 + 1):
             for j in range(j0, j1 + 1):

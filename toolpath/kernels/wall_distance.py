@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 
 from geometry.kernels.options import KERNEL
 
@@ -56,10 +56,56 @@ def _to_chain(px, py, start, reach, after, before, points, begins, least):
 
 
 @njit(**KERNEL)
-def from_boundary(ids, after, before, points, begins, window, nearest, asked, frame, far):
+def places_of(ids, window):
+    """(2 rows columns,) int64: the place on each lattice edge of a window, -1 for none; parameters as below."""
+    place = np.full(2 * window[2] * window[3], -1, np.int64)
+    for k in range(len(ids)):
+        place[ids[k]] = k
+    return place
+
+
+@njit(**KERNEL)
+def _row(i, place, after, before, points, begins, window, nearest, asked, frame, far):
+    """One row of ``from_boundary``."""
+    x0, y0, step = frame
+    row, col, rows, cols = window
+    for j in range(far.shape[1]):
+        if not asked[i, j]:
+            continue
+        bi, bj = nearest[0, i, j] - row, nearest[1, i, j] - col
+        if not (0 <= bi < rows and 0 <= bj < cols):
+            continue
+        px, py = x0 + step * j, y0 + step * i
+        node = bi * cols + bj
+        reach = int(math.sqrt(2.0 * far[i, j] / step)) + MORE
+        least = np.inf
+        for side in range(4):  # right, up, left, down
+            if side == 2 and bj == 0 or side == 3 and bi == 0:
+                continue
+            edge = 2 * node + (side & 1)
+            if side == 2:
+                edge -= 2
+            elif side == 3:
+                edge -= 2 * cols
+            if place[edge] >= 0:
+                least = _to_chain(px, py, place[edge], reach, after, before, points, begins, least)
+        if least < np.inf:
+            far[i, j] = math.sqrt(least) if far[i, j] > 0.0 else -math.sqrt(least)
+
+
+@njit(**KERNEL, parallel=True)
+def from_boundary_parallel(place, after, before, points, begins, window, nearest, asked, frame, far):
+    """``from_boundary`` on the threads numba has; the same bytes on any number of them."""
+    for i in prange(far.shape[0]):
+        _row(i, place, after, before, points, begins, window, nearest, asked, frame, far)
+
+
+@njit(**KERNEL)
+def from_boundary(place, after, before, points, begins, window, nearest, asked, frame, far):
     """Replaces the distances of the nodes asked for by those from the boundary, mm, less than 0 for blocked nodes.
 
-    ids           : (n,) int64, lattice edge of each place in the window, numbered as in ``toolpath.kernels.contour``
+    place         : (2 rows columns,) int64, of ``places_of``, for the lattice edges of the window, numbered as in
+                    ``toolpath.kernels.contour``
     after, before : (n,) int64, place that follows and precedes each on its chain, -1 for none
     points        : (m, 2) float64, mm, places with the points put in behind each
     begins        : (n + 1,) int64, where the points of each place begin
@@ -69,31 +115,5 @@ def from_boundary(ids, after, before, points, begins, window, nearest, asked, fr
     frame         : LatticeFrame
     far           : (ny, nx) float64, mm, distance of each node from the blocked node nearest to it
     """
-    x0, y0, step = frame
-    row, col, rows, cols = window
-    place = np.full(2 * rows * cols, -1, np.int64)
-    for k in range(len(ids)):
-        place[ids[k]] = k
     for i in range(far.shape[0]):
-        for j in range(far.shape[1]):
-            if not asked[i, j]:
-                continue
-            bi, bj = nearest[0, i, j] - row, nearest[1, i, j] - col
-            if not (0 <= bi < rows and 0 <= bj < cols):
-                continue
-            px, py = x0 + step * j, y0 + step * i
-            node = bi * cols + bj
-            reach = int(math.sqrt(2.0 * far[i, j] / step)) + MORE
-            least = np.inf
-            for side in range(4):  # right, up, left, down
-                if side == 2 and bj == 0 or side == 3 and bi == 0:
-                    continue
-                edge = 2 * node + (side & 1)
-                if side == 2:
-                    edge -= 2
-                elif side == 3:
-                    edge -= 2 * cols
-                if place[edge] >= 0:
-                    least = _to_chain(px, py, place[edge], reach, after, before, points, begins, least)
-            if least < np.inf:
-                far[i, j] = math.sqrt(least) if far[i, j] > 0.0 else -math.sqrt(least)
+        _row(i, place, after, before, points, begins, window, nearest, asked, frame, far)

@@ -19,6 +19,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
+from geometry.mesh_queries.drop import one_thread
 from geometry.mesh_queries.revolved_outline import Outline
 from toolpath.kernels.contour import (
     MAX_PER_CHORD,
@@ -31,9 +32,10 @@ from toolpath.kernels.contour import (
     trace,
 )
 from toolpath.kernels.grown import grow_square
-from toolpath.kernels.wall_distance import from_boundary
+from toolpath.kernels.wall_distance import from_boundary, from_boundary_parallel, places_of
 from toolpath.lines import Line, dense, pieces_where, true_runs
 from zones.kernels.lattice import LatticeFrame
+from zones.lattice import blocked_beside
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 MIN_APART = 0.6  # lattice steps between successive crossings; less only where a corner is cut
@@ -225,9 +227,11 @@ def wall_distance(field: TipField, z: float, asked: NDArray[np.bool_]) -> F64 | 
     follows = np.flatnonzero(chains.after >= 0)
     before[chains.after[follows]] = follows
     rows, cols = chains.rows, chains.cols
-    from_boundary(chains.ids, chains.after, before, chains.points, chains.begins,
-                  (rows.start, cols.start, *free[rows, cols].shape), nearest,
-                  here | ~free & dilated(here, 2.0), field.lattice.frame, far)
+    window = (rows.start, cols.start, *free[rows, cols].shape)
+    nodes = here | ~free & dilated(here, 2.0)
+    fill = from_boundary if one_thread(int(nodes.sum())) else from_boundary_parallel
+    fill(places_of(chains.ids, window), chains.after, before, chains.points, chains.begins, window, nearest, nodes,
+         field.lattice.frame, far)
     return far
 
 
@@ -299,7 +303,7 @@ def rings(field: TipField, z: float, active: NDArray[np.bool_], firsts: Sequence
     if walls is not None:
         far = np.ascontiguousarray(walls[rows, cols])
     else:
-        far = ndimage.distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1] * lat.step
+        far = np.ascontiguousarray(blocked_beside(np.pad(inside, 1), lat.step)[0][1:-1, 1:-1])
     widest = float(far[inside].max())
     corner = lat.x0 + cols.start * lat.step, lat.y0 + rows.start * lat.step
     for first in firsts:

@@ -26,6 +26,7 @@ from toolpath.kernels.march import march, spread
 from toolpath.lines import Line
 from toolpath.passes.contours import dilated, from_walls, lines_at
 from toolpath.stock.stock_map import StockMap
+from zones.lattice import blocked_beside
 from zones.reach.tip_field import TipField
 
 AROUND = 2.0  # mm, and two diameters: how far round an area the tool looks for air
@@ -78,7 +79,7 @@ class Inwards:
         stands = stock.above(z + worth, lat)[rows, cols]
         if not stands.any():
             return None
-        air = free & (ndimage.distance_transform_edt(~stands) * lat.step >= r - EDGE * lat.step)
+        air = free & (blocked_beside(~stands, lat.step)[0] >= r - EDGE * lat.step)
         far = np.where(air, 0.0, np.inf)
         march(far, free, lat.step)
         wanted = np.logical_and(dilated(area, r / lat.step)[rows, cols], free)
@@ -111,7 +112,7 @@ class Inwards:
         if not count:
             return []
         step = self.field.lattice.step
-        room = ndimage.distance_transform_edt(np.pad(self.wanted, 1))[1:-1, 1:-1] * step
+        room = blocked_beside(np.pad(self.wanted, 1), step)[0][1:-1, 1:-1]
         return [(np.array([self.corner[0] + step * j, self.corner[1] + step * i, self.z]), float(room[i, j]))
                 for i, j in ndimage.maximum_position(room, labels, np.arange(1, count + 1))]
 
@@ -140,7 +141,7 @@ def _grown(far: F64, air: NDArray[np.bool_], free: NDArray[np.bool_], min_disc: 
     min_disc, max_disc : mm, radius of a disc. One smaller than ``max_disc`` stands on the ridge between two walls:
                          where the room beside it grows more slowly than the distance to a wall
     """
-    room = ndimage.distance_transform_edt(np.pad(free, 1, mode="edge"))[1:-1, 1:-1] * step
+    room = blocked_beside(np.pad(free, 1, mode="edge"), step)[0][1:-1, 1:-1]
     beside = np.pad(room, 1, mode="edge")
     steepest = np.zeros_like(room)
     for di in (-1, 0, 1):
@@ -149,7 +150,7 @@ def _grown(far: F64, air: NDArray[np.bool_], free: NDArray[np.bool_], min_disc: 
                 there = beside[1 + di:beside.shape[0] - 1 + di, 1 + dj:beside.shape[1] - 1 + dj]
                 np.maximum(steepest, (there - room) / (step * math.hypot(di, dj)), out=steepest)
     radius = np.minimum(room, max_disc)
-    within = ndimage.distance_transform_edt(np.pad(air, 1, constant_values=True))[1:-1, 1:-1] * step
+    within = blocked_beside(np.pad(air, 1, constant_values=True), step)[0][1:-1, 1:-1]
     fits = free & np.isfinite(far) & ((room >= max_disc) | ((steepest < RIDGE) & (room >= min_disc)))
     when = np.where(fits, np.where(air, -within, far) + radius, np.inf)
     out = np.full_like(when, np.inf)

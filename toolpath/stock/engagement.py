@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
+from geometry.mesh_queries.drop import one_thread
 from geometry.tool_body import ToolBody
 from toolpath.counterexamples import NONE, Counterexamples
-from toolpath.kernels.engaged import engaged
+from toolpath.kernels.engaged import joined, sectors, sectors_parallel
 from toolpath.lines import Line, dense, pieces_where
 from toolpath.stock.stock_map import StockMap
 
@@ -39,8 +40,12 @@ def angles(stock: StockMap, points: F64, tool: ToolBody) -> F64:
     ways = np.vstack([ways, ways[-1:]])
     ways /= np.maximum(np.hypot(ways[:, 0], ways[:, 1]), 1e-12)[:, None]
     out, lat = np.empty(len(points)), stock.lattice
-    engaged(stock.top, lat.x0, lat.y0, lat.step, np.ascontiguousarray(points), np.ascontiguousarray(ways),
-            tool.radius, tool.corner_radius, SKIN_SHARE * tool.radius, WINDOW * tool.radius, out)
+    met = np.zeros(len(points), np.int64)
+    mark = sectors if one_thread(int(len(points) * (tool.radius / lat.step) ** 2)) else sectors_parallel
+    tips = np.ascontiguousarray(points)
+    mark(stock.top, lat.x0, lat.y0, lat.step, tips, np.ascontiguousarray(ways), tool.radius, tool.corner_radius,
+         SKIN_SHARE * tool.radius, met)
+    joined(met, tips, WINDOW * tool.radius, out)
     return out
 
 

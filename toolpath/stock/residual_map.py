@@ -16,9 +16,10 @@ from geometry.binning import by_cell, limits_of
 from geometry.errors import GeometryError
 from geometry.kernels.cutter_sizes import CutterSizes
 from geometry.mesh import F64
+from geometry.mesh_queries.drop import one_thread
 from geometry.tool_body import ToolBody
 from toolpath.kernels.leaning import lower_leaning
-from toolpath.kernels.residual import LEVEL_PLANE, UPRIGHT, PlaceSquares, SampleCells, lower
+from toolpath.kernels.residual import LEVEL_PLANE, UPRIGHT, PlaceSquares, SampleCells, lower, lower_parallel
 from toolpath.stock.cut_history import PER_MM
 
 CELL = 0.6  # mm
@@ -63,8 +64,12 @@ class ResidualMap:
         A flat end that only just comes down to a place at the top of a wall passes over it where rounding lifts it.
         """
         path = np.column_stack([path[:, :2], np.rint(path[:, 2] * PER_MM) / PER_MM])
-        lower(self.points, self.level, self._squares, self._cells, np.ascontiguousarray(path), _sizes(tool),
-              self.margin, self.residual)
+        cells, sizes = self._cells, _sizes(tool)
+        way = np.hypot(*np.diff(path[:, :2], axis=0).T).sum()
+        share = min(1.0, float(2.0 * way * (tool.radius + self.margin)) / (cells.ncx * cells.ncy * cells.size**2))
+        call = lower if one_thread(int(share * len(self.points))) else lower_parallel
+        call(self.points, self.level, self._squares, cells, np.ascontiguousarray(path), sizes, self.margin,
+             self.residual)
 
     def cut_leaning(self, tips: F64, axes: F64, tool: ToolBody) -> None:
         """Lower the residual by poses of a tilted tool: to the least signed distance, below 0 where it gouges.

@@ -15,6 +15,7 @@ from scipy import ndimage
 from geometry.mesh import F64
 from toolpath.lines import Line, pieces_where, thinned
 from toolpath.passes.contours import contours, dilated, lines_at
+from zones.lattice import blocked_beside
 from zones.reach.tip_field import INSIDE, LEVEL_TOLERANCE, TipField
 
 SAME_PLANE = 5e-4  # mm
@@ -95,8 +96,7 @@ def _windows(field: TipField, tips: F64, finer: int) -> Iterator[tuple[TipField,
 def _rings(field: TipField, z: float, area: NDArray[np.bool_], first: float, spacing: float) -> list[Line]:
     """Lines inside an area of the lattice, at ``first`` mm from its border and every ``spacing`` mm further in."""
     lat = field.lattice
-    padded = np.pad(area, 1)
-    far = ndimage.distance_transform_edt(padded)[1:-1, 1:-1] * lat.step
+    far = blocked_beside(np.pad(area, 1), lat.step)[0][1:-1, 1:-1]
     deepest = float(far.max()) if far.size else 0.0
     out: list[Line] = []
     d = min(max(first, 0.6 * lat.step), 0.9 * deepest)

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from geometry.mesh import F64
 from toolpath.kernels.contour import SEGMENTS, linear_crossings, trace
 from toolpath.passes.pass_family import Dragged, Family, FinishTarget, Pass, Promise, strip_width
-from zones.lattice import Lattice
+from zones.lattice import Lattice, blocked_beside
 
 NEAR = 1.5  # spacings of samples: gaps between tips up to twice this are none
 SMOOTH = 1.0  # lattice steps, of the distance field
@@ -34,7 +34,7 @@ class Rings(Family):
         self.lattice = lat = Lattice.over(bounds, (2 * near + 4) * step, step)
         disc = np.hypot(*np.mgrid[-near:near + 1, -near:near + 1]) <= near
         mask = ndimage.binary_closing(lat.mask(tips), disc)
-        far = ndimage.distance_transform_edt(mask) * step
+        far = blocked_beside(mask, step)[0]
         self.far = np.ascontiguousarray(ndimage.gaussian_filter(far, SMOOTH))
         self.inside = np.ascontiguousarray(ndimage.binary_dilation(mask, iterations=2))
         at = (tips[:, ::-1] - [lat.y0, lat.x0]).T / step

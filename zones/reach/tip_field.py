@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, label, maximum_filter
+from scipy.ndimage import label, maximum_filter
 from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
@@ -28,7 +28,7 @@ from geometry.mesh_queries.drop import blocked_many, drop_along, drop_tips
 from geometry.mesh_queries.flat_grid import drop_over_flats
 from geometry.tool_body import ToolBody
 from zones.kernels.lattice import noncut_blocked, noncut_lookup
-from zones.lattice import Lattice
+from zones.lattice import Lattice, blocked_beside
 from zones.machinable_area import LEVEL, SEEN
 from zones.reach.assembly import Clearances, Disc, discs_of
 
@@ -244,8 +244,7 @@ class TipField:
             free = self.height <= z + LEVEL_TOLERANCE
             off = z, None
             if not free.all():
-                far, near = distance_transform_edt(free, return_indices=True)
-                off = z, (far * self.lattice.step, near)
+                off = z, blocked_beside(free, self.lattice.step)
             self._off = off
         return off[1]
 

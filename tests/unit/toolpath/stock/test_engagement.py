@@ -10,7 +10,7 @@ import pytest
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, tool
 from toolpath.counterexamples import Counterexamples
-from toolpath.kernels.engaged import SECTORS, _sector, engaged
+from toolpath.kernels.engaged import SECTORS, _sector, joined, sectors, sectors_parallel
 from toolpath.lines import Line, dense
 from toolpath.stock.engagement import LOOK, SKIN_SHARE, UNBOUNDED, angles, over_limit, skims, within
 from toolpath.stock.stock_map import StockMap
@@ -66,10 +66,13 @@ def test_the_kernel_says_what_the_obvious_twin_says(corner):
     tips = np.column_stack([rng.uniform(0.0, 3.0, 12), rng.uniform(0.0, 2.4, 12), rng.uniform(-0.6, 0.8, 12)])
     turn = rng.uniform(0, 2 * np.pi, 12)
     ways = np.column_stack([np.cos(turn), np.sin(turn)])
-    given = (top, 0.05, -0.03, 0.1, tips, ways, 1.0, corner, 0.05, 0.9)
-    got = np.empty(12)
-    engaged(*given, got)
-    assert np.allclose(got, twin(*given)) and 0.0 < got.min() < got.max()
+    given = (top, 0.05, -0.03, 0.1, tips, ways, 1.0, corner, 0.05)
+    met, again, got = np.zeros(12, np.int64), np.zeros(12, np.int64), np.empty(12)
+    sectors(*given, met)
+    sectors_parallel(*given, again)
+    joined(met, tips, 0.9, got)
+    assert np.allclose(got, twin(*given, 0.9)) and 0.0 < got.min() < got.max()
+    assert np.array_equal(met, again)
 
 
 @pytest.mark.parametrize("share", [0.2, 0.6, 1.0, 1.5])
