@@ -80,7 +80,7 @@ class Machine(WireModel):
         description="true: programs contain arcs and helices in the XY plane, and longer straight moves. They stay "
                     "within half of quality.chordal_tolerance_mm of the planned path; the plan uses the other half. "
                     "Only workingsteps whose tool axis is Z of the program get arcs, and a moving tool axis gets "
-                    "neither.")] = False
+                    "neither. false: every move is straight.")] = True
     travel_mm: Annotated[Triple | None, Field(
         description="Travel of the machine in X, Y and Z, mm: the largest extent of the moves of a program. In Z it is "
                     "the extent of the spindle face, so gauge lengths count. The place of the moves within the travel "

@@ -131,7 +131,7 @@ def test_the_one_simulated_says_how_far_a_path_is_left(order, part, tmp_path):
 @pytest.mark.slow
 def test_a_program_too_large_for_its_control_is_parted_and_proved(part, tmp_path):
     """A step of 14 kB and two small ones for 16 kB: three programs, run one after the other on one blank."""
-    machine = {"dialects": ["linuxcnc", "heidenhain"], "max_program_kb": 16}
+    machine = {"dialects": ["linuxcnc", "heidenhain"], "max_program_kb": 16, "arcs": False}
     setup = parse_setup(json.dumps({**SETUP, "operations": {}, "machine": machine}))
     report = pipeline.plan(part, setup, tmp_path, quiet)
     assert report["state"] == "proved" and report["coverage"] == 1.0

@@ -22,6 +22,7 @@ TIP = 1e-3  # mm
 AXIS = 1e-6  # of unit vectors, per component
 FEED = 1e-6  # share; feed words are decimal, so equal feeds differ by rounding only
 INVERSE = 1e-4  # 1/min, rounding of inverse time words, which time the turning blocks of joints
+FIRST_LOOK = 64  # moves that are compared at once to find the end of a stretch; then twice as many
 STILL_TIP, STILL_AXIS = 5e-5, 3e-6  # mm and of unit vectors: smaller moves count as none
 
 
@@ -171,11 +172,16 @@ def _chords(r: _Rows, begin: int, end: int) -> bool:
 
 def _stretch(r: _Rows, begin: int, end: int) -> int:
     """End of the moves from ``begin`` on with its tool, kind and feed; feed moves also need its spindle speed."""
-    feed = np.nan_to_num(r.feed[begin:end])
-    speed = (r.speed[begin:end] != r.speed[begin]) & ~r.rapid[begin]
-    other = np.flatnonzero((r.rapid[begin:end] != r.rapid[begin]) | (r.tool[begin:end] != r.tool[begin])
-                           | (np.abs(feed - feed[0]) > FEED * feed[0]) | speed)
-    return begin + (int(other[0]) if len(other) else end - begin)
+    first, at, size = float(np.nan_to_num(r.feed[begin])), begin, FIRST_LOOK
+    while at < end:  # looked at in parts that grow: most stretches are short, and a file has as many as it has feeds
+        part = slice(at, min(at + size, end))
+        other = (r.rapid[part] != r.rapid[begin]) | (r.tool[part] != r.tool[begin]) \
+            | (np.abs(np.nan_to_num(r.feed[part]) - first) > FEED * first) \
+            | ((r.speed[part] != r.speed[begin]) & ~r.rapid[begin])
+        if other.any():
+            return at + int(np.argmax(other))
+        at, size = part.stop, 2 * size
+    return end
 
 
 def _along(points: F64, way: F64, limit: float) -> float:

@@ -33,7 +33,7 @@ from zones.machinable_area import LEVEL, SEEN
 from zones.reach.assembly import Clearances, Disc, discs_of
 
 LEVEL_TOLERANCE = 1e-5  # mm: a tip within this below H still counts as standing on it
-LOOKUP_STEP = 0.4  # mm, grid of the shank and holder limits
+LOOKUP_STEP = 0.2  # mm, grid of the shank and holder limits
 EDGE_SLACK = 0.01  # mm: a flat bottom need not reach nearer than this to a wall beside the plane
 BELOW = 1.0  # mm: no query has a tip farther under the obstacles than this plus its own radius
 AIMED = 12  # free nodes towards which a flat bottom is tried over a level place
