@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
 
 from geometry.mesh import F64
 from toolpath.kernels.contour import thin
@@ -53,6 +54,37 @@ def thinned(points: F64, tolerance: float) -> F64:
     keep = np.zeros(len(points), np.bool_)
     thin(points, tolerance, keep)
     return np.ascontiguousarray(points[keep])
+
+
+def smoothed(way: F64, length: float) -> F64:
+    """A way without what wobbles faster than a length: the mean of its places, weighted by a bell along it.
+
+    way    : (n, 2) float64, mm, n >= 3; one that repeats its first point is closed
+    length : mm, standard deviation of the bell; at most a twentieth of the way counts
+
+    Returns
+    -------
+    (m, 2) float64, mm, half a length apart; closed as the way is, and with its ends where it is open
+
+    Notes
+    -----
+    A round of radius r becomes smaller by length^2 / (2 r). A corner of the angle t is rounded, and its place moves by
+    0.8 length sin(t / 2), at most: the mean of a bell's half is sqrt(2 / pi) lengths from its middle.
+    """
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
+    length = min(length, s[-1] / 20.0)
+    count = int(np.ceil(2.0 * s[-1] / length))
+    u = np.linspace(0.0, s[-1], count + 1)
+    at = np.column_stack([np.interp(u, s, way[:, c]) for c in range(way.shape[1])])
+    width = length * count / s[-1]
+    if (way[0] == way[-1]).all():
+        ring = gaussian_filter1d(at[:-1], width, axis=0, mode="wrap")
+        return np.vstack([ring, ring[:1]])
+    more = min(int(np.ceil(4.0 * width)) + 1, count)
+    before, after = 2.0 * at[:1] - at[more:0:-1], 2.0 * at[-1:] - at[-2:-more - 2:-1]
+    out = gaussian_filter1d(np.vstack([before, at, after]), width, axis=0, mode="nearest")[more:-more]
+    out[0], out[-1] = at[0], at[-1]
+    return np.asarray(out)
 
 
 def place_keys(points: F64) -> list[bytes]:

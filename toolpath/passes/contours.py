@@ -33,7 +33,7 @@ from toolpath.kernels.contour import (
 )
 from toolpath.kernels.grown import grow_square
 from toolpath.kernels.wall_distance import from_boundary, from_boundary_parallel, places_of
-from toolpath.lines import Line, dense, pieces_where, true_runs
+from toolpath.lines import Line, dense, pieces_where, smoothed, true_runs
 from zones.kernels.lattice import LatticeFrame
 from zones.lattice import blocked_beside
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
@@ -313,12 +313,13 @@ def rings(field: TipField, z: float, active: NDArray[np.bool_], firsts: Sequence
 
 
 def lines_at(field: TipField, z: float, far: F64, distance: float, inside: NDArray[np.bool_],
-             corner: tuple[float, float]) -> list[Line]:
+             corner: tuple[float, float], rounded: float = 0.0) -> list[Line]:
     """The free pieces of the lines on which ``far`` crosses ``distance``, as tips at height z, mm [Lorensen1987].
 
-    far    : (ny, nx) float64, mm, contiguous, on the step of the lattice
-    inside : (ny, nx) bool; lines end where it does
-    corner : x and y of the first node, mm
+    far     : (ny, nx) float64, mm, contiguous, on the step of the lattice
+    inside  : (ny, nx) bool; lines end where it does
+    corner  : x and y of the first node, mm
+    rounded : mm over which lines are ``toolpath.lines.smoothed``; 0 for those of an exact distance
     """
     ids, starts, closed = trace(np.ascontiguousarray(far < distance), inside, SEGMENTS)
     xy = np.empty((len(ids), 2))
@@ -328,10 +329,11 @@ def lines_at(field: TipField, z: float, far: F64, distance: float, inside: NDArr
         chain = xy[starts[k]:starts[k + 1]]
         if len(chain) < 2:
             continue
-        pts = np.column_stack([chain, np.full(len(chain), z)])
         if closed[k]:
-            pts = np.vstack([pts, pts[:1]])
-        lines.extend(free_pieces(field, pts, bool(closed[k])))
+            chain = np.vstack([chain, chain[:1]])
+        if rounded > 0.0 and len(chain) > 2:
+            chain = smoothed(chain, rounded)
+        lines.extend(free_pieces(field, np.column_stack([chain, np.full(len(chain), z)]), bool(closed[k])))
     return lines
 
 

@@ -20,6 +20,8 @@ from zones.reach.tip_field import INSIDE, LEVEL_TOLERANCE, TipField
 
 SAME_PLANE = 5e-4  # mm
 EXACT = INSIDE / 3.0  # mm: contour, thinning, and where a crossing is placed: together they stay within INSIDE
+ROUND = 0.25  # of the flat radius over which rings are rounded, which takes the steps of the lattice out of them
+THIN = 0.02  # lattice steps that thinned lines keep
 FINER = 4  # ratio of the lattice of one round to that of the next
 NEAR = 2.0  # steps of the planning lattice round the residual that get lines
 MAX_FINER = 2  # rounds on finer lattices
@@ -95,14 +97,14 @@ def _windows(field: TipField, tips: F64, finer: int) -> Iterator[tuple[TipField,
 
 def _rings(field: TipField, z: float, area: NDArray[np.bool_], first: float, spacing: float) -> list[Line]:
     """Lines inside an area of the lattice, at ``first`` mm from its border and every ``spacing`` mm further in."""
-    lat = field.lattice
+    lat, flat = field.lattice, field.tool.radius - field.tool.corner_radius
     far = blocked_beside(np.pad(area, 1), lat.step)[0][1:-1, 1:-1]
     deepest = float(far.max()) if far.size else 0.0
     out: list[Line] = []
     d = min(max(first, 0.6 * lat.step), 0.9 * deepest)
     far, everywhere = np.ascontiguousarray(far), np.ones(area.shape, np.bool_)
     while 0 < d < deepest:
-        out.extend(Line(thinned(p.points, 0.3 * lat.step), p.closed)
-                   for p in lines_at(field, z, far, d, everywhere, (lat.x0, lat.y0)))
+        out.extend(Line(thinned(p.points, THIN * lat.step), p.closed)
+                   for p in lines_at(field, z, far, d, everywhere, (lat.x0, lat.y0), ROUND * flat))
         d += spacing
     return out

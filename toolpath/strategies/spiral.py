@@ -16,10 +16,12 @@ from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
 from toolpath.kernels.contour import SEGMENTS, linear_crossings, trace
+from toolpath.lines import smoothed
 from toolpath.passes.pass_family import Dragged, Family, FinishTarget, Pass, Promise, strip_width
 from zones.lattice import Lattice, blocked_beside
 
 NEAR = 1.5  # spacings of samples: gaps between tips up to twice this are none
+ROUND = 1.0  # lattice steps over which rings are rounded, or a twentieth of their length
 SMOOTH = 1.0  # lattice steps, of the distance field
 
 
@@ -64,7 +66,7 @@ class Rings(Family):
         for k in range(len(starts) - 1):
             way = xy[starts[k]:starts[k + 1]]
             if len(way) > 2:
-                out.append(np.vstack([way, way[:1]]) if closed[k] else way)
+                out.append(smoothed(np.vstack([way, way[:1]]) if closed[k] else way, ROUND * self.lattice.step))
         return out
 
 
