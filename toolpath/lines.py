@@ -59,12 +59,12 @@ def thinned(points: F64, tolerance: float) -> F64:
 def smoothed(way: F64, length: float) -> F64:
     """A way without what wobbles faster than a length: the mean of its places, weighted by a bell along it.
 
-    way    : (n, 2) float64, mm, n >= 3; one that repeats its first point is closed
+    way    : (n, 2) float64, mm, any frame, n >= 3; one that repeats its first point is closed
     length : mm, standard deviation of the bell; at most a twentieth of the way counts
 
     Returns
     -------
-    (m, 2) float64, mm, half a length apart; closed as the way is, and with its ends where it is open
+    (m, 2) float64, mm, its frame, half a length apart; closed as the way is, and with its ends where it is open
 
     Notes
     -----
