@@ -1,4 +1,4 @@
-"""Time that a machine takes for straight moves: feeds, rapids, and the acceleration between them."""
+"""Time that a machine takes for straight moves: feeds, rapids, and changes of speed at its acceleration and jerk."""
 
 from __future__ import annotations
 
@@ -8,26 +8,57 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import GeometryError
-from geometry.kernels.timing import seconds_of_moves
+from geometry.kernels import timing as kernels
 from geometry.mesh import F64
 
 
 @dataclass(frozen=True)
 class Rates:
-    """Rapid rate and acceleration of a machine.
+    """Rapid rate, acceleration and jerk of a machine.
 
     rapid        : mm/min
     acceleration : mm/s², in every direction
     rounding     : mm, largest distance by which the control may pass a corner; at 0 it stops at each corner
+    jerk         : mm/s³, in every direction; math.inf where the acceleration changes at once
     """
 
     rapid: float
     acceleration: float
     rounding: float
+    jerk: float = 20000.0
 
 
-RATES = Rates(10000.0, 1000.0, 0.001)
-"""Rates of a machine whose setup gives none."""
+RATES = Rates(10000.0, 4905.0, 0.001)
+"""Rates of a machine whose setup gives none: half of the acceleration of gravity, and the jerk of a machining centre
+(shop practice)."""
+
+
+def change_seconds(slow: float, fast: float, rates: Rates) -> float:
+    """Duration of a change between two speeds, mm/s, at the limits of acceleration and jerk, s."""
+    return float(kernels.change_seconds(slow, fast, rates.acceleration, rates.jerk))
+
+
+def change_way(slow: float, fast: float, rates: Rates) -> float:
+    """Way of a change between two speeds, mm/s, at the limits of acceleration and jerk, mm."""
+    return float(kernels.change_way(slow, fast, rates.acceleration, rates.jerk))
+
+
+def peak_speed(length: float, base: float, most: float, rates: Rates) -> float:
+    """Speed that the machine reaches from another one along a length, ``most`` at most, mm/s.
+
+    length     : mm
+    base, most : mm/s
+    """
+    return min(float(kernels.reached(base, length, rates.acceleration, rates.jerk)), most)
+
+
+def leg_seconds(length: float, speed: float, rates: Rates) -> float:
+    """Time of a straight move from standstill to standstill, s; 0 without length.
+
+    length : mm
+    speed  : mm/s, at most
+    """
+    return float(kernels.leg_seconds(0.0, 0.0, speed, length, rates.acceleration, rates.jerk))
 
 
 def move_seconds(way: F64, feed: F64, rates: Rates, stop: NDArray[np.bool_] | None = None,
@@ -49,21 +80,21 @@ def move_seconds(way: F64, feed: F64, rates: Rates, stop: NDArray[np.bool_] | No
     Raises
     ------
     GeometryError
-        A feed or an acceleration that is not positive (code 'bad_rate').
+        A feed, an acceleration or a jerk that is not positive (code 'bad_rate').
 
     Notes
     -----
-    The control rounds corners on arcs (``geometry.kernels.timing``). Speed changes at the full acceleration at once (no
-    jerk), and the look-ahead is unlimited. Theory, and figures against a controller: docs/theory/times.md.
+    The control rounds corners on arcs and changes speed on S-curves (``geometry.kernels.timing``). The look-ahead is
+    unlimited. Theory, and figures against a controller: docs/theory/times.md.
     """
     ways, feeds = np.ascontiguousarray(way, dtype=np.float64), np.ascontiguousarray(feed, dtype=np.float64)
-    worst = min(float(feeds.min(initial=np.inf)), rates.acceleration)
+    worst = min(float(feeds.min(initial=np.inf)), rates.acceleration, rates.jerk)
     if not worst > 0.0 or not np.isfinite(feeds).all():
-        raise GeometryError(f"feeds and the acceleration must be above 0, but one is {worst:g}", code="bad_rate",
+        raise GeometryError(f"feeds, acceleration and jerk must be above 0, but one is {worst:g}", code="bad_rate",
                             subjects=("feed",), measured=worst, limit=0.0, remedy="give each move a feed")
     stops, curves = (np.zeros(len(ways), np.bool_) if flag is None else np.ascontiguousarray(flag, dtype=np.bool_)
                      for flag in (stop, curve))
     out = np.zeros(len(ways))
     if len(ways):
-        seconds_of_moves(ways, feeds / 60.0, stops, curves, rates.acceleration, rates.rounding, out)
+        kernels.seconds_of_moves(ways, feeds / 60.0, stops, curves, rates.acceleration, rates.jerk, rates.rounding, out)
     return out

@@ -132,7 +132,10 @@ class Machine(WireModel):
     rapid_mm_min: Annotated[Number | None, Field(
         ge=1, le=1e6, description="Rapid rate, mm/min, for machining times; null: 10000.")] = None
     acceleration_mm_s2: Annotated[Number | None, Field(
-        ge=1, le=1e7, description="Acceleration, mm/s2, for machining times; null: 1000.")] = None
+        ge=1, le=1e7, description="Acceleration, mm/s2, for machining times; null: 4905.")] = None
+    jerk_mm_s3: Annotated[Number | None, Field(
+        ge=1, le=1e9, description="Jerk, mm/s3, for machining times: how fast the acceleration changes; "
+                                  "null: 20000.")] = None
     rapid_motion: Annotated[Literal["linear", "dogleg"] | None, Field(
         description="Path of a rapid in several axes. linear: a straight line. dogleg: each axis moves at its own "
                     "speed, so the path is not straight. The whole box of the move must then stay clear of part, stock "

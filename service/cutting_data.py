@@ -215,13 +215,20 @@ def layer_depth(setup: Setup, tool: Tool, body: ToolBody, engaged: float) -> flo
     return depth if model is None else model.bearable(data.feed, depth, width)
 
 
+def link_feed(setup: Setup) -> float:
+    """Feed of moves in air, mm/min: the highest of the machine, no faster than its rapids."""
+    machine = setup.machine
+    return min(machine.max_feed_mm_min or DEFAULT_MAX_FEED_MM_MIN, rates_of(setup).rapid)
+
+
 def rates_of(setup: Setup) -> Rates:
     """Rates of the machine of a setup; corners are rounded by the tolerance of the programs (``path_tolerance``)."""
     machine, quality = setup.machine, setup.quality
     return Rates(machine.rapid_mm_min or RATES.rapid, machine.acceleration_mm_s2 or RATES.acceleration,
-                 min(RATES.rounding, ScallopBudget(quality.scallop_height_mm, quality.chordal_tolerance_mm).program))
+                 min(RATES.rounding, ScallopBudget(quality.scallop_height_mm, quality.chordal_tolerance_mm).program),
+                 machine.jerk_mm_s3 or RATES.jerk)
 
 
 __all__ = ["DEFAULT_MAX_FEED_MM_MIN", "DEFAULT_MAX_RPM", "MATERIALS", "MAX_CHIP_THINNING",
            "PLUNGE_FACTOR", "STEP_DOWN", "CuttingData", "bending", "chip_thinning", "cutting_data", "cutting_words",
-           "feed_per_tooth", "find_material", "layer_depth", "lightly_finished", "rates_of"]
+           "feed_per_tooth", "find_material", "layer_depth", "lightly_finished", "link_feed", "rates_of"]

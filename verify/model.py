@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64, I32, TriangleMesh
+from geometry.move_timing import RATES
 from geometry.part import OtherSolid
 from geometry.tool_body import ToolBody
 from verify.assumptions import Assumed
@@ -76,7 +77,7 @@ class ProofSetup:
     cores         : mm by T number, diameter at the end of a tool within which it does not cut; absent: it cuts there
     plunge_skin   : share of the tool diameter that a steeper descent may take off (``verify.material.stock_lines``)
     rapid_feed    : mm/min
-    acceleration  : mm/s², for times
+    acceleration  : mm/s², and jerk, mm/s³, for times
     travel        : (3,) float64, mm, span of the moves of a program that the machine allows in X, Y and Z, or None
     gauge_length  : mm by T number, from the spindle face to the tip; counted in Z against the travel
     gauge_given   : T numbers of the tools whose gauge length the setup states
@@ -123,7 +124,8 @@ class ProofSetup:
     cores: Mapping[int, float] = field(default_factory=dict)
     plunge_skin: float = 0.1
     rapid_feed: float = 5000.0
-    acceleration: float = 1000.0
+    acceleration: float = RATES.acceleration
+    jerk: float = RATES.jerk
     travel: F64 | None = None
     gauge_length: Mapping[int, float] = field(default_factory=dict)
     gauge_given: frozenset[int] = frozenset()

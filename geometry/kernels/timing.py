@@ -1,16 +1,23 @@
-"""Speed of a control with look-ahead along straight moves.
+"""Speed of a control with look-ahead along straight moves, with limited acceleration and jerk.
 
 Notation
-    l, s      : length of a move, mm, and the programmed speed on it, mm/s
-    a         : acceleration, mm/s², the same in every direction
-    phi       : angle by which the way turns at a corner; 0 straight on, pi back
-    d         : mm, largest distance by which the control may pass a corner
-    v         : speed at a corner, mm/s
+    l, s  : length of a move, mm, and the programmed speed on it, mm/s
+    a, j  : acceleration, mm/s², and jerk, mm/s³, the same in every direction; j may be infinite
+    phi   : angle by which the way turns at a corner; 0 straight on, pi back
+    d     : mm, largest distance by which the control may pass a corner
+    r     : radius of the arc that the control runs at a corner, mm
+    v, w  : speed, mm/s; dv the size of a change of it
+
+A change of speed is an S-curve: the acceleration rises and falls at the jerk, and is 0 before and behind. It takes
+t = 2 sqrt(dv / j) where the acceleration stays below a, that is for dv <= a² / j, else t = dv / a + a / j, and its way
+is (v + w) / 2 t.
 
 At a corner the control runs an arc that touches both moves. Of radius r it passes the corner by
 r (1 / cos(phi / 2) - 1) and touches the moves r tan(phi / 2) before and behind it, which is half of either at most.
-Along the arc v² = SQUARE_SHARE a r is the most, so that half of the acceleration is left to change the speed with; for
-chords of a curve, whose corners take half of each, r is its radius.
+Along the arc v² = SQUARE_SHARE a r is the most. The acceleration square to the way rises from 0 to v² / r and falls
+again while the arc is run, in the time r phi / v. At the jerk j that takes v² / r <= j r phi / (2 v), so
+v³ <= j r² phi / 2. A corner between two that turn the same way by about as much is one of a curve: the acceleration
+does not fall between them, and only the ends of the curve bound the jerk, v³ <= j r², with the radius of the curve.
 """
 
 from __future__ import annotations
@@ -22,75 +29,153 @@ from numba import njit
 
 from geometry.kernels.options import KERNEL
 
-SQUARE_SHARE, ARC_SHARE = math.sqrt(0.75), 0.5  # of the acceleration on an arc: square to the way and along it
+SQUARE_SHARE = math.sqrt(0.75)  # of the acceleration on an arc, square to the way: half of it is left along the way
+ALIKE, SHARP = 3.0, 0.5  # radii of neighbours on a curve differ by that factor at most; cos of its sharpest corner
+BINDS = 1e-4  # share by which a corner is slower than the moves beside it, to end a stretch of one speed
+HALVINGS, NEWTON = 40, 8
 
 
 @njit(**KERNEL)
-def corner(before, behind, shorter, a, d):
-    """The arc at a corner between unit vectors, of three numbers, along two moves, the shorter ``shorter`` mm long.
+def change_seconds(v, w, a, j):
+    """Seconds from one speed to another."""
+    dv = abs(w - v)
+    if dv * j <= a * a:
+        return 2.0 * math.sqrt(dv / j)
+    return dv / a + a / j
 
-    Returns the most speed on it, mm/s, how much of each move it takes the place of, and half of its length, mm.
+
+@njit(**KERNEL)
+def change_way(v, w, a, j):
+    """Way from one speed to another, mm."""
+    return 0.5 * (v + w) * change_seconds(v, w, a, j)
+
+
+@njit(**KERNEL)
+def reached(v, length, a, j):
+    """Speed reached from v over a length, mm/s.
+
+    Below the acceleration a it solves l = j x³ + 2 v x for x = sqrt(dv / j), by Newton from a bound above; else
+    w² + w a² / j = v² - v a² / j + 2 a l.
     """
-    cos = before[0] * behind[0] + before[1] * behind[1] + before[2] * behind[2]
-    half = math.sqrt(max(0.5 * (1.0 + cos), 0.0))  # cos(phi / 2)
-    if half <= 1e-9:
-        return 0.0, 0.0, 0.0
-    sine = math.sqrt(max(0.5 * (1.0 - cos), 0.0))
-    tan = sine / half
-    if tan <= 1e-9 or half >= 1.0:
-        return np.inf, 0.0, 0.0
-    radius = min(d * half / (1.0 - half), 0.5 * shorter / tan)
-    return math.sqrt(SQUARE_SHARE * a * radius), radius * tan, radius * math.atan2(sine, half)
+    base = a * a / j
+    if base > 0.0 and length > 0.0:
+        x = (length / j) ** (1.0 / 3.0)
+        if v > 0.0:
+            x = min(x, 0.5 * length / v)
+        for _ in range(NEWTON):
+            x -= (j * x * x * x + 2.0 * v * x - length) / (3.0 * j * x * x + 2.0 * v)
+        if j * x * x <= base:
+            return v + j * x * x
+    return 0.5 * (math.sqrt(base * base + 4.0 * (v * v - v * base + 2.0 * a * length)) - base)
 
 
 @njit(**KERNEL)
-def _direction(way, size, i):
-    """Unit vector along move i."""
-    return way[i, 0] / size[i], way[i, 1] / size[i], way[i, 2] / size[i]
+def leg_seconds(v, w, most, length, a, j):
+    """Seconds of a length from speed v to w, at ``most`` at most; v and w can be reached from each other on it."""
+    if length <= 0.0:
+        return 0.0
+    low, high = max(v, w), max(most, max(v, w))
+    if change_way(v, high, a, j) + change_way(high, w, a, j) > length:
+        if change_way(v, low, a, j) + change_way(low, w, a, j) >= length:
+            return length / (0.5 * (v + w))
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            if change_way(v, middle, a, j) + change_way(middle, w, a, j) <= length:
+                low = middle
+            else:
+                high = middle
+        high = low
+    even = length - change_way(v, high, a, j) - change_way(high, w, a, j)
+    return change_seconds(v, high, a, j) + change_seconds(high, w, a, j) + max(even, 0.0) / high
 
 
 @njit(**KERNEL)
-def seconds_of_moves(way, speed, stop, curve, a, d, out):
+def _corner(way, size, i, out):
+    """The corner before move i: sine and cosine of half its angle, and the vector it turns about, into ``out`` (5,)."""
+    cos = 0.0
+    for k in range(3):
+        cos += way[i - 1, k] * way[i, k]
+        m, n = (k + 1) % 3, (k + 2) % 3
+        out[2 + k] = (way[i - 1, m] * way[i, n] - way[i - 1, n] * way[i, m]) / (size[i - 1] * size[i])
+    cos /= size[i - 1] * size[i]
+    out[0], out[1] = math.sqrt(max(0.5 * (1.0 - cos), 0.0)), math.sqrt(max(0.5 * (1.0 + cos), 0.0))
+
+
+@njit(**KERNEL)
+def _caps(way, size, stop, curve, a, j, d, cap, round_):
+    """Most speed at each corner, into ``cap`` (m + 1,), and whether the arc there takes half of a move, (m + 1,)."""
+    m = len(way)
+    turn, radius = np.zeros((m + 1, 5)), np.full(m + 1, np.inf)
+    standing = np.zeros(m + 1, np.bool_)
+    standing[0], standing[m] = True, True
+    for i in range(1, m):
+        standing[i] = stop[i] or size[i - 1] == 0.0 or size[i] == 0.0
+        if not standing[i]:
+            _corner(way, size, i, turn[i])
+            if turn[i, 0] > 1e-9 * turn[i, 1]:
+                radius[i] = 0.5 * min(size[i - 1], size[i]) * turn[i, 1] / turn[i, 0]
+    for i in range(m + 1):
+        cap[i], round_[i] = 0.0, False
+        if standing[i]:
+            continue
+        cap[i] = np.inf
+        sine, half = turn[i, 0], turn[i, 1]
+        if math.isinf(radius[i]):
+            continue
+        if half <= 1e-9:
+            cap[i] = 0.0
+            continue
+        wide = np.inf if curve[i] else d * half / max(1.0 - half, 1e-300)
+        r = min(wide, radius[i])
+        cap[i] = min(math.sqrt(SQUARE_SHARE * a * r), (j * r * r * math.atan2(sine, half)) ** (1.0 / 3.0))
+        round_[i] = radius[i] <= wide
+        bent = curve[i]
+        if round_[i] and not bent and 1 < i < m - 1 and half * half - sine * sine > SHARP:
+            bent = True
+            for k in (i - 1, i + 1):
+                along = turn[i, 2] * turn[k, 2] + turn[i, 3] * turn[k, 3] + turn[i, 4] * turn[k, 4]
+                bent = bent and along > 0.0 and radius[i] < ALIKE * radius[k] and radius[k] < ALIKE * radius[i]
+                r = min(r, radius[k])
+        if bent:
+            cap[i] = max(cap[i], min(math.sqrt(SQUARE_SHARE * a * r), (j * r * r) ** (1.0 / 3.0)))
+
+
+@njit(**KERNEL)
+def seconds_of_moves(way, speed, stop, curve, a, j, d, out):
     """Seconds (m,) of m moves run one behind the other from standstill to standstill, written to ``out``.
 
     way : (m, 3) mm; speed : (m,) mm/s; stop : (m,) bool, moves before which the control stands still
     curve : (m,) bool, moves that are chords of the curve the one before is one of: only half of either bounds the arc
-    An arc counts to the moves before and behind it by halves.
+    Moves of one speed that no corner slows are one stretch, whose time they share by their lengths.
     """
     m = len(way)
     size = np.empty(m)
     for i in range(m):
         size[i] = math.sqrt(way[i, 0] * way[i, 0] + way[i, 1] * way[i, 1] + way[i, 2] * way[i, 2])
-    # by turns what is left straight of a move and the arc behind it: length, most speed, most change of it
-    length, most, change = np.zeros(2 * m), np.zeros(2 * m), np.full(2 * m, a)
+    cap, round_, most = np.empty(m + 1), np.empty(m + 1, np.bool_), np.empty(m)
+    _caps(way, size, stop, curve, a, j, d, cap, round_)
     for i in range(m):
-        length[2 * i], most[2 * i] = size[i], speed[i]
-    for i in range(m - 1):
-        k = 2 * i + 1
-        change[k] = ARC_SHARE * a
-        if stop[i + 1] or size[i] == 0.0 or size[i + 1] == 0.0:
-            continue
-        v, taken, half = corner(_direction(way, size, i), _direction(way, size, i + 1), min(size[i], size[i + 1]), a,
-                                np.inf if curve[i + 1] else d)
-        length[k], most[k] = 2.0 * half, min(v, min(speed[i], speed[i + 1]))
-        length[k - 1] -= taken
-        length[k + 1] -= taken
-    at = np.zeros(2 * m)  # speed before each piece; the last arc is none, before it the control stands
-    for k in range(1, 2 * m - 1):
-        length[k] = max(length[k], 0.0)
-        at[k] = min(min(most[k - 1], most[k]), math.sqrt(at[k - 1] ** 2 + 2.0 * change[k - 1] * length[k - 1]))
-    for k in range(2 * m - 2, -1, -1):
-        at[k] = min(at[k], math.sqrt(at[k + 1] ** 2 + 2.0 * change[k] * length[k]))
+        most[i] = speed[i]
+        if round_[i] and round_[i + 1]:  # arcs all along the move
+            most[i] = min(speed[i], max(cap[i], cap[i + 1]))
+    first = np.empty(m + 1, np.int64)  # moves with which stretches begin
+    count = 0
     for i in range(m):
-        out[i] = 0.0
-    for k in range(2 * m - 1):
-        if length[k] > 0.0:
-            v, w, b = at[k], at[k + 1], change[k]
-            peak = min(most[k], math.sqrt(b * length[k] + 0.5 * (v * v + w * w)))
-            even = length[k] - (2.0 * peak * peak - v * v - w * w) / (2.0 * b)
-            seconds = (2.0 * peak - v - w) / b + max(even, 0.0) / peak
-            if k % 2 == 0:
-                out[k // 2] += seconds
-            else:
-                out[k // 2] += 0.5 * seconds
-                out[k // 2 + 1] += 0.5 * seconds
+        low = most[i] if i == 0 else min(most[i - 1], most[i])
+        if i == 0 or cap[i] < (1.0 - BINDS) * low or abs(most[i] - most[i - 1]) > BINDS * low:
+            first[count] = i
+            count += 1
+    first[count] = m
+    length, at = np.zeros(count), np.zeros(count + 1)
+    for k in range(count):
+        for i in range(first[k], first[k + 1]):
+            length[k] += size[i]
+        if k:
+            at[k] = min(cap[first[k]], min(most[first[k] - 1], most[first[k]]))
+            at[k] = min(at[k], reached(at[k - 1], length[k - 1], a, j))
+    for k in range(count - 1, 0, -1):
+        at[k] = min(at[k], reached(at[k + 1], length[k], a, j))
+    for k in range(count):
+        seconds = leg_seconds(at[k], at[k + 1], most[first[k]], length[k], a, j)
+        for i in range(first[k], first[k + 1]):
+            out[i] = seconds * size[i] / length[k] if length[k] > 0.0 else 0.0

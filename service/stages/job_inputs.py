@@ -25,7 +25,15 @@ from schemas.machine import Machine
 from schemas.materials import Material
 from schemas.setup import Access, Operations, Quality, Setup, Stock, setup_sha256
 from schemas.tools import Tool
-from service.cutting_data import bending, cutting_data, cutting_words, layer_depth, lightly_finished, rates_of
+from service.cutting_data import (
+    bending,
+    cutting_data,
+    cutting_words,
+    layer_depth,
+    lightly_finished,
+    link_feed,
+    rates_of,
+)
 from service.from_wire import (
     gauge_lengths,
     machine_kinematics,
@@ -42,7 +50,6 @@ from verify.cutting_words import CuttingWords
 from verify.kinematics import Kinematics
 from zones.reach.assembly import Clearances
 
-LINK_FEED = 3000.0  # mm/min, feed moves in air
 ENGAGEMENT_SHARE = 0.15  # of the radius of a tool, between places of the stock: at the edge 32 degrees of it
 SLOT_DEG = 180.0  # engaged angle of a slot
 RAMP_ANGLE = math.radians(3.0)
@@ -198,7 +205,7 @@ def _cut_table(setup: Setup, bodies: Sequence[ToolBody]) -> dict[str, CutData]:
     """Speeds, feeds and layer depths by tool id; layers are slots, as far as the engaged angle is not bounded."""
     out = {}
     for tool, body in zip(setup.tools, bodies, strict=True):
-        link = min(LINK_FEED, setup.machine.max_feed_mm_min or LINK_FEED)
+        link = link_feed(setup)
         engaged = math.radians(SLOT_DEG if tool.max_engagement_deg is None else tool.max_engagement_deg)
         depth = layer_depth(setup, tool, body, engaged)
         rough = cutting_data(setup.material, tool, setup.machine, depth)

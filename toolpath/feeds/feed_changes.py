@@ -4,7 +4,7 @@ A change of feed takes time and way, because acceleration and jerk are limited, 
 on the surface. Where the feed between two rapids changes often, a lower feed over several stretches is nearly as fast.
 The feed of a place never rises, so no bound on load, ramp or deflection is touched. Lengths are mm, feeds mm/min.
 
-Changes are those of ``toolpath.feeds.speed_changes``; the machine accelerates within the faster stretch.
+Changes are those of ``geometry.move_timing``; the machine accelerates within the faster stretch.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.move_timing import Rates
-from toolpath.feeds.speed_changes import change_seconds, change_way, peak_speed
+from geometry.move_timing import Rates, change_seconds, change_way, peak_speed
 from toolpath.lines import SHORTEST, stretch
 from toolpath.workingsteps import Trajectory, TrajectoryKind
 
@@ -61,11 +60,11 @@ def _evened(run: Sequence[Trajectory], rates: Rates) -> list[Trajectory]:
     if len({t.feed for t in run}) < 2:
         return list(run)
     lengths = np.array([t.length for t in run])
-    found = _cheapest(lengths, np.array([t.feed for t in run]), rates.acceleration)
-    return _applied(run, lengths, _long_enough(found, rates.acceleration))
+    found = _cheapest(lengths, np.array([t.feed for t in run]), rates)
+    return _applied(run, lengths, _long_enough(found, rates))
 
 
-def _cheapest(lengths: F64, feeds: F64, acceleration: float) -> list[_Stretch]:
+def _cheapest(lengths: F64, feeds: F64, rates: Rates) -> list[_Stretch]:
     """Feeds up to those given that take the least time, with ``PRICE`` and the time lost for each change.
 
     lengths : (n,) float64, mm
@@ -78,7 +77,7 @@ def _cheapest(lengths: F64, feeds: F64, acceleration: float) -> list[_Stretch]:
     if len(levels) > MAX_LEVELS:
         levels = levels[np.unique(np.linspace(0, len(levels) - 1, MAX_LEVELS).astype(np.int64))]
     speed = levels / 60.0
-    lost = np.array([[change_seconds(a, b, acceleration) * abs(a - b) / (2.0 * max(a, b)) for b in speed.tolist()]
+    lost = np.array([[change_seconds(a, b, rates) * abs(a - b) / (2.0 * max(a, b)) for b in speed.tolist()]
                      for a in speed.tolist()])
     change = np.where(np.eye(len(levels), dtype=np.bool_), 0.0, lost + PRICE)
     seconds = np.where(levels <= feeds[:, None], lengths[:, None] / speed, np.inf)
@@ -107,7 +106,7 @@ def _joined(parts: Sequence[_Stretch]) -> list[_Stretch]:
     return out
 
 
-def _long_enough(parts: Sequence[_Stretch], acceleration: float) -> list[_Stretch]:
+def _long_enough(parts: Sequence[_Stretch], rates: Rates) -> list[_Stretch]:
     """Stretches of at least ``LEAST``, the shortest corrected first.
 
     A stretch takes the feed of a slower neighbour, or is lengthened at the expense of a faster one, whichever takes
@@ -119,7 +118,7 @@ def _long_enough(parts: Sequence[_Stretch], acceleration: float) -> list[_Stretc
     while heap:
         length, k = heapq.heappop(heap)
         own = chain.parts[k]
-        if length != own.length or not _too_short(own, chain.beside(k), acceleration):
+        if length != own.length or not _too_short(own, chain.beside(k), rates):
             continue
         _correct(own, chain.beside(k))
         chain.join(k)
@@ -167,7 +166,7 @@ def _correct(own: _Stretch, beside: Sequence[_Stretch]) -> None:
         own.feed = slower
 
 
-def _too_short(own: _Stretch, beside: Sequence[_Stretch], acceleration: float) -> bool:
+def _too_short(own: _Stretch, beside: Sequence[_Stretch], rates: Rates) -> bool:
     """Whether a stretch is shorter than ``LEAST``, or than the ways of its changes and saves no time worth them."""
     if not beside or own.length <= 0.0:
         return False
@@ -175,18 +174,18 @@ def _too_short(own: _Stretch, beside: Sequence[_Stretch], acceleration: float) -
         return True
     slower = [p.feed / 60.0 for p in beside if p.feed < own.feed]
     speed = own.feed / 60.0
-    ways = sum(change_way(v, speed, acceleration) for v in slower)
+    ways = sum(change_way(v, speed, rates) for v in slower)
     if not slower or own.length >= ways:
         return False
     base = max(slower)
-    saved = own.length / base - _peaked(own.length / len(slower), base, speed, acceleration) * len(slower)
+    saved = own.length / base - _peaked(own.length / len(slower), base, speed, rates) * len(slower)
     return saved < PRICE * len(slower)
 
 
-def _peaked(length: float, base: float, most: float, acceleration: float) -> float:
+def _peaked(length: float, base: float, most: float, rates: Rates) -> float:
     """Seconds from a speed up along a length, mm, as fast as the machine gets there; speeds in mm/s."""
-    peak = peak_speed(length, base, most, acceleration)
-    return change_seconds(base, peak, acceleration) + (length - change_way(base, peak, acceleration)) / peak
+    peak = peak_speed(length, base, most, rates)
+    return change_seconds(base, peak, rates) + (length - change_way(base, peak, rates)) / peak
 
 
 def _applied(run: Sequence[Trajectory], lengths: F64, parts: Sequence[_Stretch]) -> list[Trajectory]:

@@ -18,9 +18,8 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from geometry.mesh import F64
-from geometry.move_timing import RATES
+from geometry.move_timing import RATES, Rates, leg_seconds
 from toolpath.feeds.feed_scheduling import GUARD
-from toolpath.feeds.speed_changes import leg_seconds
 from toolpath.lines import dense, stretch
 from toolpath.stock.stock_map import AIR_TOLERANCE, SURE_RIM, StockMap
 from toolpath.workingsteps import Trajectory, TrajectoryKind
@@ -38,7 +37,7 @@ class Motions:
 
     plunge_feed : straight down, and vertical limit of a way down along a pass
     front_feed  : limit in cut where the whole front of the cutter is in stock that no engaged angle limits
-    acceleration : mm/s²
+    rates       : of the machine, for times
     """
 
     feed: float
@@ -51,7 +50,7 @@ class Motions:
     step_down: float
     tolerance: float
     front_feed: float = math.inf
-    acceleration: float = RATES.acceleration
+    rates: Rates = RATES
 
     def link_seconds(self, lengths: Sequence[float]) -> float:
         """Time of straight moves at the feed of links, with a stop at each corner.
@@ -60,7 +59,7 @@ class Motions:
 
         Returns s.
         """
-        return sum(leg_seconds(a, self.link_feed / 60.0, self.acceleration) for a in lengths)
+        return sum(leg_seconds(a, self.link_feed / 60.0, self.rates) for a in lengths)
 
     def plane_seconds(self, here: F64, to: F64) -> float:
         """Time from a place to another by the clearance plane: up, across and down.
@@ -74,7 +73,7 @@ class Motions:
         lift = max(self.clearance - self.rapid_floor, 0.0)
         rapids = (lift, float(np.hypot(*(to - here)[:2])), lift)
         return self.link_seconds([self.rapid_floor - float(here[2]), self.rapid_floor - float(to[2])]) + sum(
-            leg_seconds(a, self.rapid_feed / 60.0, self.acceleration) for a in rapids)
+            leg_seconds(a, self.rapid_feed / 60.0, self.rates) for a in rapids)
 
 
 @dataclass

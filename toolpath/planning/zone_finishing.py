@@ -392,7 +392,7 @@ def motions_of(cut: CutData, settings: PlanSettings) -> Motions:
     skimmed = math.inf if cut.finish is None or cut.engaged >= UNBOUNDED else cut.finish.feed
     return Motions(cut.feed, cut.plunge_feed, cut.link_feed, settings.rates.rapid, settings.clearance,
                    settings.rapid_floor, settings.ramp_angle, cut.step_down, settings.budget.chord, skimmed,
-                   settings.rates.acceleration)
+                   settings.rates)
 
 
 def step_of(step_id: str, name: str, zone: str | None, zones: Sequence[ZoneArea], operation: str, strategy: str,

@@ -20,7 +20,7 @@ PATH = 0.001
 
 
 def minutes_of(program: Program, setup: ProofSetup) -> F64:
-    """Time of each move of a program with acceleration and deceleration, without dwells.
+    """Time of each move of a program with changes of speed, without dwells.
 
     Returns (m,) float64, min.
 
@@ -43,7 +43,7 @@ def minutes_of(program: Program, setup: ProofSetup) -> F64:
     stop[1:] = (program.tool[1:] != program.tool[:-1]) | (rapid[1:] != rapid[:-1])
     curve = np.zeros(len(way), np.bool_)
     curve[1:] = (program.line[1:] == program.line[:-1]) & ~stop[1:]
-    rates = Rates(setup.rapid_feed, setup.acceleration, max(program.blend, PATH))
+    rates = Rates(setup.rapid_feed, setup.acceleration, max(program.blend, PATH), setup.jerk)
     return np.where(moving, move_seconds(way, feed, rates, stop, curve) / 60.0, even)
 
 

@@ -7,10 +7,9 @@ import itertools
 import numpy as np
 import pytest
 
-from geometry.move_timing import Rates
+from geometry.move_timing import Rates, change_seconds
 from toolpath.feeds import feed_changes
 from toolpath.feeds.feed_changes import LEAST, PRICE, with_few_changes
-from toolpath.feeds.speed_changes import change_seconds
 from toolpath.lines import SHORTEST
 from toolpath.workingsteps import Trajectory, TrajectoryKind
 
@@ -41,7 +40,7 @@ def profile(trajectories):
 def seconds(pieces):
     """What the choice of feeds minimizes: time at the feeds, time lost in changes, and their price."""
     speeds = [f / 60.0 for _, f in pieces]
-    lost = [change_seconds(a, b, 1000.0) * abs(a - b) / (2 * max(a, b)) + PRICE
+    lost = [change_seconds(a, b, RATES) * abs(a - b) / (2 * max(a, b)) + PRICE
             for a, b in itertools.pairwise(speeds) if a != b]
     return sum(length / v for (length, _), v in zip(pieces, speeds, strict=True)) + sum(lost)
 
@@ -72,7 +71,7 @@ def test_the_choice_is_the_best_of_all(seed):
     rng = np.random.default_rng(seed)
     pieces = [(float(a), float(f)) for a, f in zip(rng.uniform(0.5, 3.0, 6), rng.choice([50, 60, 90, 200, 900], 6),
                                                     strict=True)]
-    found = feed_changes._cheapest(np.array([a for a, _ in pieces]), np.array([f for _, f in pieces]), 1000.0)
+    found = feed_changes._cheapest(np.array([a for a, _ in pieces]), np.array([f for _, f in pieces]), RATES)
     levels = sorted({f for _, f in pieces})
     best = min(seconds([(a, f) for (a, _), f in zip(pieces, choice, strict=True)])
                for choice in itertools.product(levels, repeat=6)

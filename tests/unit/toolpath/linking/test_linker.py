@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
+from geometry.move_timing import leg_seconds
 from output.program_grid import to_grid
 from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
 from toolpath.counterexamples import BARRED, CARE, Counterexamples
 from toolpath.feeds.feed_scheduling import GUARD, Pace
-from toolpath.feeds.speed_changes import leg_seconds
 from toolpath.lines import Line, dense, legs
 from toolpath.linking.linker import FLUTE_SHARE, Linker
 from toolpath.linking.rapid_travel import OVER, Motions
@@ -591,8 +591,8 @@ def test_the_clearance_plane_costs_the_stops_between_rapids_and_feed_moves():
     assert 30.0 / m.link_feed > 2.0 / m.link_feed + 32.0 / m.rapid_feed + 0.3 / 60.0
     assert m.link_seconds([30.0]) < m.plane_seconds(here, to)
     assert m.link_seconds([90.0]) > m.plane_seconds(here, to + [60.0, 0.0, 0.0])
-    alone = m.link_seconds([1.0]) + m.link_seconds([1.0]) + 2.0 * leg_seconds(1.0, 10000 / 60, m.acceleration)
-    assert m.plane_seconds(here, to) == pytest.approx(alone + leg_seconds(30.0, 10000 / 60, m.acceleration))
+    alone = m.link_seconds([1.0]) + m.link_seconds([1.0]) + 2.0 * leg_seconds(1.0, 10000 / 60, m.rates)
+    assert m.plane_seconds(here, to) == pytest.approx(alone + leg_seconds(30.0, 10000 / 60, m.rates))
 
 
 def test_legs_end_at_corners():

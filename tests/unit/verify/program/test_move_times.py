@@ -1,6 +1,7 @@
 """Minutes of the moves of programs as they are read."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from verify.kinematics import Kinematics
 from verify.model import ProofSetup
 from verify.program.move_times import minutes_of, spent
 
-SETUP = ProofSetup(rapid_feed=6000.0, acceleration=1e6)
+SETUP = ProofSetup(rapid_feed=6000.0, acceleration=1e6, jerk=math.inf)
 BEGIN = "G21 G17 G90 G94 G40 G49 G80 {}\nG54\nT1 M6\nS1000 M3\nG43 H1\nG0 X0 Y0 Z10\nX100\nX0\n"
 
 
@@ -29,7 +30,7 @@ def test_an_arc_is_not_a_row_of_corners(mode):
 
 def test_corners_cost_a_slow_machine_time():
     square = [f"G1 {w} F6000" for w in ("X10", "Y10", "X0", "Y0")] * 5
-    fast, slow = seconds(square), seconds(square, setup=ProofSetup(rapid_feed=6000.0, acceleration=500.0))
+    fast, slow = seconds(square), seconds(square, setup=replace(SETUP, acceleration=500.0))
     assert fast == pytest.approx(2.0, rel=0.01) and slow == pytest.approx(20 * 2 * math.sqrt(10.0 / 500.0), rel=0.05)
 
 
@@ -50,8 +51,8 @@ def test_a_rotary_axis_in_a_rapid_takes_its_turn():
     begin = "%\nG21 G17 G90 G94 G40 G49 G80 G64 P0.001\nG54\nG0 A0 C0\nT1 M6\nG43 H1\n"
     text = begin + "G0 X0 Y0 Z50\nM428\nG0 C90\nM429\nM2\n%\n"
     program = read_program(text, kinematics=machine)
-    took = {rate: float(minutes_of(program, ProofSetup(rapid_feed=1e6, acceleration=1e7, kinematics=machine,
-                                                       rotary_rate=rate)).sum()) for rate in (None, 1.0)}
+    fast = ProofSetup(rapid_feed=1e6, acceleration=1e7, jerk=math.inf, kinematics=machine)
+    took = {rate: float(minutes_of(program, replace(fast, rotary_rate=rate)).sum()) for rate in (None, 1.0)}
     assert took[1.0] - took[None] == pytest.approx(0.5 * math.pi * (1.0 - 1.0 / math.radians(7200.0)), rel=1e-3)
 
 
