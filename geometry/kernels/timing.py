@@ -58,7 +58,9 @@ def reached(v, length, a, j):
     w² + w a² / j = v² - v a² / j + 2 a l.
     """
     base = a * a / j
-    if base > 0.0 and length > 0.0:
+    if length <= 0.0:
+        return v
+    if base > 0.0:
         x = (length / j) ** (1.0 / 3.0)
         if v > 0.0:
             x = min(x, 0.5 * length / v)
@@ -156,8 +158,8 @@ def seconds_of_moves(way, speed, stop, curve, a, j, d, out):
     _caps(way, size, stop, curve, a, j, d, cap, round_)
     for i in range(m):
         most[i] = speed[i]
-        if round_[i] and round_[i + 1]:  # arcs all along the move
-            most[i] = min(speed[i], max(cap[i], cap[i + 1]))
+        if round_[i] and round_[i + 1] and size[i] <= min(size[i - 1], size[i]) + min(size[i], size[i + 1]):
+            most[i] = min(speed[i], max(cap[i], cap[i + 1]))  # arcs take at least half of the move
     first = np.empty(m + 1, np.int64)  # moves with which stretches begin
     count = 0
     for i in range(m):

@@ -51,6 +51,7 @@ from zones.zoning.zones import ZoneArea
 
 WALL = 0.9  # part of a unit normal along the access: faces with more are no walls
 AGAIN_SHARE = 0.95  # of the progress, before zones are finished again
+ISLAND = 0.8  # of a layer: stock between rings that is left to the next one
 THIN = 2.0  # scallops: thickness on a wall that a finish leaves
 
 Progress = Callable[[float], None]
@@ -361,7 +362,8 @@ class _Layers:
         if self.bounded:
             Clearing(linker, z, area, self.allowance, side, settings.cut_direction,
                      depth_layers.STOCK_WORTH, fine).walk()
-        for lines in depth_layers.layer(self.field, self.stock, z, area, self.allowance, side):
+        for lines in depth_layers.layer(self.field, self.stock, z, area, self.allowance, side,
+                                        ISLAND * self.cut.step_down):
             for line in nearest_order(lines, linker.at, False):
                 linker.add(turned(line, settings), fine)
 

@@ -55,7 +55,7 @@ def between(upper: float, lower: float, step: float) -> list[float]:
 
 
 def layer(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], allowance: float,
-          side_step: float) -> Iterator[list[Line]]:
+          side_step: float, island: float = 0.0) -> Iterator[list[Line]]:
     """Lines of one layer, ring by ring from the outside of the stock to ``allowance`` from the walls.
 
     field     : TipField
@@ -64,6 +64,7 @@ def layer(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], a
     area      : (ny, nx) bool on the lattice, where this tool has something to finish below
     allowance : mm left beside walls
     side_step : mm between rings
+    island    : mm, stock between the rings up to which it is left to the next layer
 
     Yields
     ------
@@ -74,13 +75,14 @@ def layer(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], a
     standing = dilated(stock.above(z + STOCK_WORTH, lat), 2.0 * tool.radius / lat.step)
     active = dilated(area, tool.radius / lat.step) & standing
     # Where rings turn sharply, islands stay between them; rings half a step off take these.
-    for lines in rings(field, z, active, (allowance, allowance + 0.5 * side_step), side_step):
-        kept: list[Line] = []
-        for line in lines:
-            wanted = stock.overlap(line.points, tool, lower_bound=0.0) > STOCK_WORTH
-            kept.extend(pieces_where(line, wanted, 0.6 * tool.radius, 3.0 * tool.radius))
-        if kept:
-            yield kept
+    for first, worth in ((allowance, STOCK_WORTH), (allowance + 0.5 * side_step, max(STOCK_WORTH, island))):
+        for lines in rings(field, z, active, (first,), side_step):
+            kept: list[Line] = []
+            for line in lines:
+                wanted = stock.overlap(line.points, tool, lower_bound=0.0) > worth
+                kept.extend(pieces_where(line, wanted, 0.6 * tool.radius, 3.0 * tool.radius))
+            if kept:
+                yield kept
 
 
 def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], finished: NDArray[np.bool_],

@@ -200,3 +200,10 @@ def test_round_a_circle_the_jerk_binds_only_at_its_ends():
     v = (rates.jerk * 4.0) ** (1.0 / 3.0)
     took = float(move_seconds(way, np.full(len(way), 60e3), rates).sum())
     assert took == pytest.approx(160.0 * math.pi / v, rel=0.015)
+
+
+def test_a_move_next_to_nothing_slows_only_its_own_corners():
+    """Rounding leaves moves of a nanometre square to the way; what lies beside them is run as fast as before."""
+    way = [[2.0, 0, 0], [0, 0, 1e-9], [-0.02, 0, 0], [0, 0, -1e-9], [2.0, 0, 0]]
+    alone = [total([[x, 0, 0]], 3000.0, Rates(1e4, A, 0.001)) for x in (2.0, 0.02, 2.0)]
+    assert total(way, 3000.0, Rates(1e4, A, 0.001)) == pytest.approx(sum(alone), rel=0.02)
