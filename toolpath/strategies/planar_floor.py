@@ -14,13 +14,14 @@ from scipy import ndimage
 
 from geometry.mesh import F64
 from toolpath.lines import Line, pieces_where, thinned
-from toolpath.passes.contours import contours, dilated, lines_at
+from toolpath.passes.contours import contours, dilated, free_pieces, lines_at
 from zones.lattice import blocked_beside
 from zones.reach.tip_field import INSIDE, LEVEL_TOLERANCE, TipField
 
 SAME_PLANE = 5e-4  # mm
 EXACT = INSIDE / 3.0  # mm: contour, thinning, and where a crossing is placed: together they stay within INSIDE
 ROUND = 0.25  # of the flat radius over which rings are rounded, which takes the steps of the lattice out of them
+SPOT = 0.25  # of the flat radius: a smaller ring is a straight line
 THIN = 0.02  # lattice steps that thinned lines keep
 FINER = 4  # ratio of the lattice of one round to that of the next
 NEAR = 2.0  # steps of the planning lattice round the residual that get lines
@@ -104,7 +105,20 @@ def _rings(field: TipField, z: float, area: NDArray[np.bool_], first: float, spa
     d = min(max(first, 0.6 * lat.step), 0.9 * deepest)
     far, everywhere = np.ascontiguousarray(far), np.ones(area.shape, np.bool_)
     while 0 < d < deepest:
-        out.extend(Line(thinned(p.points, THIN * lat.step), p.closed)
-                   for p in lines_at(field, z, far, d, everywhere, (lat.x0, lat.y0), ROUND * flat))
+        found = lines_at(field, z, far, d, everywhere, (lat.x0, lat.y0), ROUND * flat)
+        out.extend(Line(thinned(q.points, THIN * lat.step), q.closed)
+                   for p in found for q in (_across(field, p) if _is_spot(p, flat) else [p]))
         d += spacing
     return out
+
+
+def _is_spot(line: Line, flat: float) -> bool:
+    """Whether a ring is so small that the flat covers the same place along its length alone."""
+    return line.closed and float(np.ptp(line.points[:, :2], axis=0).max()) < SPOT * flat
+
+
+def _across(field: TipField, ring: Line) -> list[Line]:
+    """The free pieces of the straight line between the two ends of a ring."""
+    first = ring.points[int(np.argmax(np.linalg.norm(ring.points - ring.points[0], axis=1)))]
+    last = ring.points[int(np.argmax(np.linalg.norm(ring.points - first, axis=1)))]
+    return free_pieces(field, np.vstack([first, last]), False)
