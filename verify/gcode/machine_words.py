@@ -23,7 +23,8 @@ SIEMENS_M: dict[int, str] = _LINUXCNC | {
 HEIDENHAIN_M: dict[int, str] = _LINUXCNC | {
     92: "a place of the machine's maker", 95: "other approaches of radius compensation",
     96: "other approaches of radius compensation", 97: "other corners of radius compensation",
-    98: "open contours of radius compensation", 104: "the zero of before", 112: "rounded corners",
+    98: "open contours of radius compensation", 104: "the zero of before",
+    109: "a feed that rises on arcs outside", 112: "rounded corners",
     114: "another compensation of rotary axes", 124: "points that are left out",
     130: "coordinates that are not tilted", 136: "feed per turn", 138: "a choice of tilting axes",
     140: "a retract without MB and its length", 142: "the end of shifts, mirrors and scales",

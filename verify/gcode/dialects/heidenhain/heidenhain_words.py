@@ -26,8 +26,7 @@ M_AFTER = frozenset({0, 1, 2, 5, 9, 30, 129})
 """M words that act at the end of their block."""
 M_WORDS = {0: "M0 M5 M9", 1: "M1 M5 M9", 6: "M5", 13: "M3 M8", 14: "M4 M8", 19: "M5", 128: "M428", 129: "M429"}
 """Their words for the reader. M0, M1, M6 and M19 stop the spindle, M0 and M1 the coolant too."""
-M_IDLE = frozenset({7, 101, 102, 103, 105, 106, 107, 108, 109, 110, 111, 113, 115, 116, 117, 118, 120, 126, 127, 137,
-                    141,
+M_IDLE = frozenset({7, 101, 102, 103, 105, 106, 107, 108, 110, 111, 113, 115, 116, 117, 118, 120, 126, 127, 137, 141,
                     145, 148, 149, 150})
 """M words that change feed, tool life or messages only; M126 and M127 are kept as state."""
 _KNOWN_M = M_BEFORE | M_AFTER | M_IDLE | {89, 91, 99}
