@@ -48,10 +48,10 @@ SMALL = 0.01
 _DEF = re.compile(rf"TOOL DEF\s+(\"[^\"]*\"|{NUMBER}|QS?[0-9]+)((?:\s+[LR]\s*{VALUE})*)")
 _SIZE = re.compile(rf"([LR])\s*({VALUE})")
 _IDLE = ("BLK FORM", "* -", "*", "FUNCTION PROG PATH", "FUNCTION MODE MILL", "FUNCTION FEED DWELL",
-         "FUNCTION S-PULSE",
+         "FUNCTION S-PULSE RESET",
          "FUNCTION DWELL", "WMAT", "CYCL DEF 13.", "FUNCTION COUNT", "FUNCTION FILE", "OPEN TABLE",
          "FUNCTION FEED RESET",
-         "FUNCTION AFC", "SEL TABLE", "FUNCTION DCM", "FUNCTION SPINDLE", "CYCL DEF 14.",
+         "FUNCTION AFC", "SEL TABLE", "FUNCTION DCM", "CYCL DEF 14.",
          "FUNCTION DRESS OFF")
 _REFUSED = {
     "FPOL": "a free contour", "FL": "a free contour", "FC": "a free contour", "FLT": "a free contour",
@@ -65,7 +65,7 @@ _REFUSED = {
     "FUNCTION POLARKIN": "polar kinematics", "SEL CORR-TABLE": "a correction table",
     "FUNCTION CORRDATA": "a correction table",
     "TRANS DATUM TABLE": "a datum table", "SEL TABLE": "a datum table", "FUNCTION TURNING": "turning",
-    "CALL PGM": "another program",
+    "CALL PGM": "another program", "FUNCTION S-PULSE P-TIME": "a spindle speed that swings",
 }
 """Openings of blocks that move or cut and are not followed, and what they are."""
 

@@ -24,7 +24,6 @@ from verify.gcode.dialects.siemens.siemens_flow import LABEL, NUMBERED, PLAIN, S
 from verify.gcode.dialects.siemens.siemens_moves import CURVES, Line
 from verify.gcode.dialects.siemens.siemens_words import (
     COMPRESSORS,
-    DEGREE_IS_MM,
     ENVELOPES,
     IDLE,
     IDLE_CALLS,
@@ -40,6 +39,7 @@ from verify.gcode.dialects.siemens.siemens_words import (
     UNBOUNDED,
     UNITS,
     VALUES,
+    check_limit,
     factor_of_feeds,
 )
 from verify.gcode.machine_words import SIEMENS_M
@@ -240,11 +240,7 @@ class SiemensReader(SiemensCalls):
             return self._system(name, reader, end)
         if name in IDLE_VALUES:
             reader.at = end
-            value = reader.value()
-            if name == "FGREF" and isinstance(value, float) and value < DEGREE_IS_MM:
-                raise BlockError(f"FGREF[ ]={value:g} is not followed: a rotary axis turns faster than the degrees of "
-                                 "F", "leave FGREF as it is")
-            return None
+            return check_limit(name, reader.text[behind:end], reader.value())
         if name in REFUSED:
             raise BlockError(f"{name} ({REFUSED[name]}) is not followed")
         reader.at = behind
@@ -356,6 +352,7 @@ class SiemensReader(SiemensCalls):
             return None
         if name == "DISC" or name in IDLE_VALUES or re.fullmatch(r"H[0-9]+", name):
             value = self._stood(reader) if name in ("SPOS", "SPOSA") else reader.value()
+            check_limit(name, "", value)
             if name == "DISC" and value:
                 raise BlockError("DISC= above 0 (other outside corners of cutter radius compensation) is not followed")
             if name in ("SPOS", "SPOSA"):

@@ -15,7 +15,7 @@ SAME = frozenset({0, 1, 2, 3, 17, 18, 19, 40, 53, 54, 55, 56, 57, 90, 91, 93, 94
 """G words that the reader takes as they are."""
 UNITS = {700: 20, 710: 21, 71: 21}
 UNBOUNDED = frozenset({64, 642, 643, 644, 645})
-IDLE_CODES = frozenset({9, 62, 290, 601, 602, 603, 621, 810, 820, 962, 971})
+IDLE_CODES = frozenset({9, 62, 290, 601, 602, 603, 621, 810, 820, 971})
 """G words without effect on a path: exact stops, feeds in corners, groups of the machine's maker."""
 
 
@@ -26,7 +26,8 @@ def _named(meaning: str, words: str) -> dict[str, str]:
 _SOFT = "a soft approach or retract"
 MOVES = {5: "an oblique plunge", 7: "an oblique plunge", 33: "thread cutting", 34: "thread cutting",
          35: "thread cutting",
-         58: "a programmable work offset", 59: "a programmable work offset", 96: "constant cutting speed",
+         58: "a programmable work offset", 59: "a programmable work offset",
+         96: "constant cutting speed", 962: "constant cutting speed",
          **dict.fromkeys((147, 148, 247, 248, 340, 341, 347, 348), _SOFT),
          **dict.fromkeys((460, 461, 462), "a longer approach of cutter radius compensation")}
 """G words that are not followed, and what they do."""
@@ -34,7 +35,7 @@ MOVES = {5: "an oblique plunge", 7: "an oblique plunge", 33: "thread cutting", 3
 IDLE = frozenset("""
     ACTBLOCNO BLSYNC BRISK CDOF CDOF2 CDON CFC CFIN CFTCP COMPOF CORROF CP CPRECOF CPRECON CUT2D CUT2DF
     DELAYFSTOF DELAYFSTON DIAMOF DISPLOF DISPLON DRIVE DYNFINISH DYNNORM DYNPOS DYNPREC DYNROUGH
-    DYNSEMIFIN FCUB FFWOF FFWON FIFOCTRL FLIN FNORM FTOCOF GWPSOF IPTRLOCK IPTRUNLOCK NORM OSC OSD OSOF
+    DYNSEMIFIN FFWOF FFWON FIFOCTRL FNORM FTOCOF GWPSOF IPTRLOCK IPTRUNLOCK NORM OSC OSD OSOF
     OSS OSSE OST PAROTOF RTLION SAVE SBLOF SBLON SOFT SPATH SPCOF SPCON STARTFIFO STOPFIFO STOPRE SUPD
     TOROTOF TOWSTD UPATH WALIMOF WALIMON""".split())
 """Words that change speed, smoothing, display or the flow of blocks only."""
@@ -43,10 +44,11 @@ COMPRESSORS = frozenset({"COMPON", "COMPCURV", "COMPCAD", "COMPSURF"})
 """Words after which the control may leave the path, by CTOL where it is stated."""
 
 IDLE_VALUES = frozenset("""
-    ACC ACCLIMA FGREF FL H JERKLIM JERKLIMA LIMS OVRA OVRRAP SPOS SPOSA STOLF VELOLIM
+    ACC ACCLIMA FGREF FL H JERKLIM JERKLIMA OVRA OVRRAP SPOS SPOSA STOLF VELOLIM
     VELOLIMA""".split())
 """Names with a value that change speed, smoothing or outputs only."""
 
+_AXES = frozenset("XYZABC")
 DEGREE_IS_MM = 57.2957
 """mm, FGREF of a rotary axis at which one degree counts as 1 mm: as delivered."""
 
@@ -98,7 +100,9 @@ REFUSED = {
     **_named("an angle of a line", "ANG"), **_named("surface normals",
                                                                                       "A4 B4 C4 A5 B5 C5"),
     **_named("a lead or tilt angle", "LEAD TILT"), **_named("a turn of the tool about itself", "THETA"),
-    **_named("a feed per tooth", "FZ"), **_named("a cutting rate", "SVC"), **_named(_SOFT, "DISR DISCL"),
+    **_named("a feed that changes along its move", "FLIN FCUB FPO"),
+    **_named("a limit of the spindle speed", "LIMS"), **_named("a feed per tooth", "FZ"),
+    **_named("a cutting rate", "SVC"), **_named(_SOFT, "DISR DISCL"),
     **_named("another transformation", "TRACON TRANSMIT TRACYL TRAANG"),
     **_named("a positioning axis", "POS POSA POSP"), **_named("a turn of the tool", "ORIRESET"),
     **_named("coordinates that count as diameters", "DIAMCHANA"),
@@ -110,6 +114,21 @@ LENGTH_BY_PLANE = Assumed(AssumedKind.LENGTH_AXIS, "Z in the planes G18 and G19 
                           "the length of a mill counts in Y in G18 and in X in G19, and the tool goes down by it",
                           "program G17, or set SD42940 $SC_TOOL_LENGTH_CONST to 17 on the machine")
 """What a program leaves open that changes the plane while a length offset is on."""
+
+
+def check_limit(name: str, index: str, value: float | str) -> None:
+    """Refuse a limit or factor NAME[index] = value that changes what F or S of the program mean.
+
+    Raises
+    ------
+    BlockError
+        FGREF below ``DEGREE_IS_MM``, or a factor of the speed of a spindle.
+    """
+    if name == "FGREF" and isinstance(value, float) and value < DEGREE_IS_MM:
+        raise BlockError(f"FGREF[ ]={value:g} is not followed: a rotary axis turns faster than the degrees of F",
+                         "leave FGREF as it is")
+    if name in ("OVRA", "VELOLIM") and index.strip("[] =") not in _AXES:
+        raise BlockError(f"{name}{index.strip('= ')} is not followed: it may slow the spindle down", "program S")
 
 
 def factor_of_feeds(percent: float) -> float:
@@ -125,6 +144,6 @@ def factor_of_feeds(percent: float) -> float:
     return percent / 100.0
 
 
-__all__ = ["COMPRESSORS", "DEGREE_IS_MM", "ENVELOPES", "IDLE", "IDLE_CALLS", "IDLE_CODES", "IDLE_VALUES",
+__all__ = ["COMPRESSORS", "ENVELOPES", "IDLE", "IDLE_CALLS", "IDLE_CODES", "IDLE_VALUES",
            "LENGTH_BY_PLANE", "MOVES", "NOT_FOLLOWED", "REFUSED", "SAME", "SHARP_STYLE", "SIEMENS_STYLE", "UNBOUNDED",
-           "UNITS", "VALUES", "factor_of_feeds"]
+           "UNITS", "VALUES", "check_limit", "factor_of_feeds"]

@@ -94,6 +94,7 @@ REFUSED = [
     ("L X+Q9", "Q9 has no value yet"), ("FN 4: Q1 = +1 DIV +0", "no value here"),
     ("FN 18: SYSREAD Q1 = ID1", "FN 18 is not"),
     ("L X+1 M136", "M136 (feed per turn)"), ("L X+1 M109", "M109 (a feed that rises"),
+    ("FUNCTION S-PULSE P-TIME10 SCALE50", "a spindle speed that swings"),
     ("L X+1 M142", "M142 (the end of shifts"),
     ("CC X+0 Y+0\nRND R5", "needs a move directly before"),
     ("L X+10\nRND R500\nL Y+5", "does not fit"), ("L X+10\nCHF 50\nL Y+5", "longer than a line"),

@@ -277,9 +277,18 @@ def test_save_brings_unit_and_kind_of_feed_back():
             read(f"UP1\nM30\nPROC UP1 SAVE\n{word}\nRET", "siemens")
 
 
-def test_a_cutting_rate_is_refused():
-    with pytest.raises(ProgramError, match="a cutting rate"):
-        read("SVC=1\nG1 X1", "siemens")
+@pytest.mark.parametrize(("word", "why"), [
+    ("SVC=1", "a cutting rate"), ("FLIN", "changes along its move"), ("G1 X1 F5 FCUB", "changes along its move"),
+    ("LIMS=100", "a limit of the spindle"), ("G962", "constant cutting speed"), ("OVRA[S1]=10", "slow the spindle"),
+    ("VELOLIM[S1]=10", "slow the spindle"), ("VELOLIM[SPI(1)]=10", "slow the spindle"),
+    ("OVRA=10", "slow the spindle")])
+def test_words_that_part_feed_and_speed_from_f_and_s_are_refused(word, why):
+    with pytest.raises(ProgramError, match=why):
+        read(f"{word}\nG1 X1", "siemens")
+
+
+def test_limits_of_axes_are_read():
+    assert len(read("VELOLIM[X]=50 OVRA[C]=50\nFL[Y]=10\nACC[X]=80\nFNORM\nG1 X1 F500", "siemens"))
 
 
 @pytest.mark.parametrize("lines", ["CTOL=1\nCOMPCAD", "COMPCAD\nCTOL=1", "COMPCAD CTOL=1", "G642\nG1 X1\nCTOL=1",
