@@ -278,6 +278,17 @@ def stands_behind_taps(rng: Rng) -> Case:
                 word="spindle")
 
 
+def other_feed_by_a_word(rng: Rng) -> Case:
+    """A word of Siemens or Heidenhain after which feed or speed is not what F and S say."""
+    part, word = choice(rng, *LEVEL), choice(rng, "VELOLIM[S1]=2", "OVRA[S1]=2", "FLIN", "FCUB", "SVC=1", "FGROUP(Z)",
+                                             "FUNCTION S-PULSE P-TIME10 SCALE90", "M109")
+    dialect = "heidenhain" if word[0] == "M" or " " in word else "siemens"
+    s = PARTS[part].program()
+    s.ops.insert(2, Op("raw", text=word))
+    return made("other feed by a word", part, s, (REFUSED, "load"), None, None, {"machine": {"dialects": [dialect]}},
+                dialect, what=word)
+
+
 def surface_speed(rng: Rng) -> Case:
     """A speed in titanium over 31 times the recommended one: the cutter burns."""
     part = choice(rng, "plate", "step")
@@ -308,4 +319,5 @@ MECHANISMS = {"wrong length offset": wrong_length_offset, "no length offset": no
               "G91 left on": incremental_left_on, "block delete": block_delete, "pasted twice": pasted_twice,
               "over a limit": over_limit, "chip too thick": chip_too_thick, "deep slot": deep_slot,
               "surface speed": surface_speed, "ends in the part": below_at_end, "bends too far": bends_too_far,
-              "steep climb": steep_climb, "stands behind taps": stands_behind_taps}
+              "steep climb": steep_climb, "stands behind taps": stands_behind_taps,
+              "other feed by a word": other_feed_by_a_word}
