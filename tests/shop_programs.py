@@ -9,6 +9,7 @@ HEAD = "%\nO1000 (PART)\nG21 G90 G17\nG0 G40 G49 G80\nT1 M6\nS900 M3\nG54 G43 H1
 TWIN = "%\nG21 G90 G17\nT1 M6\nS900 M3\nG43 H1\nG0 X0 Y0 Z5\nG1 F500\n"
 
 LINUXCNC = {
+    "dwell and move in one block": "G4 P.5 G1 X5 Y2\nG4 P1 X9\nG4 P0.1 G0 Z9\nG4 P1 Y0\n",
     "compensated square": "G41 D1 G1 X10\nY20\nX-20\nY-20\nX10\nY0\nG40 X0\n",
     "compensated outside": "G42 D1 G1 X10\nY20\nX-20\nY-20\nX10\nY0\nG40 X0\n",
     "compensated island": "G41 D1\nG1 X-10 Y0\nG2 X10 I10\nG2 X-10 I-10\nG40 G1 X-20\n",

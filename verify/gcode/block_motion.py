@@ -46,8 +46,10 @@ class BlockMotion(FrameWords):
         plane = PLANE_AXES[s.plane]
         self.across = bool(self.polar) or axes[plane[0]] is not None or axes[plane[1]] is not None
         turn = self._turn(values, absolute=53 in block.codes)
-        if 4 in block.codes:
-            return self._wait(turn is not None or bool(self.polar) or any(a is not None for a in axes), values)
+        circle = s.motion in (2, 3) and not values.keys().isdisjoint("IJK")
+        moves = turn is not None or bool(self.polar) or circle or any(a is not None for a in axes)
+        if 4 in block.codes and not (self._wait(moves, values) and moves):
+            return None
         if not SHIFTS.isdisjoint(block.codes):
             self._settled("a word that moves program zero")
             return self._shift_origin(block, axes)
@@ -57,8 +59,7 @@ class BlockMotion(FrameWords):
             return self._machine_place(axes, turn)
         if not {28, 30}.isdisjoint(block.codes):
             return self._home(axes, turn, values)
-        full_circle = s.motion in (2, 3) and not values.keys().isdisjoint("IJK")
-        if all(a is None for a in axes) and turn is None and not self.polar and not full_circle:
+        if not moves:
             return None
         if s.motion is None or s.motion == 80:
             return self.log.error("coordinates without a motion word")
@@ -81,16 +82,23 @@ class BlockMotion(FrameWords):
             return self._go(target, FEED, rate, turn, minutes)
         return self._arc(target, values, feed, turn)
 
-    def _wait(self, coordinates: bool, values: dict[str, float]) -> None:
+    def _wait(self, moves: bool, values: dict[str, float]) -> bool:
+        """G4: whether it is followed. LinuxCNC dwells before it moves; P would be the turns of an arc as well."""
+        refused = ""
         if "P" not in values:
-            return self.log.error("G4 needs P")
-        if values["P"] < 0:
-            return self.log.error(f"G4 P{values['P']:g} is a negative dwell")
-        if coordinates:
-            return self.log.error("coordinates in a block with G4: some controls move, some dwell")
+            refused = "G4 needs P"
+        elif values["P"] < 0:
+            refused = f"G4 P{values['P']:g} is a negative dwell"
+        elif moves and self.control is not None:
+            refused = "coordinates in a block with G4: some controls move, some dwell"
+        elif moves and self.s.motion not in (0, 1):
+            refused = "coordinates in a block with G4 that G0 or G1 does not lead to"
+        if refused:
+            self.log.error(refused)
+            return False
         self.dwell += values["P"]
         self.log.dwells.append((self.log.line, self.log.count, values["P"]))
-        return None
+        return True
 
     def _target(self, axes: list[float | None]) -> list[float]:
         s = self.s

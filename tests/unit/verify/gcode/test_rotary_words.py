@@ -162,7 +162,7 @@ def test_axes_that_never_leave_zero_change_nothing():
     ("G43 G43.4 H1\n", "G43 and G43.4 in one block", "correct"),
     ("M428 M429\n", "M428 and M429 in one block", "correct"),
     ("G81 X1 Y1 Z-1 R1 A5 F100\n", "a drilling cycle turns a rotary axis in its block", "correct"),
-    ("G4 P1 A5\n", "coordinates in a block with G4", "correct"), ("G80\nA5\n", "without a motion word", "correct"),
+    ("G2 G4 P1 A5\n", "coordinates in a block with G4", "correct"), ("G80\nA5\n", "without a motion word", "correct"),
     ("G0 A30\n", "without tool centre point control at A30 C0", "machine.pivots_mm"),
     ("M428\nA30\nM429\nX0 Y0 Z0\n", "without tool centre point control at A30 C0", "machine.pivots_mm"),
     ("G93 G1 A5\n", "needs F in every block", "correct"), ("G1 A5\n", "without a feed", "correct")])
