@@ -9,9 +9,10 @@ from benchmarks.jobs.plain_plates import TOOLS, plate
 from schemas.setup import Setup
 from service.pipeline import plan, verify_program
 from service.stages import sample_spacing
-from tests.step_files import write_step
+from tests.step_files import PARTS, write_step
 
 pytest.importorskip("cadquery")
+CASE = PARTS.parent / "cases" / "parts" / "plain_plate_300.step"
 
 
 @pytest.mark.slow
@@ -28,6 +29,15 @@ def test_a_plate_is_proved_with_few_samples_as_with_many(tmp_path, monkeypatch):
     assert few["reach_coverage"] == pytest.approx(many["reach_coverage"], abs=1e-3)
     assert [(z["tool"], z["strategy"]) for z in few["zones"]] == \
         [(z["tool"], z["strategy"]) for z in many["zones"]]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not CASE.is_file(), reason="the collection of cases (../shared/cases) is not here")
+def test_the_large_plate_of_the_cases_is_proved_with_few_samples(tmp_path):
+    """300 x 200 mm; with 100 samples a mm² it took 131 s and more."""
+    report = plan(CASE, Setup.model_validate({"tools": TOOLS}), tmp_path, lambda *_: None)
+    assert report["state"] == "proved" and not report["findings"] and report["coverage"] > 0.9999
+    assert report["proof"]["samples"] < 20.0 * sum(d["area_mm2"] for d in report["deviation"])
 
 
 FACING = [f"G0 X-20 Y{y:g} Z10\nG1 Z{{z}} F500\nX20\nG0 Z10" for y in (-9, -5, -1, 3, 7, 11)]

@@ -13,10 +13,11 @@ from geometry.part import Part
 from geometry.setup_frame import SetupFrame
 from geometry.step_import.occ.loading import load_part
 from geometry.step_import.reader import read_part
-from tests.step_files import write_step
+from tests.step_files import PARTS, write_step
 
 cq = pytest.importorskip("cadquery")
 
+CASE = PARTS.parent / "cases" / "parts" / "asm_plate_and_bolt.step"
 PLACES = re.compile(r"\((-?[\d.]+), (-?[\d.]+), (-?[\d.]+)\)")
 
 
@@ -52,6 +53,18 @@ def test_products_of_an_assembly_are_separate_and_named(tmp_path):
     assert "solid 1 (plate" in found.message and "solid 2 (bolt" in found.message
     assert "solid 2 only touches solid 1 on a face at (" in found.message
     assert "part.solid: N" in found.remedy and "part.fuse: true" in found.remedy
+
+
+@pytest.mark.skipif(not CASE.is_file(), reason="the collection of cases (../shared/cases) is not here")
+def test_the_bolt_in_a_plate_of_the_cases_is_refused_chosen_and_fused():
+    found = refused(CASE)
+    assert found.code == "several_solids" and found.subjects == ("solid 1", "solid 2") and found.measured == 2
+    assert "solid 1 (plate" in found.message and "solid 2 (bolt" in found.message
+    plate, bolt, both = load_part(CASE, solid=1), load_part(CASE, solid=2), load_part(CASE, fuse=True)
+    assert plate.bounds[1] - plate.bounds[0] == pytest.approx([40, 30, 10], abs=1e-3)
+    assert bolt.bounds[1] - bolt.bounds[0] == pytest.approx([13, 13, 15], abs=1e-3)
+    assert both.volume == pytest.approx(plate.volume + bolt.volume, rel=1e-3)
+    assert refused(CASE, solid=3).code == "no_such_solid"
 
 
 def test_each_product_can_be_chosen(tmp_path):
