@@ -73,7 +73,7 @@ from verify.surface.sample_scores import RAY_ERROR, face_proofs, proved_samples,
 from verify.surface.surface_cuts import SurfaceCuts, reach_of, surface_cuts
 from verify.surface.unread_work import unread_work
 from verify.surface.wall_support import supported
-from verify.surface.ways_in import deep_findings
+from verify.surface.ways_in import deep_findings, slot_findings
 from verify.surface.work_done import work_done
 
 # shares of the work done: read, places between samples settled, residuals, support, contacts known
@@ -168,7 +168,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                             error_bound([p.program for p in framed]))
         unread = None if asked.whole is None else unread_work(asked.whole, framed[0], measured, cutting, tools)
         work, left = work_done(asked, measured, cutting, run.cut, source, unread)
-        findings += [*cuts.allowance, *left, *deep_findings(scored.samples, cuts.residual, cuts.mover, cutting, source)]
+        findings += [*cuts.allowance, *left, *deep_findings(scored.samples, cuts.residual, cuts.mover, cutting, source),
+                     *slot_findings(scored.samples, cuts.residual, cutting, source)]
     notes = [*cuts.notes, *springs, *(note for p in framed for note in p.notes())]
     dips = [Assumed(AssumedKind.BETWEEN_SAMPLES, round(met.dip, 3), "the fixtures are so large that a ball may enter "
                     f"one by {met.dip:.3f} mm unseen", "give smaller boxes where tools go")] * (met.dip > DIP + 1e-9)
