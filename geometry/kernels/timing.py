@@ -86,7 +86,7 @@ def leg_seconds(v, w, most, length, a, j):
                 low = middle
             else:
                 high = middle
-        high = low
+        high = low if low > 0.0 else high  # so short that no halving was slow enough: 1e-12 of ``most``
     even = length - change_way(v, high, a, j) - change_way(high, w, a, j)
     return change_seconds(v, high, a, j) + change_seconds(high, w, a, j) + max(even, 0.0) / high
 

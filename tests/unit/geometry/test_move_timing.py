@@ -176,6 +176,8 @@ def test_a_move_is_as_long_as_its_parts(length):
         assert seconds == pytest.approx(2.0 * change_seconds(0.0, peak, rates) +
                                         (length - 2.0 * change_way(0.0, peak, rates)) / peak)
     assert leg_seconds(0.0, 50.0, rates) == leg_seconds(-1.0, 50.0, rates) == 0.0
+    assert all(0.0 < leg_seconds(length, speed, rates) < 1e-5 for length in (1e-17, 1e-18, 1e-21, 1e-30, 5e-324)
+               for speed in (1.0, 50.0, 500.0))
     assert total([[length, 0, 0]], 3000.0, rates) == pytest.approx(seconds)
 
 
