@@ -120,7 +120,11 @@ def cycle_blocks(call: CycleCall, here: Sequence[float], machine: Machine, over:
         raise BlockError(f"cycle {n} whose depth counts to the edge of the drill (Q395=1) is not followed: give that "
                          f"of its tip")
     hole = DrilledHole(clear, surface - depth, back, dwell=dwell, surface=surface, **ways)  # type: ignore[arg-type]
-    return hole_blocks(hole, here, 2, unit, False)
+    blocks = hole_blocks(hole, here, 2, unit, False)
+    if n not in (207, 209):
+        return blocks
+    # rigid tapping turns the spindle itself, and controls differ in whether it stands at its end
+    return [*([] if machine.s.turning else ["M3"]), *blocks, "M5"]
 
 
 def _ways(call: CycleCall, machine: Machine, surface: float, depth: float, feed: Callable[[float], str],

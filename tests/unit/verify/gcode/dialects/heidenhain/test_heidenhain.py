@@ -41,6 +41,20 @@ def test_a_rounding_between_a_line_and_an_arc_touches_both():
     assert np.linalg.norm(middle - [30.0, 12.0]) == pytest.approx(14.0)  # both arcs touch from outside
 
 
+@pytest.mark.parametrize(("cycle", "stands"), [
+    ("CYCL DEF 207 TAP Q200=2 Q201=-5 Q239=+1 Q203=+0 Q204=10", True),
+    ("CYCL DEF 209 TAP Q200=2 Q201=-5 Q239=+1 Q203=+0 Q204=10 Q257=2 Q256=0 Q336=0", True),
+    ("CYCL DEF 17.0 TAP\nCYCL DEF 17.1 SETUP 2\nCYCL DEF 17.2 DEPTH -5\nCYCL DEF 17.3 PITCH +1", True),
+    ("CYCL DEF 206 TAP Q200=2 Q201=-5 Q206=100 Q211=0 Q203=+0 Q204=10", False)])
+def test_the_spindle_stands_behind_rigid_tapping(cycle, stands):
+    for before in ("M3", "M5"):
+        for again in ("", "M3\n"):
+            p = read(f"L X+0 Y+0 R0 FMAX\nL Z+20 R0 FMAX {before}\n{cycle}\nCYCL CALL\nL X+5 R0 FMAX M99\n{again}"
+                     "L X+9 R0 F500", "heidenhain")
+            told = any("spindle standing" in r.message for r in p.remarks)
+            assert told == (not again if stands else before == "M5"), (before, again, p.remarks)
+
+
 def test_bore_milling_stays_in_its_bore():
     p = read(PAIRS["bore milling"][0], "heidenhain")
     feed = p.kind == 1
