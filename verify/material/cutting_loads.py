@@ -236,7 +236,10 @@ class _Judge:
 
         def text(value: float, i: int) -> str:
             return f"{cut(i)} would bend its tip by {value:.3f} mm"
-        far, _ = self._over(last, force * soft, BEND_TIMES * said.bend, math.inf, "load", text,
+        # lines on the very edge of a slot may stay for a pass and show twice its depth: as wide as the tool it is less
+        slot = cutting_forces(said.kc, said.mc, per_tooth[turns], section / tool.diameter,
+                              np.full(len(section), tool.diameter), tool, said.flutes)
+        far, _ = self._over(last, np.minimum(force, slot) * soft, BEND_TIMES * said.bend, math.inf, "load", text,
                             f"{BEND_TIMES:g} times the limit of {said.bend:.3f} mm is {BEND_TIMES * said.bend:.3f} mm",
                             "", advice)
         _, bent = self._over(last, bend, math.inf, said.bend, "deflection", text, "", f"limit {said.bend:.3f} mm",

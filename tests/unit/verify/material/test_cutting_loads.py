@@ -95,6 +95,17 @@ def test_a_tool_that_bends_ten_times_its_limit_is_a_load():
         assert not harm or 0.9 * bend < found[0].depth <= bend * 1.001  # for the least width that the stock shows
 
 
+def test_layers_of_a_slot_bend_no_more_than_each_of_them():
+    """Lines of the stock on the very edge of the slot may stay for a pass: then the depth seems to be that of two."""
+    slim = replace(MILL, stickout=45.0)
+    layers = ["G0 X-26 Y12", "Z0.5"]
+    for k in range(1, 7):
+        layers += [f"G1 Z{0.5 - 0.5 * k:.4f} F400", f"X{26 if k % 2 else -26} F600"]
+    bend = closed_form(0.5, 4.0, 600, 8000, slim)[2]
+    assert 0.3 < bend < 0.5 < 2.0 * bend
+    assert judged(layers, tool=slim)[0] == []
+
+
 def climbing(degrees):
     """Up through the full height of the block, from beside it."""
     rise = 6.0 * math.tan(math.radians(degrees))
