@@ -97,13 +97,14 @@ def test_a_tool_that_bends_ten_times_its_limit_is_a_load():
 
 def test_layers_of_a_slot_bend_no_more_than_each_of_them():
     """Lines of the stock on the very edge of the slot may stay for a pass: then the depth seems to be that of two."""
-    slim = replace(MILL, stickout=45.0)
+    slim, two = replace(MILL, stickout=56.0), replace(WORDS, flutes=2)
     layers = ["G0 X-26 Y12", "Z0.5"]
     for k in range(1, 7):
-        layers += [f"G1 Z{0.5 - 0.5 * k:.4f} F400", f"X{26 if k % 2 else -26} F600"]
-    bend = closed_form(0.5, 4.0, 600, 8000, slim)[2]
-    assert 0.3 < bend < 0.5 < 2.0 * bend
-    assert judged(layers, tool=slim)[0] == []
+        layers += [f"G1 Z{0.5 - 0.5 * k:.4f} F400", f"X{26 if k % 2 else -26} F300"]
+    bend = cutting_force(two.kc, two.mc, 300 / (8000 * 2), 0.5, 4.0, slim, 2) * compliance(slim)
+    assert 0.35 < bend < 0.48
+    found, cautions = judged(layers, two, slim)
+    assert found == [] and cautions["deflection"].measured > bend
 
 
 def climbing(degrees):
