@@ -3,7 +3,7 @@
 A planner decides by estimates: it knows the stock at the nodes of a lattice, a ramp by the slope of its line, a wall by
 its profile. Where an estimate is wrong the proof reports the place. The next plan reacts in this order.
 
-- A place that was cut too deep: the tool goes there in thinner layers.
+- A place that was cut too deep: the tool goes there in thinner layers, and past it at the feed of the cut.
 - A place where that does not help, or where the tool met something besides stock under its end: lines leave it out.
   The material there counts as left.
 - A sample with too much material left: the plan aims lower there, and gives it up where that fails again.

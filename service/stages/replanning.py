@@ -69,7 +69,8 @@ class Attempt:
 def learned(before: ProofFeedback, tried: Attempt) -> ProofFeedback | None:
     """The feedback for the next plan; None where the proof found nothing, or where another plan would not help.
 
-    - A place where the tool plunged is cut with care, one with too large an engaged angle in skims.
+    - A place where the tool plunged, or cut more than it bears, is cut with care, one with too large an engaged angle
+      in skims.
     - A place where that happens again, or on a flank pass, or where the tool met something, is barred to the tool.
     - Where a wall lacked support, all tools go down in lower bands.
     - Samples that stayed uncut although a zone answers for them get finer passes, and are given up the second time.
@@ -93,11 +94,12 @@ def learned(before: ProofFeedback, tried: Attempt) -> ProofFeedback | None:
             notes.append(f"planned again, in lower bands ({step.id}): {f.message}")
             continue
         if step is None or planned is None or f.tip is None or f.kind not in (
-                FindingKind.PLUNGE, FindingKind.ENGAGEMENT, *CONTACTS):
+                FindingKind.PLUNGE, FindingKind.LOAD, FindingKind.ENGAGEMENT, *CONTACTS):
             return None
         tip = np.array(f.tip) @ tried.frame.rotation @ planned.view.rotation.T
         old = out.get(planned.view.id, NONE)
-        careful = f.kind is FindingKind.PLUNGE and step.strategy != "flank" and old.care(step.tool, tip[None]) == 1.0
+        deep = f.kind in (FindingKind.PLUNGE, FindingKind.LOAD)
+        careful = deep and step.strategy != "flank" and old.care(step.tool, tip[None]) == 1.0
         thin = f.kind is FindingKind.ENGAGEMENT and step.strategy != "flank" and not old.crowds(step.tool, tip[None])[0]
         how = "with care" if careful else "in skims" if thin else "with the tool kept away"
         if careful:

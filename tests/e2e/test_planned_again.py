@@ -1,4 +1,4 @@
-"""A part of the five-axis sweep whose first plan digs deeper than a skin in one place: planned again, it is proved."""
+"""A part of the five-axis sweep whose first plan cuts too deep in one place: planned again, it is proved."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def once(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
 
 def test_planned_once_it_is_unproved(once: dict[str, Any]) -> None:
-    assert once["state"] == "unproved" and once["finding_counts"]["plunge"] == 1
+    assert once["state"] == "unproved" and once["finding_counts"] == {"load": 1}
     assert once["findings"][0]["tip"] is not None
     assert not any("planned again" in w for w in once["part"]["warnings"])
 
@@ -43,7 +43,7 @@ def test_planned_again_it_is_proved_and_says_what_was_changed(once: dict[str, An
     report = _planned(tmp_path, shares)
     assert report["state"] == "proved" and not report["findings"] and report["reach_coverage"] > 0.9999
     told = [w for w in report["part"]["warnings"] if "planned again" in w]
-    dug = next(f for f in once["findings"] if f["kind"] == "plunge")
+    (dug,) = once["findings"]
     x, y, z = dug["point"]
     assert any(f"with care near X{x:.2f} Y{y:.2f} Z{z:.2f}" in w and dug["message"] in w for w in told)
     assert shares == sorted(shares) and shares[-1] == 1.0

@@ -246,7 +246,7 @@ class Linker:
         if joined:
             self._joined(np.vstack([self.go.here(), entry]))
         else:
-            self.go.come_down(entry[0])
+            self.go.come_down(entry[0], self.found)
             if len(entry) > 1:
                 self.go.feed(TrajectoryKind.APPROACH, entry, self.motions.feed)
         if np.linalg.norm(self.go.here() - cut[0]) > 1e-9:
@@ -329,10 +329,13 @@ class Linker:
     def _joined(self, way: F64) -> None:
         """Follow a way (n, 3), mm, to the next pass at the feed of links as far as it is in air.
 
-        Its first stretch, and one before stock, may touch stock that the lattice does not show.
+        Its first stretch, and one before stock, may touch stock that the lattice does not show. So may a stretch where
+        the proof found too deep a cut.
         """
         for quick, part in self.go.parts(way, seen=True):
-            if quick:
+            if quick and self.found.care(self.field.tool, part) < 1.0:
+                self.go.feed(TrajectoryKind.CONNECT, part, self.motions.feed)
+            elif quick:
                 self.go.feed(TrajectoryKind.CONNECT, part, self.motions.link_feed)
             else:
                 self._paced(TrajectoryKind.CONNECT, part)
@@ -347,8 +350,9 @@ class Linker:
     def keep_down(self, ways: Iterable[F64]) -> bool:
         """Follow the first of some ways that is free and in air, from where the tool is; else lift.
 
-        A way counts only where it is sooner than the clearance plane and has not been used before: a program that
-        repeats the same moves without cutting looks as if it was pasted twice.
+        A way counts only where it is sooner than the clearance plane, where the proof found no cut too deep on it, and
+        where it has not been used before: a program that repeats the same moves without cutting looks as if it was
+        pasted twice.
 
         ways : (n, 3) float64, mm, access frame, each
 
@@ -358,7 +362,8 @@ class Linker:
             steps = np.flatnonzero(np.linalg.norm(np.diff(way, axis=0), axis=1) > 1e-9)
             if not len(steps):
                 return True
-            if self.motions.link_seconds(legs(way).tolist()) > self.motions.plane_seconds(way[0], way[-1]):
+            if self.motions.link_seconds(legs(way).tolist()) > self.motions.plane_seconds(way[0], way[-1]) \
+                    or self.found.care(self.field.tool, way) < 1.0:
                 continue
             known = self.gone.were_cut(way) | self.depths.were_cut(way)
             if int(known.sum()) > MAX_AGAIN:

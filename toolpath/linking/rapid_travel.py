@@ -19,6 +19,7 @@ from scipy.ndimage import maximum_filter1d
 
 from geometry.mesh import F64
 from geometry.move_timing import RATES, Rates, leg_seconds
+from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.feeds.feed_scheduling import GUARD
 from toolpath.lines import dense, stretch
 from toolpath.stock.stock_map import AIR_TOLERANCE, SURE_RIM, StockMap
@@ -127,13 +128,16 @@ class Travel:
         if self.motions.clearance > free + 1e-9:
             self.rapid(np.array([[x, y, free], [x, y, self.motions.clearance]]))
 
-    def come_down(self, start: F64) -> None:
+    def come_down(self, start: F64, found: Counterexamples = NONE) -> None:
         """Reach a place from above: straight over what stands between, or by the clearance plane.
 
         start : (3,) float64, mm, access frame
+        found : findings of a proof; past a cut that was too deep the tool goes by the clearance plane
         """
         x, y, z = start
         way = self._across(start)
+        if way is not None and found.care(self.field.tool, way) < 1.0:
+            way = None
         if way is not None:
             self.feed(TrajectoryKind.CONNECT, way, self.motions.link_feed)
             self.feed(TrajectoryKind.APPROACH, np.array([way[-1], start]), self._onto_feed(start))

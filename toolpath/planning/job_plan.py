@@ -51,7 +51,7 @@ from zones.zoning.zones import ZoneArea
 
 WALL = 0.9  # part of a unit normal along the access: faces with more are no walls
 AGAIN_SHARE = 0.95  # of the progress, before zones are finished again
-ISLAND = 0.8  # of a layer: stock between rings that is left to the next one
+ISLAND = 0.8  # of a layer: stock between rings that is left to the next one, unless even stock is asked for
 THIN = 2.0  # scallops: thickness on a wall that a finish leaves
 
 Progress = Callable[[float], None]
@@ -302,7 +302,7 @@ class _Layers:
             self.stock.settle()
             between.extend(depth_layers.between(self.above, z, cut.step_down))
             self.above = z
-            self._walk(linker, z, below)
+            self._walk(linker, z, below, 0.0 if settings.semi_finishing else ISLAND * cut.step_down)
             finished = lat.mask(self.walls[np.abs(self.walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
             unseen = z <= self.swept - FLUTE_SHARE * tool.flute_length
             self.swept = z if unseen else self.swept
@@ -356,14 +356,13 @@ class _Layers:
         return Linker(self.field, self.stock, motions_of(cut, self.settings), self.depths, self.settings.found, pace,
                       cut.engaged)
 
-    def _walk(self, linker: Linker, z: float, area: NDArray[np.bool_]) -> None:
-        """Cut the stock above a height, mm, in an area, down to it."""
+    def _walk(self, linker: Linker, z: float, area: NDArray[np.bool_], island: float = 0.0) -> None:
+        """Cut the stock above a height, mm, in an area, down to it; ``island`` mm of it may stay between rings."""
         settings, side, fine = self.settings, depth_layers.ring_spacing(self.field.tool), 0.1 * self.field.lattice.step
         if self.bounded:
             Clearing(linker, z, area, self.allowance, side, settings.cut_direction,
                      depth_layers.STOCK_WORTH, fine).walk()
-        for lines in depth_layers.layer(self.field, self.stock, z, area, self.allowance, side,
-                                        ISLAND * self.cut.step_down):
+        for lines in depth_layers.layer(self.field, self.stock, z, area, self.allowance, side, island):
             for line in nearest_order(lines, linker.at, False):
                 linker.add(turned(line, settings), fine)
 
