@@ -43,12 +43,13 @@ def attempt(*findings, counts=None, proved=(True,) * 6, answered=(1, 1, 0, 2, 2,
     return Attempt([side], [program], zones, owner, np.array(answered), ProofFrame("A1", np.eye(3), None), proof)
 
 
-def test_a_place_that_was_dug_is_gone_to_with_care_and_then_not_at_all():
-    once = learned(ProofFeedback(), attempt(found(FindingKind.PLUNGE)))
+@pytest.mark.parametrize("kind", [FindingKind.PLUNGE, FindingKind.LOAD])
+def test_a_place_that_was_dug_is_gone_to_with_care_and_then_not_at_all(kind):
+    once = learned(ProofFeedback(), attempt(found(kind)))
     there = np.array([[1.0, 3.0, -2.0]])  # in the frame of the access
     assert np.allclose(once.along("A1").dug[TOOL.id], there) and not once.along("A1").barred
     assert "S01" in once.notes[0] and "with care" in once.notes[0] and "X9.00 Y9.00 Z9.00" in once.notes[0]
-    twice = learned(once, attempt(found(FindingKind.PLUNGE, tip=(1.1, 2.0, 3.0))))
+    twice = learned(once, attempt(found(kind, tip=(1.1, 2.0, 3.0))))
     assert np.allclose(twice.along("A1").barred[TOOL.id], [[1.1, 3.0, -2.0]])
     assert len(twice.notes) == 2 and "kept away" in twice.notes[1]
     assert not once.along("A2").dug
