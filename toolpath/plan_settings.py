@@ -82,13 +82,15 @@ class CutData:
         """Feed, mm/min, at which a cut of a depth, mm, and an engaged angle, rad, deflects the tool no more than its
         limit.
 
-        It is at least ``feed``, which is for the worst cut, and at most the feed before it was reduced.
+        In a cut no deeper than a layer it is at least ``feed``, which is for the worst of these. It is at most the feed
+        before that was reduced.
         """
         if self.bending is None or self.bend is None or self.bend.share >= 1.0:
             return self.feed
         full = self.feed / self.bend.share
         width = 0.5 * effective_diameter(tool.diameter, tool.corner_radius, depth) * (1.0 - math.cos(angle))
-        return max(self.feed, self.bending.under(full, depth, width).share * full)
+        least = self.feed if depth <= self.step_down * (1.0 + 1e-9) else MIN_FEED
+        return max(least, self.bending.under(full, depth, width).share * full)
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ class Pace:
 
     feed   : for the worst cut
     air    : where no stock stands
-    under  : feed for a depth, mm, and an engaged angle, rad; ``feed`` is the minimum
+    under  : feed for a depth, mm, and an engaged angle, rad; ``feed`` is the minimum in cuts no deeper than a layer
     layer  : mm, depth of a layer
     hidden : where the stock map shows nothing, on passes that remove what the map does not show; None: that is air
     rim    : lattice steps by which the disc is larger in which the depth is looked for, as in ``StockMap.overlap``
@@ -98,5 +98,9 @@ def _in_stock(way: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> NDArray[
     turn[turn == 0] = np.where(deep, math.ceil(missed / ANGLE), round(math.pi / ANGLE))[turn == 0]
     kinds, place = np.unique(np.column_stack([depth, turn]), axis=0, return_inverse=True)
     known = np.array([pace.under(d * pace.layer / DEPTHS, t * ANGLE) for d, t in kinds.tolist()])
-    levels = np.floor(np.log(np.maximum(known, pace.feed) / pace.feed) / math.log(STEP) + 1e-9)
+    if pace.hidden is None:  # a rim has its own bounds
+        known = np.where(kinds[:, 0] > DEPTHS, known, np.maximum(known, pace.feed))
+    else:
+        known = np.maximum(known, pace.feed)
+    levels = np.floor(np.log(known / pace.feed) / math.log(STEP) + 1e-9)
     return np.minimum(pace.feed * STEP ** levels, max(pace.air, pace.feed))[place.reshape(-1)]

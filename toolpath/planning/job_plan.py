@@ -39,6 +39,7 @@ from toolpath.planning.layouts_ahead import computed_ahead
 from toolpath.planning.zone_finishing import Finish, ZonePlan, motions_of, step_of, turned
 from toolpath.planning.zone_layout import ZoneLayout, layouts_of
 from toolpath.roughing.engagement_limited_clearing import Clearing
+from toolpath.roughing.sized_walls import SizedWalls
 from toolpath.stock.cut_history import Depths, Walked
 from toolpath.stock.engagement import SKIN_SHARE, UNBOUNDED
 from toolpath.stock.stock_map import SURE_RIM, StockMap
@@ -98,6 +99,8 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields: 
     def begin(snapshot: PlanSnapshot | None = None) -> _Work:
         jobs = [_ToolJob([z for z in zones if z.tool.id == tid], check_of, fields[tid], cut_data[tid], stock, settings,
                          layouts, under) for tid in order]
+        for k, job in enumerate(jobs):
+            job.before = jobs[:k]
         return _Work(jobs, stock, settings, snapshot)
 
     work = keeper.taken(begin) or begin()
@@ -180,6 +183,7 @@ class _ToolJob:
         self.layers: _Layers | None = None
         self.layered: list[Workingstep] = []
         self.finishes: dict[str, Finish] = {}
+        self.before: Sequence[_ToolJob] = ()  # of the tools before this one
 
     @property
     def begun(self) -> list[Finish]:
@@ -200,12 +204,21 @@ class _ToolJob:
         """
         if self.layers is None:
             self.layers = self._layers()
-        made = self.layers.down_to(plane - self.under, number)
+        made = self.layers.down_to(plane - self.under, number, self._sized_walls())
         self.layered.extend(made)
         for f in self.begun:
             for step in made:
                 f.measure(step)
         return made
+
+    def _sized_walls(self) -> SizedWalls:
+        """The walls that this tool and those before it have brought to size so far, and the rest of them."""
+        begun = [f for job in (*self.before, self) for f in job.begun]
+        known = {f.zone.id for f in begun}
+        rest = [self.checks[z.id] for z in self.zones if z.id not in known]
+        return SizedWalls.of(self.field.tool, [
+            *((f.checks, f.residual.residual <= self.settings.scallop_height) for f in begun),
+            *((c, np.zeros(len(c.points), np.bool_)) for c in rest)])
 
     def finish(self, zone: ZoneArea, plane: float, number: int) -> list[Workingstep]:
         """The finish of a zone down to a height, mm; number : of the first of the workingsteps."""
@@ -269,7 +282,7 @@ class _Layers:
         self.bounded = cut.engaged < UNBOUNDED
         # the finish of a floor has the whole front of the cutter in the allowance
         low = min(self.allowance, 0.5 * SKIN_SHARE * tool.radius) if self.bounded else self.allowance
-        bottom, step = float(tips[:, 2].min()) + low, 0.85 * cut.step_down
+        bottom, step = float(tips[:, 2].min()) + low, cut.step_down
         self.top = top = stock.highest if snapshot is None else snapshot.top
         self.swept, self.above = (top, top) if snapshot is None else (snapshot.swept, snapshot.above)
         self.left: list[tuple[float, NDArray[np.bool_]]] = []
@@ -288,8 +301,11 @@ class _Layers:
         """State of the layers."""
         return LayersSnapshot(self.top, self.swept, self.above, len(self.left))
 
-    def down_to(self, lowest: float, number: int) -> list[Workingstep]:
-        """The layers from ``lowest`` mm up that were not cut before, as one workingstep; number : of the first.
+    def down_to(self, lowest: float, number: int, sized: SizedWalls) -> list[Workingstep]:
+        """The layers from ``lowest`` mm up that were not cut before, as one workingstep.
+
+        number : of the first workingstep
+        sized  : SizedWalls, which get no rims
 
         Where even stock is required the cuts between them follow as another workingstep.
         """
@@ -305,12 +321,15 @@ class _Layers:
             self._walk(linker, z, below, 0.0 if settings.semi_finishing else ISLAND * cut.step_down)
             finished = lat.mask(self.walls[np.abs(self.walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
             unseen = z <= self.swept - FLUTE_SHARE * tool.flute_length
+            if settings.finishing and not unseen and self.left and self.left[0][0] >= lowest - 1e-9:
+                continue  # flutes reach up to the rims of an earlier layer
             self.swept = z if unseen else self.swept
+            deep = FLUTE_SHARE * tool.flute_length if unseen or settings.finishing else cut.step_down
+            bare = sized.along(lat, z + tool.corner_radius, z + deep)
             alone = lat.mask(self.alone[np.abs(self.alone[:, 2] - z) <= 2.0 * cut.step_down, :2])
             rims = depth_layers.rim(field, self.stock, z, below, finished, self.allowance, chord, unseen,
                               min(THIN * settings.scallop_height, 0.5 * self.allowance) if settings.finishing else 0.0,
-                              dilated(alone, self.alone_wide / lat.step))
-            deep = FLUTE_SHARE * tool.flute_length if unseen else cut.step_down
+                              dilated(alone, self.alone_wide / lat.step) | bare)
             usual, linker.pace = linker.pace, self._rim_pace(deep)
             for line in nearest_order(rims, linker.at, False):
                 linker.add(turned(line, settings))

@@ -8,7 +8,8 @@ dimensionless unit vectors, in the access frame.
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -223,6 +224,25 @@ class StockMap:
         """
         lat, self._ceilings = self.lattice, None
         stamp(self.top, self.cover, lat.frame, np.ascontiguousarray(points), tool.radius, tool.corner_radius)
+
+    @contextmanager
+    def undone(self, box: F64) -> Iterator[None]:
+        """Try cuts: what is cut within the context stands again behind it.
+
+        box : (2, 2) float64, mm, access frame, lower and upper bounds in plan of all that is cut
+        """
+        lat = self.lattice
+        lo = np.floor((box[0] - [lat.x0, lat.y0]) / lat.step).astype(np.int64) - 1
+        hi = np.ceil((box[1] - [lat.x0, lat.y0]) / lat.step).astype(np.int64) + 2
+        here = (slice(max(int(lo[1]), 0), max(int(hi[1]), 0)), slice(max(int(lo[0]), 0), max(int(hi[0]), 0)))
+        kept = [(a, a[here].copy()) for a in (self.top, self.cover)]
+        pooled = self._pooled.copy(), self._covered.copy()
+        try:
+            yield
+        finally:
+            for a, before in kept:
+                a[here] = before
+            (self._pooled, self._covered), self._ceilings = pooled, None
 
     def cut_leaning(self, tips: F64, axes: F64, tool: ToolBody) -> None:
         """Remove the volume that a tilted tool cuts along poses.

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,13 +31,14 @@ def ring_spacing(tool: ToolBody) -> float:
 
 
 def layer_heights(top: float, bottom: float, step: float) -> list[float]:
-    """Levels below the top of the stock, mm, ``step`` mm apart, the last one at ``bottom``; descending."""
-    out = []
-    z = top - step
-    while z > bottom + 0.25 * step:
-        out.append(z)
-        z -= step
-    return [*out, bottom]
+    """Levels below the top of the stock, mm, evenly no more than ``step`` mm apart, the last one at ``bottom``;
+    descending.
+
+    >>> layer_heights(3.0, 0.0, 2.0)
+    [1.5, 0.0]
+    """
+    count = max(1, math.ceil((top - bottom) / step - 1e-9))
+    return [top - k * (top - bottom) / count for k in range(1, count)] + [bottom]
 
 
 def between(upper: float, lower: float, step: float) -> list[float]:
@@ -74,15 +76,42 @@ def layer(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], a
     lat, tool = field.lattice, field.tool
     standing = dilated(stock.above(z + STOCK_WORTH, lat), 2.0 * tool.radius / lat.step)
     active = dilated(area, tool.radius / lat.step) & standing
+    beyond = min((SURE_RIM + 0.8) * stock.lattice.step + lat.step, 0.6 * tool.radius)
+    walled = field.nearest_blocked(z) is not None
+    lists = list(rings(field, z, active, (allowance,), side_step))
+    yield from filter(None, _outwards(stock, tool, lists, beyond, island) if walled else
+                      (_in_stock(stock, tool, lines, STOCK_WORTH, beyond) for lines in lists))
     # Where rings turn sharply, islands stay between them; rings half a step off take these.
-    for first, worth in ((allowance, STOCK_WORTH), (allowance + 0.5 * side_step, max(STOCK_WORTH, island))):
-        for lines in rings(field, z, active, (first,), side_step):
-            kept: list[Line] = []
-            for line in lines:
-                wanted = stock.overlap(line.points, tool, lower_bound=0.0) > worth
-                kept.extend(pieces_where(line, wanted, 0.6 * tool.radius, 3.0 * tool.radius))
-            if kept:
-                yield kept
+    for lines in rings(field, z, active, (allowance + 0.5 * side_step,), side_step):
+        yield from filter(None, [_in_stock(stock, tool, lines, max(STOCK_WORTH, island), beyond)])
+
+
+def _outwards(stock: StockMap, tool: ToolBody, lists: Sequence[Sequence[Line]], beyond: float,
+              island: float) -> list[list[Line]]:
+    """The parts of rings that are needed, in the same order, the farthest from the walls first.
+
+    They are chosen from the walls outwards: a ring is needed where those nearer to the walls, which come anyway, leave
+    stock. ``stock`` is unchanged.
+    """
+    ways = [line.points[:, :2] for lines in lists for line in lines]
+    if not ways:
+        return []
+    places = np.vstack(ways)
+    kept: list[list[Line]] = []
+    with stock.undone(np.array([places.min(axis=0) - tool.radius, places.max(axis=0) + tool.radius])):
+        for lines in reversed(lists):
+            worth = max(STOCK_WORTH, island) if kept else STOCK_WORTH
+            kept.append(_in_stock(stock, tool, lines, worth, beyond))
+            for part in kept[-1]:
+                stock.cut(part.points, tool)
+    return kept[::-1]
+
+
+def _in_stock(stock: StockMap, tool: ToolBody, lines: Sequence[Line], worth: float, beyond: float) -> list[Line]:
+    """The parts of lines with more than ``worth`` mm of stock over the cutter, ``beyond`` mm more at both ends."""
+    return [part for line in lines
+            for part in pieces_where(line, stock.overlap(line.points, tool, lower_bound=0.0) > worth, beyond,
+                                     3.0 * tool.radius)]
 
 
 def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], finished: NDArray[np.bool_],

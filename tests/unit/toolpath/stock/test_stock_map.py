@@ -348,3 +348,16 @@ def test_how_far_stock_stands_above_a_cutter_is_that_of_every_node_in_the_disc(b
         np.testing.assert_array_equal(stock.under_end(tips, body, lower_bound=0.0),
                                       np.maximum(held.under_end(tips, body), 0.0))
         assert (np.isfinite(slow) & (slow > 0.0)).sum() > 50 < (slow < 0.0).sum()
+
+
+def test_cuts_that_are_tried_stand_again():
+    mesh = box_mesh([0, 0, -2], [20, 10, 0])
+    stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([20.0, 10, 3.0]), 0.1)
+    body, path = tool(3.0, 0.0), np.array([[4.0, 5.0, 1.0], [16.0, 5.0, 1.0]])
+    top, cover, seen = stock.top.copy(), stock.cover.copy(), stock.overlap(path, body)
+    box = np.array([path[:, :2].min(axis=0) - 1.5, path[:, :2].max(axis=0) + 1.5])
+    with stock.undone(box):
+        stock.cut(path, body)
+        assert (stock.overlap(path, body) < 0.1).all()  # which also lowers the coarse squares
+    assert (stock.top == top).all() and (stock.cover == cover).all()
+    assert (stock.overlap(path, body) == seen).all() and seen.max() == pytest.approx(2.0)

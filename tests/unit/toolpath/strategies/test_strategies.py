@@ -331,11 +331,11 @@ def test_planes_cover_a_level_area_but_for_islands_in_sharp_turns(shape, body):
 
 
 @pytest.mark.parametrize(("top", "bottom", "step"), [(10.0, 3.2, 1.0), (5.0, 4.9, 1.0), (4.0, 3.0, 0.3)])
-def test_layers_end_at_the_bottom_and_are_no_deeper_than_a_step_and_a_quarter(top, bottom, step):
+def test_layers_are_even_end_at_the_bottom_and_are_no_deeper_than_a_step(top, bottom, step):
     z = depth_layers.layer_heights(top, bottom, step)
-    assert z[-1] == bottom
     drop = -np.diff([top, *z])
-    assert (drop > 0).all() and (drop[:-1] <= step + 1e-9).all() and drop[-1] <= 1.25 * step + 1e-9
+    assert z[-1] == bottom and len(z) == math.ceil((top - bottom) / step - 1e-9)
+    assert drop.max() <= step + 1e-9 and np.ptp(drop) < 1e-9
 
 
 def clear(field, z, allowance):
@@ -396,6 +396,26 @@ def test_a_layer_comes_from_the_side_away_from_the_walls():
     _, stock, area, _ = rough(walls, body, z, 0.3, False)
     again = [line for lines in depth_layers.layer(field, stock, z, area, 0.3, 1.2) for line in lines]
     assert sum(line.length for line in again) < 0.02 * sum(line.length for lines in groups for line in lines)
+
+
+def test_a_ring_is_left_out_where_the_next_one_to_the_wall_takes_its_stock():
+    # a strip of stock 1 mm wide along the walls: the ring nearest to them is wide enough for it
+    body, z, allowance = tool(3.0, 0.0), 4.0, 0.3
+    mesh = walls()
+    field = field_of(mesh, body)
+    stock = StockMap.box(field.tree, mesh.bounds[0] - 1.0, mesh.bounds[1] + 1.0, 0.1)
+    lat = stock.lattice
+    x, y = np.meshgrid(lat.x0 + lat.step * np.arange(lat.nx), lat.y0 + lat.step * np.arange(lat.ny))
+    off = from_walls(np.column_stack([x.ravel(), y.ravel()])).reshape(x.shape)
+    stock.top[:] = np.where((off > 0.0) & (off < 1.3), z + 0.8, z)
+    before, area = stock.top.copy(), np.ones((field.lattice.ny, field.lattice.nx), bool)
+    groups = depth_layers.layer(field, stock, z, area, allowance, 0.8 * body.radius)
+    first = next(groups)
+    assert (stock.top == before).all()  # rings are tried on the stock
+    assert all(np.abs(from_walls(dense(r.points, 0.1)[:, :2]) - body.radius - allowance).max() < 0.1 for r in first)
+    for line in first:
+        stock.cut(line.points, body)
+    assert list(groups) == []
 
 
 @pytest.mark.parametrize("body", [tool(3.0, 0.0), ball(3.0)], ids=kind)
