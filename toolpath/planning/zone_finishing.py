@@ -29,12 +29,13 @@ from toolpath.lines import Line, thinned, true_runs
 from toolpath.linking.linker import Linker
 from toolpath.linking.ramp_entry import RAMP_SHARE
 from toolpath.linking.rapid_travel import Motions
+from toolpath.passes.needed_lines import Reach, needed
 from toolpath.passes.pass_order import nearest_order
 from toolpath.plan_checkpoint import FinishSnapshot
 from toolpath.plan_settings import CutData, PlanSettings
 from toolpath.planning.candidates import compared
 from toolpath.planning.layouts_ahead import side_by_side
-from toolpath.planning.zone_layout import Rounds, Strategy, ZoneLayout
+from toolpath.planning.zone_layout import LINK_S, Rounds, Strategy, ZoneLayout
 from toolpath.poses import Blocked
 from toolpath.stock.cut_history import Depths, Walked, still_to_walk
 from toolpath.stock.engagement import UNBOUNDED
@@ -55,6 +56,8 @@ from zones.zoning.zones import ZoneArea
 
 REFINEMENTS = 4
 LEANING = frozenset((flank.NAME, curvature_matched.NAME, inclined_axis.NAME))  # strategies of a tool that leans
+SPARED = 0.25  # of the scallop: where other lines leave no more, a line is not needed
+OVERRUN = 0.3  # radii that a line runs past the last sample that needs it
 MIN_AGAIN = 4  # moves that a line repeats before they are left out
 AS_IT_IS = 1e-9  # mm, tolerance of a line that is thinned out already
 
@@ -273,7 +276,7 @@ class Finish:
         for k in range(REFINEMENTS + 2):
             if not len(failing):
                 break
-            for lines in self._groups(k, failing):
+            for lines in self._needed(k, failing):
                 self._add(linker, lines, k)
             failing = np.flatnonzero(wanted & (self.residual.residual > budget))
         self.met[failing] = self.stock.meets_bodies(self.checks.tips[failing], self.field.discs)
@@ -304,6 +307,17 @@ class Finish:
         if k > REFINEMENTS:
             return [touch_points.touches(self.field, self.checks.tips[failing])]
         return self.strategy.rounds(k, failing)
+
+    def _needed(self, k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
+        """Lines of round k, as far as a failing sample needs them."""
+        groups, tool, settings = self._groups(k, failing), self.field.tool, self.settings
+        if k > REFINEMENTS:
+            return groups
+        overrun = OVERRUN * tool.radius
+        reach = Reach(self.strategy.side_step + self.checks.spacing, self.checks.spacing, overrun,
+                      2.0 * overrun + LINK_S * self.cut.feed / 60.0)
+        aim = self._aims(SPARED * settings.scallop_height)
+        return needed(groups, self.residual, tool, failing, self.checks.tips, aim, reach)
 
     def _add(self, linker: Linker, lines: list[Line], k: int) -> None:
         """Cut lines of round k and measure them."""
