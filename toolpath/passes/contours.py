@@ -38,6 +38,8 @@ from zones.kernels.lattice import LatticeFrame
 from zones.lattice import blocked_beside
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
+THIN = 1.5  # lattice steps: mean width of loops that a slit may have fallen apart into
+FINER = 4  # of the lattice, in a slit
 MIN_APART = 0.6  # lattice steps between successive crossings; less only where a corner is cut
 
 
@@ -88,8 +90,35 @@ def contour_pieces(field: TipField, z: float, active: NDArray[np.bool_], wanted:
     dip          : mm, how far below z the lines lie
 
     Most of an area is cut away again, so only what may stay is found exactly. Where more stays than expected, all of it
-    is found exactly.
+    is found exactly. A slit hardly wider than the tool falls apart into thin loops, one for each row of nodes that it
+    meets: there the pieces are found on a finer lattice.
     """
+    found = _pieces(field, z, active, wanted, extend, join, tolerance, dip)
+    thin = [p for p in found if p.closed and _mean_width(p) < THIN * field.lattice.step]
+    if len(thin) < 2:
+        return found
+    lat, places = field.lattice, np.vstack([p.points[:, :2] for p in thin])
+    fine = field.window(places.min(axis=0) - 4.0 * lat.step, places.max(axis=0) + 4.0 * lat.step, lat.step / FINER)
+    inside = dilated(lat.mask(places), 2.0)
+    there = fine.lattice
+    nodes = np.stack(np.meshgrid(there.x0 + there.step * np.arange(there.nx),
+                                 there.y0 + there.step * np.arange(there.ny)), axis=-1).reshape(-1, 2)
+    i, j = lat.cells(nodes)
+    shape = there.ny, there.nx
+    return (_pieces(field, z, active, wanted & ~inside, extend, join, tolerance, dip)
+            + _pieces(fine, z, active[i, j].reshape(shape), (wanted & inside)[i, j].reshape(shape), extend, join,
+                      tolerance, dip))
+
+
+def _mean_width(line: Line) -> float:
+    """Twice the area that a closed line goes round in plan by its length, mm."""
+    x, y = line.points[:-1, :2].T
+    return abs(float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())) / line.length
+
+
+def _pieces(field: TipField, z: float, active: NDArray[np.bool_], wanted: NDArray[np.bool_], extend: float,
+            join: float, tolerance: float, dip: float) -> list[Line]:
+    """``contour_pieces`` on the lattice of the field."""
     lat = field.lattice
 
     def pieces(lines: list[Line]) -> list[Line]:

@@ -7,7 +7,7 @@ import pytest
 from scipy import ndimage
 
 from geometry.mesh import TriangleMesh
-from tests.hand_parts import ball, box_mesh, field_of, terraces, tool, walls
+from tests.hand_parts import ball, box_mesh, field_of, joined, terraces, tool, walls
 from tests.plan_checks import dense
 from toolpath.kernels.contour import OFF, SEGMENTS, trace
 from toolpath.lines import Line, pieces_where, place_keys, thinned, true_runs
@@ -252,3 +252,31 @@ def test_a_place_has_one_key_however_it_was_rounded():
     for off in (1e-14, -1e-14, 1e-10, -1e-10):
         assert place_keys(p + off) == place_keys(p)
     assert not set(place_keys(p + 2e-6)) & set(place_keys(p))
+
+
+@pytest.mark.parametrize("turn", [0.1, 0.37])
+def test_a_slit_hardly_wider_than_the_tool_is_one_line_and_not_a_loop_for_each_row_of_nodes(turn):
+    # two walls 4.06 mm apart, askew to the lattice, and a flat end of 4 mm: the tool has 0.03 mm to each side
+    ahead = np.array([np.cos(turn), np.sin(turn)])
+    aside = np.array([-ahead[1], ahead[0]])
+    mesh = None
+    for side in (-1.0, 1.0):
+        at = np.array([10.0, 6.0]) + side * (2.03 + 0.75) * aside
+        block = box_mesh([-6, -0.75, 0], [6, 0.75, 5])
+        xy = block.vertices[:, :2]
+        vertices = np.column_stack([at + xy[:, :1] * ahead + xy[:, 1:] * aside, block.vertices[:, 2]])
+        block = TriangleMesh(vertices, block.faces, block.face_ids)
+        mesh = block if mesh is None else joined(mesh, block)
+    field = field_of(mesh, tool(4.0, 0.0))
+    lat = field.lattice
+    j, i = np.mgrid[:lat.ny, :lat.nx]
+    off = np.column_stack([lat.x0 + lat.step * i.ravel(), lat.y0 + lat.step * j.ravel()]) - [10.0, 6.0]
+    slit = ((np.abs(off @ ahead) < 4.0) & (np.abs(off @ aside) < 1.0)).reshape(lat.ny, lat.nx)
+    found = contour_pieces(field, 1.0, everywhere(field), slit, 0.5, 1.0, 0.001)
+    assert 1 <= len(found) <= 4
+    p = np.vstack([dense(line.points, 0.05) for line in found]) - [10.0, 6.0, 1.0]
+    inner = p[np.abs(p[:, :2] @ ahead) < 3.5]
+    away = inner[:, :2] @ aside
+    assert np.abs(np.abs(away) - 0.03).max() < 0.002  # along both walls
+    for side in (away < 0, away > 0):
+        assert np.ptp(inner[side, :2] @ ahead) > 6.8
