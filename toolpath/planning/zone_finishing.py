@@ -35,7 +35,7 @@ from toolpath.plan_checkpoint import FinishSnapshot
 from toolpath.plan_settings import CutData, PlanSettings
 from toolpath.planning.candidates import compared
 from toolpath.planning.layouts_ahead import side_by_side
-from toolpath.planning.zone_layout import LINK_S, Rounds, Strategy, ZoneLayout
+from toolpath.planning.zone_layout import Rounds, Strategy, ZoneLayout, linked
 from toolpath.poses import Blocked
 from toolpath.stock.cut_history import Depths, Walked, still_to_walk
 from toolpath.stock.engagement import UNBOUNDED
@@ -315,7 +315,7 @@ class Finish:
             return groups
         overrun = OVERRUN * tool.radius
         reach = Reach(self.strategy.side_step + self.checks.spacing, self.checks.spacing, overrun,
-                      2.0 * overrun + LINK_S * self.cut.feed / 60.0)
+                      2.0 * overrun + linked(tool, self.cut, settings))
         aim = self._aims(SPARED * settings.scallop_height)
         return needed(groups, self.residual, tool, failing, self.checks.tips, aim, reach)
 

@@ -15,6 +15,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.move_timing import leg_seconds
 from geometry.tool_body import ToolBody
 from toolpath.counterexamples import NONE
 from toolpath.lines import Line
@@ -30,7 +31,7 @@ from zones.machinable_area import AreaForm
 from zones.reach.tip_field import TipField
 from zones.zoning.zones import ZoneArea
 
-LINK_S = 0.4  # s from a pass to the next, down again included: mean of the 2,289 links of the demo part
+LINK_LEGS = 3.0  # moves of a diameter each from a pass to the next: up, across and down again
 BORDER_SHARE = 0.1  # of the distance between passes on a plane: precision of the border of an area
 WORTH_A_TRY = 1.5  # of the way of the usual passes: longer iso-parametric ones are not tried
 
@@ -150,7 +151,7 @@ class ZoneLayout:
         checks, usual = self.checks, self.usual
         every, scallop, chord = np.arange(len(checks.points)), settings.budget.laid, settings.budget.chord
         cut = self.eased(usual)
-        link = LINK_S * cut.feed / 60.0  # between passes that end elsewhere than the next begins
+        link = linked(tool, cut, settings)  # between passes that end elsewhere than the next begins
         way = sum(line.length + (0.0 if line.closed or not steep else link)
                   for lines in usual.rounds(0, every) for line in lines)
         level = float(side_step(np.zeros(1), tool.corner_radius, scallop)[0])
@@ -188,6 +189,11 @@ def layouts_of(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields
     settings = replace(settings, found=NONE, planes=())  # what a proof changes is not of the layout
     return {z.id: ZoneLayout(z, c, fields[z.tool.id], cut_data[z.tool.id], settings, trimmed.get(z.id, ()))
             for z, c in zip(zones, checks, strict=True)}
+
+
+def linked(tool: ToolBody, cut: CutData, settings: PlanSettings) -> float:
+    """Way in cut, mm, that takes as long as a link from a pass to the next."""
+    return LINK_LEGS * leg_seconds(tool.diameter, cut.link_feed / 60.0, settings.rates) * cut.feed / 60.0
 
 
 def _refused(reasons: Sequence[str]) -> tuple[dict[str, object], ...]:
@@ -229,8 +235,9 @@ def _strategy(zone: ZoneArea, checks: FinishTarget, field: TipField, cut: CutDat
 
         return Strategy("planar_floor", 1.6 * (tool.radius - tool.corner_radius), planes, False)
     wide = float(side_step(np.zeros(1), tool.corner_radius, settings.budget.laid)[0]) or tool.radius
-    feed = cut.under(left_by_layers(cut.step_down, field.lattice.step), wide).feed
-    promise = Promise(settings.budget.laid, settings.chordal_tolerance, 0.3 * tool.radius, LINK_S * feed / 60.0)
+    eased = cut.under(left_by_layers(cut.step_down, field.lattice.step), wide)
+    promise = Promise(settings.budget.laid, settings.chordal_tolerance, 0.3 * tool.radius,
+                      linked(tool, eased, settings))
     layout = zigzag.laid(field, checks, promise, settings.pattern, settings.cut_direction.climbs)
 
     def dragged(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
