@@ -85,7 +85,7 @@ class Linker:
     refused: int = 0
 
     def __post_init__(self) -> None:
-        self.go = Travel(self.field, self.stock, self.motions)
+        self.go = Travel(self.field, self.stock, self.motions, self.found)
         self.gone = Depths(self.stock.lattice)  # ways back in air
 
     @property
@@ -246,7 +246,7 @@ class Linker:
         if joined:
             self._joined(np.vstack([self.go.here(), entry]))
         else:
-            self.go.come_down(entry[0], self.found)
+            self.go.come_down(entry[0])
             if len(entry) > 1:
                 self.go.feed(TrajectoryKind.APPROACH, entry, self.motions.feed)
         if np.linalg.norm(self.go.here() - cut[0]) > 1e-9:
@@ -333,7 +333,7 @@ class Linker:
         the proof found too deep a cut.
         """
         for quick, part in self.go.parts(way, seen=True):
-            if quick and self.found.care(self.field.tool, part) < 1.0:
+            if quick and self.go.too_deep(part):
                 self.go.feed(TrajectoryKind.CONNECT, part, self.motions.feed)
             elif quick:
                 self.go.feed(TrajectoryKind.CONNECT, part, self.motions.link_feed)
@@ -363,7 +363,7 @@ class Linker:
             if not len(steps):
                 return True
             if self.motions.link_seconds(legs(way).tolist()) > self.motions.plane_seconds(way[0], way[-1]) \
-                    or self.found.care(self.field.tool, way) < 1.0:
+                    or self.go.too_deep(way):
                 continue
             known = self.gone.were_cut(way) | self.depths.were_cut(way)
             if int(known.sum()) > MAX_AGAIN:

@@ -84,6 +84,7 @@ class Travel:
     field        : TipField of the tool
     stock        : StockMap, lowered as the tool moves
     motions      : Motions
+    found        : findings of a proof of an earlier plan
     trajectories : so far
     at           : (3,) float64, mm, access frame, tip of the tool; None before the first move
     """
@@ -91,6 +92,7 @@ class Travel:
     field: TipField
     stock: StockMap
     motions: Motions
+    found: Counterexamples = NONE
     trajectories: list[Trajectory] = fresh(default_factory=list)
     at: F64 | None = None
 
@@ -128,15 +130,23 @@ class Travel:
         if self.motions.clearance > free + 1e-9:
             self.rapid(np.array([[x, y, free], [x, y, self.motions.clearance]]))
 
-    def come_down(self, start: F64, found: Counterexamples = NONE) -> None:
+    def too_deep(self, way: F64) -> bool:
+        """Whether a proof found a cut too deep near a way, where no stock that the lattice shows explains it.
+
+        way : (n, 3) float64, mm, access frame
+        """
+        return self.found.care(self.field.tool, way) < 1.0
+
+    def come_down(self, start: F64) -> None:
         """Reach a place from above: straight over what stands between, or by the clearance plane.
 
         start : (3,) float64, mm, access frame
-        found : findings of a proof; past a cut that was too deep the tool goes by the clearance plane
+
+        Past a cut that was too deep the tool goes by the clearance plane.
         """
         x, y, z = start
         way = self._across(start)
-        if way is not None and found.care(self.field.tool, way) < 1.0:
+        if way is not None and self.too_deep(way):
             way = None
         if way is not None:
             self.feed(TrajectoryKind.CONNECT, way, self.motions.link_feed)
