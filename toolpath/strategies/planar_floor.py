@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from geometry.mesh import F64
-from toolpath.lines import Line, pieces_where, thinned
-from toolpath.passes.contours import contours, dilated, free_pieces, lines_at
+from toolpath.lines import Line, thinned
+from toolpath.passes.contours import contour_pieces, dilated, free_pieces, lines_at
 from zones.lattice import blocked_beside
 from zones.reach.tip_field import INSIDE, LEVEL_TOLERANCE, TipField
 
@@ -76,11 +76,7 @@ def _plane(field: TipField, z: float, tips: F64, tolerance: float, share: float,
     mask = dilated(lat.mask(tips[:, :2]), near / lat.step)
     free = field.height <= z + LEVEL_TOLERANCE
     lines = _rings(field, z, mask & free, 0.2 * flat, 1.6 * flat * share)
-    active = dilated(mask, join / lat.step)
-    for line in contours(field, z, active, tolerance):
-        wanted = mask[lat.cells(line.points[:, :2])]
-        lines.extend(pieces_where(line, np.asarray(wanted), near, join))
-    return lines
+    return lines + contour_pieces(field, z, dilated(mask, join / lat.step), mask, near, join, tolerance)
 
 
 def _windows(field: TipField, tips: F64, finer: int) -> Iterator[tuple[TipField, F64]]:
