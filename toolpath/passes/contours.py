@@ -40,6 +40,7 @@ from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 THIN = 1.5  # lattice steps: mean width of loops that a slit may have fallen apart into
 FINER = 4  # of the lattice, in a slit
+ROUND = 0.5  # of the distance between rings, over which all but those along the walls are smoothed
 MIN_APART = 0.6  # lattice steps between successive crossings; less only where a corner is cut
 
 
@@ -338,7 +339,8 @@ def rings(field: TipField, z: float, active: NDArray[np.bool_], firsts: Sequence
     for first in firsts:
         distances = np.arange(min(first, 0.9 * widest), widest, spacing).tolist()
         for distance in distances[::-1] if walled else distances:
-            yield lines_at(field, z, far, distance, inside, corner)
+            rounded = ROUND * spacing if walled and distance > distances[0] else 0.0
+            yield lines_at(field, z, far, distance, inside, corner, rounded)
 
 
 def lines_at(field: TipField, z: float, far: F64, distance: float, inside: NDArray[np.bool_],
