@@ -35,6 +35,7 @@ from verify.checks.program_sequence import (
 from verify.checks.repeated_passes import repeats
 from verify.checks.sideways_cuts import sideways_findings, torn_threads
 from verify.checks.table_clearance import table_findings
+from verify.checks.thread_teeth import drawn_thread_mills
 from verify.findings import (
     Source,
     contact_findings,
@@ -130,7 +131,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     cuts = surface_cuts(part, tools, setup, scored, moves, source, threads,
                         stages.span(READ if asked is None else SETTLED, CUT))
     stages.tell(CUT)
-    support, unheld = supported(TriangleTree(part.mesh), scored, setup, moves, tools, source, zone_ids, threads,
+    tree = TriangleTree(part.mesh)
+    support, unheld = supported(tree, scored, setup, moves, tools, source, zone_ids, threads,
                                 stages.span(CUT, HELD))
     slides = slides_of(framed, tools, setup)
     met = contacts(part.mesh, np.concatenate([cuts.guard, cuts.edge]), moves, tools, setup, slides, threads,
@@ -157,13 +159,15 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                 *_idle_findings(framed, run, moves, source, [t for t in fine if t.cone_height <= 0.0], asked),
                 *again, *sideways_findings(moves, run.cut, tools, source),
                 *torn_threads(moves, run.cut, tools, source),
+                *drawn_thread_mills(moves, run.cut, tools, source, tree,
+                                      setup.scallop_height + setup.gouge_tolerance + setup.stock_allowance),
                 *(box_findings(moves, slides, *dogleg_limits(part.mesh, moves, tools, setup), source)
                   if setup.dogleg else ()),
                 *engagement_findings(angle, stretches, of, source, setup.max_engaged), *unheld,
                 *_residuals(scored, cuts, setup, zone_ids)]
     work: WorkDone | None = None
     if asked is not None:
-        cutting = Cutting(TriangleTree(part.mesh), setup, moves, tools, threads)
+        cutting = Cutting(tree, setup, moves, tools, threads)
         measured = Measured(scored.samples, cuts.residual, cuts.mover, cuts.reach,
                             error_bound([p.program for p in framed]))
         unread = None if asked.whole is None else unread_work(asked.whole, framed[0], measured, cutting, tools)

@@ -41,7 +41,7 @@ def sideways_findings(moves: Moves, cut: NDArray[np.bool_], tools: Sequence[Tool
     way = np.where(cuts[:, None], moves.end - moves.start[first], way)
     aside = np.linalg.norm(way - np.einsum("ij,ij->i", way, up)[:, None] * up, axis=1)
     bad = np.flatnonzero(cuts & ((aside > ASIDE) | (axes.angle > 0.0)))
-    return _one_a_line(bad, aside, moves.end, source, lambda m: (
+    return one_a_line(bad, aside, moves.end, source, lambda m: (
         f"T{source.tool[m]} is a {tools[moves.tool[m]].kind} and cuts {aside[m]:.3f} mm sideways; it cuts along its "
         "axis only"))
 
@@ -60,13 +60,19 @@ def torn_threads(moves: Moves, cut: NDArray[np.bool_], tools: Sequence[ToolBody]
     same = (moves.tool[1:] == moves.tool[:-1]) & (source.program[1:] == source.program[:-1])
     bad = 1 + np.flatnonzero(taps[moves.tool[:-1]] & same & moves.feed[:-1] & cut[:-1] & ~moves.feed[1:]
                              & (way[1:] > ASIDE))
-    return _one_a_line(bad, way, moves.start, source, lambda m: (
+    return one_a_line(bad, way, moves.start, source, lambda m: (
         f"T{source.tool[m]} is a tap and leaves its thread at rapid; it feeds out as it fed in"))
 
 
-def _one_a_line(bad: NDArray[np.intp], depth: F64, at: F64, source: Source,
+def one_a_line(bad: NDArray[np.intp], depth: F64, at: F64, source: Source,
                 words: Callable[[int], str]) -> list[Finding]:
-    """A finding for the first of the moves ``bad`` in each line, at its place ``at`` (m, 3), mm."""
+    """Findings of moves, one for each line: the first of its moves counts.
+
+    bad   : (n,) intp, index, moves
+    depth : (m,) float64, mm, of a finding at each move
+    at    : (m, 3) float64, mm, setup frame, place of each move
+    words : gives the message of a move
+    """
     out, seen = [], set[tuple[int, int]]()
     for m in bad.tolist():
         key = (int(source.program[m]), int(source.line[m]))
@@ -79,4 +85,4 @@ def _one_a_line(bad: NDArray[np.intp], depth: F64, at: F64, source: Source,
     return out
 
 
-__all__ = ["sideways_findings", "torn_threads"]
+__all__ = ["one_a_line", "sideways_findings", "torn_threads"]

@@ -1,0 +1,148 @@
+"""Thread mills that are drawn along their axis out of a thread, in a bore and round a boss."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.mesh import TriangleMesh
+from geometry.mesh_queries.bvh import TriangleTree
+from tests.hand_parts import tool
+from verify.checks.thread_teeth import drawn_thread_mills, teeth_touch
+from verify.findings import Source
+from verify.moves import Moves
+from verify.tool_axes import ToolAxes
+
+PITCH, BORE, HIGH = 0.8, 2.5, 10.0
+ORBIT = 0.5
+MILL = replace(tool(4.0, 0.0), named="thread_mill", flute_length=3.0)
+
+
+def tube(radius, floor=None, sides=180):
+    """The wall of a bore or boss about Z, from z 0 or the floor to ``HIGH``."""
+    low = 0.0 if floor is None else floor
+    at = np.arange(sides) * (2.0 * math.pi / sides)
+    ring = np.column_stack([radius * np.cos(at), radius * np.sin(at)])
+    points = np.concatenate([np.column_stack([ring, np.full(sides, z)]) for z in (low, HIGH)] + [[[0.0, 0.0, low]]])
+    k, after = np.arange(sides), (np.arange(sides) + 1) % sides
+    faces = [np.column_stack([k, after, k + sides]), np.column_stack([after, after + sides, k + sides])]
+    if floor is not None:
+        faces.append(np.column_stack([np.full(sides, 2 * sides), k, after]))
+    faces = np.concatenate(faces).astype(np.int32)
+    return TriangleTree(TriangleMesh(points, faces, np.ones(len(faces), np.int32)))
+
+
+def helix(orbit, turns, low, pitch=PITCH, start=0.0, pieces=60):
+    """Tips of an upward helix from the angle ``start``, without the first."""
+    k = np.arange(1, round(pieces * turns) + 1) / pieces
+    at = start + 2.0 * math.pi * k
+    return [(orbit * math.cos(a), orbit * math.sin(a), low + pitch * t) for a, t in zip(at, k, strict=True)]
+
+
+def found(tips, feed=(), tree=None, mill=MILL, cut=None, turn=None):
+    """Depths by line, the number of the tip to which a move goes; ``feed`` : lines at rapid."""
+    at = np.array(tips, float)
+    n = len(at) - 1
+    axes = None
+    if turn is not None:
+        at = at @ turn.T
+        axes = ToolAxes.between(*[np.tile(turn[:, 2], (n, 1))] * 2)
+    go = np.ones(n, bool)
+    go[[line - 1 for line in feed]] = False
+    moves = Moves(at[:-1].copy(), at[1:].copy(), go, np.zeros(n, np.int32), axes)
+    source = Source(("program",), np.zeros(n, np.int32), np.arange(1, n + 1, dtype=np.int32), np.full(n, 6, np.int32))
+    cut = np.zeros(n, bool) if cut is None else np.array(cut, bool)
+    return {f.line: f.depth for f in drawn_thread_mills(moves, cut, [mill], source, tree or tube(BORE), 0.03)}
+
+
+DOWN = [(0, 0, 15), (0, 0, 2)]
+IN = [*DOWN, (ORBIT, 0, 2)]
+TURN = [*IN, *helix(ORBIT, 1.0, 2.0)]
+TOP = 2.0 + PITCH
+
+
+@pytest.mark.parametrize("tips", [
+    [*TURN, (0, 0, TOP), (0, 0, 15)],
+    [*IN, *helix(ORBIT, 6.0, 2.0), (0, 0, 6.8), (0, 0, 15)],
+    [*TURN, (0, 0, TOP), (0, 0, 2), (ORBIT, 0, 2), *helix(ORBIT, 1.0, 2.0), (0, 0, TOP), (0, 0, 15)],
+    [*DOWN, *((0.25 + p[0], p[1], p[2]) for p in helix(0.25, 0.5, 2.0, start=math.pi)), *helix(ORBIT, 1.0, 2.4),
+     *((0.25 + p[0], p[1], p[2]) for p in helix(0.25, 0.5, 3.2)), (0, 0, 15)],
+    [*IN, *helix(ORBIT, 6.0, 2.0, pieces=8), (0, 0, 6.8), (0, 0, 15)],
+    [(0, 0, 15), (0, 0, 6), (ORBIT, 0, 6), *helix(ORBIT, 3.0, 6.0, -PITCH), (0, 0, 3.6), (0, 0, 15)],
+    [*TURN, (ORBIT, 0, TOP + 0.5 * PITCH), (0, 0, TOP + 0.5 * PITCH), (0, 0, 15)],
+], ids=["one turn", "six turns", "twice", "arcs", "polygons", "down", "half a pitch"])
+def test_a_thread_mill_that_leaves_its_thread_aside_is_right(tips):
+    assert found(tips) == {}
+    assert found(tips, feed=(1, len(tips) - 1)) == {}
+
+
+@pytest.mark.parametrize(("more", "line", "deep"), [
+    ([(ORBIT, 0, 15)], 1, HIGH - TOP),
+    ([(ORBIT, 0, TOP + 1.0)], 1, 1.0),
+    ([(ORBIT - 0.2, 0, TOP), (ORBIT - 0.2, 0, 15)], 2, 3.0),  # as far as the teeth have cut
+    ([(0, 0, TOP), (ORBIT, 0, TOP), (ORBIT, 0, 15)], 3, HIGH - TOP),
+    ([(0, 0, 15), (ORBIT, 0, 15), (ORBIT, 0, 5)], 1, None),
+    ([(0.5 * ORBIT, 0, TOP + 6.0)], 1, 3.0),
+    ([(0, 0, TOP + 6.0)], 1, 3.0),
+], ids=["out", "more than a pitch", "a little aside", "back again", "from above", "slanted", "slanted out"])
+def test_a_thread_mill_along_its_axis_in_the_thread_is_found(more, line, deep):
+    if deep is None:  # from above into the thread
+        assert list(found([*TURN[:-1], (0, 0, TOP), *more])) == [len(TURN) + 2]
+        return
+    where = found([*TURN, *more])
+    assert list(where) == [len(TURN) - 1 + line] and where[len(TURN) - 1 + line] == pytest.approx(deep, abs=0.35)
+    assert found([*TURN, *more], feed=(len(TURN) - 1 + line,)) == where
+
+
+def test_small_steps_and_small_turns_are_no_way_out():
+    up = [(ORBIT + 0.01 * (-1) ** k, 0, TOP + 0.1 * k) for k in range(1, 60)]
+    first = min(found([*TURN, *up]))
+    assert len(TURN) <= first <= len(TURN) + 8  # a pitch up
+    small = [(x + ORBIT - 0.02, y, z) for x, y, z in helix(0.02, 8.0, TOP, pieces=12)]
+    assert len(found([*TURN, *small])) == 1
+
+
+def test_a_helix_steeper_than_any_thread_is_found():
+    bore, orbit = tube(8.0), 6.0
+    start = [(0, 0, 15), (0, 0, 1), (orbit, 0, 1)]
+    assert found([*start, *helix(orbit, 1.0, 1.0, 1.0), (0, 0, 2), (0, 0, 15)], tree=bore) == {}
+    steep = found([*start, *helix(orbit, 0.5, 1.0, 16.0), (0, 0, 9), (0, 0, 15)], tree=bore)
+    assert len(steep) >= 1
+
+
+def test_a_wall_that_is_entered_without_a_helix_counts():
+    assert list(found([*IN, (ORBIT, 0, 8)])) == [3]
+    assert found([*IN, (ORBIT, 0, 2.3), (0, 0, 2.3), (0, 0, 15)]) == {}
+
+
+def test_a_thread_in_stock_counts_where_the_tool_cut_it():
+    wide = tube(30.0)
+    cut = [False, True, *[True] * 60, False]
+    assert list(found([*TURN, (ORBIT, 0, 15)], tree=wide, cut=cut)) == [len(TURN)]
+    assert found([*TURN, (0, 0, TOP), (0, 0, 15)], tree=wide, cut=[*cut, False]) == {}
+
+
+def test_a_thread_round_a_boss_and_along_a_leaning_axis():
+    boss, orbit = tube(6.0), 8.0
+    turn = [(12, 0, 15), (12, 0, 2), (orbit, 0, 2), *helix(orbit, 1.0, 2.0, pieces=180)]
+    assert found([*turn, (12, 0, TOP), (12, 0, 15)], tree=boss) == {}
+    assert list(found([*turn, (orbit, 0, 15)], tree=boss)) == [len(turn)]
+    c, s = math.cos(0.7), math.sin(0.7)
+    lean = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    mesh = tube(BORE).mesh
+    tree = TriangleTree(TriangleMesh(mesh.vertices @ lean.T, mesh.faces, mesh.face_ids))
+    assert found([*TURN, (0, 0, TOP), (0, 0, 15)], tree=tree, turn=lean) == {}
+    assert list(found([*TURN, (ORBIT, 0, 15)], tree=tree, turn=lean)) == [len(TURN)]
+
+
+def test_a_floor_or_a_rim_near_the_tip_is_no_wall():
+    up = np.array([[0.0, 0.0, 1.0]])
+    blind = tube(BORE, floor=1.9)
+    for x, touches in ((0.0, False), (0.4, False), (0.48, True), (0.5, True)):
+        at = np.array([[x, 0.0, 2.0]])
+        assert teeth_touch(blind, at, up, 2.0, 1.0, 0.03)[0] == touches
+        assert teeth_touch(tube(BORE), at, up, 2.0, 3.0, 0.03)[0] == touches
+    assert not teeth_touch(tube(BORE), np.array([[0.5, 0.0, HIGH + 0.1]]), up, 2.0, 3.0, 0.03)[0]
+    assert not teeth_touch(tube(BORE), np.array([[0.5, 0.0, -3.2]]), up, 2.0, 3.0, 0.03)[0]
+    assert not len(teeth_touch(blind, np.zeros((0, 3)), np.zeros((0, 3)), 2.0, 1.0, 0.03))
