@@ -14,6 +14,7 @@ ToolKind = Literal["ball", "flat", "bull", "tapered_ball", "barrel", "drill", "t
 BUILT_KINDS = ("ball", "flat", "bull")
 VERIFIED_KINDS = ("drill", "tap", "chamfer", "thread_mill")
 """Kinds that programs to be verified use, and that jobs do not plan."""
+THREADING_KINDS = ("tap", "thread_mill")
 POINT_ANGLES = {"drill": 118.0, "chamfer": 90.0}
 """Default of ``point_angle_deg``, deg."""
 LENGTH_EPSILON = 1e-9
@@ -62,6 +63,10 @@ class Tool(WireModel):
     tip_diameter_mm: Annotated[Number | None, Field(
         ge=0, le=2000, description="Diameter of the flat at the tip of the cone, mm. Default: 0, a point. The lead of "
                                    "a tap needs it.")] = None
+    pitch_mm: Annotated[Number | None, Field(
+        ge=0.01, le=100, description="Pitch of the thread that a tap or thread mill cuts, mm. Feed over spindle speed "
+                                     "of a tap, and the helices of a thread mill, must be within 2 % of it. null: only "
+                                     "pitches that no thread has are findings. null for all other kinds.")] = None
     corner_radius_mm: Annotated[Number, Field(
         ge=0, description="Corner radius, mm. Above 0 for a bull nose, 0 for a flat end mill. For a ball, 0 means half "
                           "the diameter.")] = 0.0
@@ -134,6 +139,8 @@ class Tool(WireModel):
             raise ValueError(f"tool {self.id}: kind '{self.kind}' is not available yet; "
                              f"use one of {', '.join(BUILT_KINDS + VERIFIED_KINDS)}")
         self._check_cone()
+        if self.pitch_mm is not None and self.kind not in THREADING_KINDS:
+            raise ValueError(f"tool {self.id}: pitch_mm belongs to kinds tap and thread_mill")
         if self.taper_angle_deg != 0 or self.profile_radius_mm is not None:
             raise ValueError(f"tool {self.id}: taper_angle_deg and profile_radius_mm belong to tapered and barrel "
                              "tools, which are not available yet; leave them at 0 and null")

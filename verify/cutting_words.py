@@ -17,6 +17,7 @@ class CuttingWords:
     kc, mc      : specific cutting force of the material, N/mm², and its exponent
     rpm, feed, plunge_feed, life : 1/min, mm/min, mm/min and minutes in the cut, as the tool states them
     coolant     : whether the tool is to be cooled
+    pitch       : mm, of a tap or thread mill, as the tool states it
     """
 
     flutes: int
@@ -31,6 +32,7 @@ class CuttingWords:
     plunge_feed: float | None = None
     life: float | None = None
     coolant: bool | None = None
+    pitch: float | None = None
 
 
 @dataclass(frozen=True)

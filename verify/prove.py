@@ -35,7 +35,7 @@ from verify.checks.program_sequence import (
 from verify.checks.repeated_passes import repeats
 from verify.checks.sideways_cuts import sideways_findings, torn_threads
 from verify.checks.table_clearance import table_findings
-from verify.checks.thread_teeth import drawn_thread_mills
+from verify.checks.thread_teeth import drawn_thread_mills, taps_in_holes
 from verify.findings import (
     Source,
     contact_findings,
@@ -145,7 +145,9 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     known = counted(framed, np.unique(source.tool).tolist())
     took = np.concatenate([np.zeros(0), *(minutes_of(p.program, setup) for p in framed)])
     in_cut = cut_sequence(framed, known, run, moves, source, tools, stretches, of, took[known], met.spacing)
-    loaded, cautions = loads(in_cut, tools, setup.cutting)
+    slack = setup.scallop_height + setup.gouge_tolerance + setup.stock_allowance
+    tapped = taps_in_holes(moves, tools, tree, slack)
+    loaded, cautions = loads(in_cut, tools, setup.cutting, run.cut | tapped.any(axis=1))
     angle = engaged_angles(run.engaged, stretches, tools)
     again, springs = repeats(moves, run.cut, source, _finishes(cuts, setup, len(moves)))
     dug = fine_plunges(moves, tools, fine, part.mesh.bounds, setup, threads,
@@ -158,9 +160,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                 *(f for p in framed for f in table_findings([p.program], tools, p.setup)),
                 *_idle_findings(framed, run, moves, source, [t for t in fine if t.cone_height <= 0.0], asked),
                 *again, *sideways_findings(moves, run.cut, tools, source),
-                *torn_threads(moves, run.cut, tools, source),
-                *drawn_thread_mills(moves, run.cut, tools, source, tree,
-                                      setup.scallop_height + setup.gouge_tolerance + setup.stock_allowance),
+                *torn_threads(moves, run.cut, tapped[:, 0], tools, source),
+                *drawn_thread_mills(moves, run.cut, tools, source, tree, slack, _pitches(setup)),
                 *(box_findings(moves, slides, *dogleg_limits(part.mesh, moves, tools, setup), source)
                   if setup.dogleg else ()),
                 *engagement_findings(angle, stretches, of, source, setup.max_engaged), *unheld,
@@ -200,6 +201,11 @@ def _check(tools: Sequence[ToolBody], setup: ProofSetup, scored: ScoredSamples, 
     if len(scored.zone) != len(scored.samples) or scored.zone.max(initial=0) > len(zone_ids):
         raise VerificationError("the counts of samples and zones differ", code="bad_samples",
                                 measured=len(scored.zone), limit=len(scored.samples))
+
+
+def _pitches(setup: ProofSetup) -> dict[int, float]:
+    """Pitches that tools state, mm by T number."""
+    return {number: said.pitch for number, said in setup.cutting.items() if said.pitch is not None}
 
 
 def _settled(scored: ScoredSamples, part: Part, tools: Sequence[ToolBody], setup: ProofSetup, moves: Moves,

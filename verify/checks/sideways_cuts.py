@@ -46,10 +46,12 @@ def sideways_findings(moves: Moves, cut: NDArray[np.bool_], tools: Sequence[Tool
         "axis only"))
 
 
-def torn_threads(moves: Moves, cut: NDArray[np.bool_], tools: Sequence[ToolBody], source: Source) -> list[Finding]:
-    """One finding for each line in which a tap that has just cut moves at rapid: the thread would be torn out.
+def torn_threads(moves: Moves, cut: NDArray[np.bool_], inside: NDArray[np.bool_], tools: Sequence[ToolBody],
+                 source: Source) -> list[Finding]:
+    """One finding for each line in which a tap in its thread moves at rapid: the thread would be torn out.
 
-    cut : (m,) bool, whether each move removes stock
+    cut    : (m,) bool, whether each move removes stock
+    inside : (m,) bool, whether the teeth touch the part where each move begins
 
     The depth of a finding is the way of the rapid, mm.
     """
@@ -58,8 +60,8 @@ def torn_threads(moves: Moves, cut: NDArray[np.bool_], tools: Sequence[ToolBody]
         return []
     way = np.linalg.norm(moves.end - moves.start, axis=1)
     same = (moves.tool[1:] == moves.tool[:-1]) & (source.program[1:] == source.program[:-1])
-    bad = 1 + np.flatnonzero(taps[moves.tool[:-1]] & same & moves.feed[:-1] & cut[:-1] & ~moves.feed[1:]
-                             & (way[1:] > ASIDE))
+    bad = 1 + np.flatnonzero(taps[moves.tool[:-1]] & same & moves.feed[:-1] & (cut[:-1] | inside[1:])
+                             & ~moves.feed[1:] & (way[1:] > ASIDE))
     return one_a_line(bad, way, moves.start, source, lambda m: (
         f"T{source.tool[m]} is a tap and leaves its thread at rapid; it feeds out as it fed in"))
 

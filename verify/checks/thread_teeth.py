@@ -9,7 +9,7 @@ Coordinates are in the setup frame, lengths in mm.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -34,6 +34,9 @@ USUAL = 0.1
 """Pitch over the diameter of a thread mill that is taken where neither setup nor program shows one."""
 ASIDE = 0.4
 """Pitches by which teeth that leave a thread go aside at least. Threads of ISO 68 are 0.54 deep."""
+PITCH_ERROR = 0.02
+"""Share by which the helices of a thread mill may differ from its pitch."""
+SHARP = math.radians(75.0)  # a corner that is no part of a helix
 HEIGHTS = 0.25  # radii between the places on the axis from which a wall is looked for
 PLACES = 256  # at most, along one axis and along one move
 ROUND = 32  # directions in which a wall is looked for where a floor is nearer
@@ -72,13 +75,29 @@ def teeth_touch(tree: TriangleTree, tips: F64, up: F64, radius: float, length: f
     return np.asarray(out.reshape(len(tips), steps).any(axis=1))
 
 
+def taps_in_holes(moves: Moves, tools: Sequence[ToolBody], tree: TriangleTree, slack: float) -> NDArray[np.bool_]:
+    """(m, 2) bool: moves of taps whose teeth touch the part where the move begins, and where it ends.
+
+    slack : mm, farther from the part a tooth does not touch it
+    """
+    out = np.zeros((len(moves), 2), np.bool_)
+    for k, tool in enumerate(tools):
+        rows = np.flatnonzero(moves.tool == k) if tool.kind == "tap" else np.zeros(0, np.int64)
+        up = np.tile([0.0, 0.0, 1.0], (len(rows), 1)) if moves.axes is None else moves.axes.axis[rows]
+        for j, tips in enumerate((moves.start, moves.end)):
+            out[rows, j] = teeth_touch(tree, tips[rows], up, tool.radius, tool.flute_length, slack)
+    return out
+
+
 def drawn_thread_mills(moves: Moves, cut: NDArray[np.bool_], tools: Sequence[ToolBody], source: Source,
-                       tree: TriangleTree, slack: float) -> list[Finding]:
+                       tree: TriangleTree, slack: float, pitches: Mapping[int, float]) -> list[Finding]:
     """One finding for each line in which a thread mill goes along its axis while its teeth stand in a wall.
 
     cut : (m,) bool, whether each move removes stock; slack : mm, farther from the part a tooth does not touch it
+    pitches : mm by T number, as the tools state them
 
-    The depth of a finding is the way along the axis in the wall, mm.
+    A thread mill whose helices have another pitch than it states is a finding too. The depth of a finding is the way
+    along the axis in the wall, or the pitch of the helices, mm.
 
     Notes
     -----
@@ -97,13 +116,22 @@ def drawn_thread_mills(moves: Moves, cut: NDArray[np.bool_], tools: Sequence[Too
                 over = tree.mesh.vertices @ axis
                 touches = partial(_touches, tree, axis, tool, slack)
                 whole = _Way.of(moves.only(rows), rows, axis)
-                pitch = _pitch_of(whole, cut[rows], tool.diameter, touches)
+                at, measured = _pitch_of(whole, cut[rows], tool.diameter, touches)
+                pitch = pitches.get(tool.number, measured or USUAL * tool.diameter)
+                if measured and abs(measured - pitch) > PITCH_ERROR * pitch:
+                    found.extend(one_a_line(rows[[at]], np.full(len(moves), measured), moves.start, source,
+                                            partial(_off_pitch, tool.number, pitch, measured)))
                 way, of = whole.parted(pitch)
                 torn = _ToothWay(way, cut[rows][of], tool, (over.min(), over.max()), touches, pitch).torn()
                 np.maximum.at(depth, rows[of], torn)
                 found.extend(one_a_line(np.flatnonzero(depth), depth, moves.start, source,
                                         partial(_words, tool.number, depth)))
     return found
+
+
+def _off_pitch(number: int, pitch: float, measured: float, _m: int) -> str:
+    return (f"T{number} is a thread mill of the pitch {pitch:g} mm, and its helices rise {measured:.4g} mm a turn: a "
+            "thread is milled with a helix of its pitch")
 
 
 def _words(number: int, depth: F64, m: int) -> str:
@@ -163,14 +191,17 @@ class _Way(NamedTuple):
         return np.asarray(np.linalg.norm(self.flat_end - self.flat, axis=1))
 
     @property
+    def corner(self) -> F64:
+        """(m - 1,) float64, rad, -pi to pi: how the way turns across the axis from each move to the next."""
+        d = self.flat_end - self.flat
+        return np.asarray((np.diff(np.arctan2(d[:, 1], d[:, 0])) + math.pi) % (2.0 * math.pi) - math.pi)
+
+    @property
     def turn(self) -> F64:
         """(m,) float64, rad: how far each move turns across the axis, half of the corners at its ends."""
-        d = self.flat_end - self.flat
-        heading, goes = np.arctan2(d[:, 1], d[:, 0]), self.aside > SAME
-        corner = np.zeros(len(d) + 1)
-        off = np.abs((np.diff(heading) + math.pi) % (2.0 * math.pi) - math.pi)
-        corner[1:-1] = np.where(self.joined[1:] & self.feed[1:] & self.feed[:-1] & goes[1:] & goes[:-1], off, 0.0)
-        return 0.5 * (corner[1:] + corner[:-1])
+        goes = self.feed & (self.aside > SAME)
+        off = np.where(self.joined[1:] & goes[1:] & goes[:-1], np.abs(self.corner), 0.0)
+        return np.asarray(0.5 * (np.r_[off, 0.0] + np.r_[0.0, off]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,22 +292,45 @@ def _touches(tree: TriangleTree, axis: F64, tool: ToolBody, slack: float, tips: 
 
 
 def _pitch_of(way: _Way, cut: NDArray[np.bool_], diameter: float,
-              touches: Callable[[F64], NDArray[np.bool_]]) -> float:
-    """Pitch of the helices that cut or touch the part, mm: the median, by the angle that they turn.
+              touches: Callable[[F64], NDArray[np.bool_]]) -> tuple[int, float]:
+    """A move of the helices that cut or touch the part, and their pitch, mm; 0 where there is none.
 
     cut, touches : as in ``_ToothWay``; diameter : mm, of the teeth
+
+    The pitch is the greatest rise over a whole turn, as leads in and out rise less.
     """
-    turn, rise = way.turn, np.abs(way.rise)
-    rows = np.flatnonzero(way.feed & (turn > 0.0) & (turn < 0.5 * math.pi)
-                          & (FULL * rise <= COARSEST * diameter * turn) & (rise > SAME))
-    rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), HELIX)).astype(np.int64)]
-    rows = rows[cut[rows] | touches(way.end[rows])]
-    if not len(rows):
-        return USUAL * diameter
-    pitch = FULL * rise[rows] / turn[rows]
-    order = np.argsort(pitch, kind="stable")
-    whole = np.cumsum(turn[rows][order])
-    return float(pitch[order][np.searchsorted(whole, 0.5 * whole[-1])])
+    corner, goes = way.corner, way.feed & (way.aside > SAME)
+    linked = goes[1:] & goes[:-1] & way.joined[1:] & (np.abs(corner) < SHARP)
+    at, pitch = [], []
+    for first, last in zip(*_runs(goes, linked), strict=True):
+        inner = corner[first:last - 1]
+        if last - first < 3 or abs(inner.sum()) < 0.5 * FULL:
+            continue
+        turned = np.concatenate([[0.0], np.cumsum(0.5 * (np.r_[inner[:1], inner] + np.r_[inner, inner[-1:]]))])
+        turned *= np.sign(turned[-1])
+        high = np.r_[way.high[first:last], way.high_end[last - 1]]
+        ends = np.searchsorted(turned, turned + 0.99 * FULL)
+        whole = np.flatnonzero(ends < len(turned))
+        ends = ends[whole]
+        rise = np.abs(high[ends] - high[whole]) * FULL / (turned[ends] - turned[whole])
+        at.append(first + (whole + ends) // 2)
+        pitch.append(rise)
+    rows, values = np.concatenate([np.zeros(0, np.int64), *at]), np.concatenate([np.zeros(0), *pitch])
+    sound = (values > SAME) & (values <= COARSEST * diameter)
+    rows, values = rows[sound], values[sound]
+    some = np.linspace(0, len(rows) - 1, min(len(rows), HELIX)).astype(np.int64)
+    some = some[cut[rows[some]] | touches(way.end[rows[some]])]
+    if not len(some):
+        return -1, 0.0
+    best = some[int(np.argmax(values[some]))]
+    return int(rows[best]), float(values[best])
+
+
+def _runs(goes: NDArray[np.bool_], linked: NDArray[np.bool_]) -> tuple[list[int], list[int]]:
+    """First and one past the last of each run of moves that go (m,), each linked (m - 1,) to the one before."""
+    starts = goes & np.r_[True, ~linked]
+    ends = goes & np.r_[~linked, True]
+    return np.flatnonzero(starts).tolist(), (np.flatnonzero(ends) + 1).tolist()
 
 
 def _by_axis(moves: Moves, rows: NDArray[np.intp]) -> Iterator[tuple[F64, NDArray[np.intp]]]:
@@ -300,4 +354,4 @@ def _square(axis: F64) -> tuple[F64, F64]:
     return u, np.cross(axis, u)
 
 
-__all__ = ["COARSEST", "drawn_thread_mills", "teeth_touch"]
+__all__ = ["COARSEST", "drawn_thread_mills", "taps_in_holes", "teeth_touch"]

@@ -32,6 +32,11 @@ RECOMMENDED_TIMES = 2.0
 """Chip and speed over the recommended ones that give a caution: the recommendations are deliberately low."""
 BEND_TIMES = 10.0
 """Deflection over the limit that is a finding, as in a plan: the cut is not where it should be."""
+FINEST, COARSEST = 0.01, 0.5
+"""Pitch over the diameter outside of which there is no thread: the coarsest of ISO 261, M1 x 0.25, has a quarter, and
+fine threads of 1 mm go up to 100 mm."""
+PITCH_ERROR = 0.02
+"""Share by which feed over speed of a tap may differ from its pitch: what a floating holder takes up."""
 WINDOW, SPACINGS = 0.5, 4.0  # radii of way, and spacings of the stock, over which a cut is measured; the greater counts
 DWELL_TURNS = 10.0  # turns of the spindle that a tool may stand in its cut: a spot face takes three
 ROUNDING = 1e-6
@@ -122,11 +127,12 @@ def _lengths(moves: Moves, depth: F64, tools: Sequence[ToolBody]) -> tuple[F64, 
     return np.maximum.reduce([tip, *ways[:3]]), ways[3]
 
 
-def loads(cuts: CutSequence, tools: Sequence[ToolBody],
-          words: Mapping[int, CuttingWords]) -> tuple[list[Finding], list[ProgramCaution]]:
+def loads(cuts: CutSequence, tools: Sequence[ToolBody], words: Mapping[int, CuttingWords],
+          tapped: NDArray[np.bool_]) -> tuple[list[Finding], list[ProgramCaution]]:
     """Findings of loads that no cutter bears, and cautions where a program exceeds its tools' words, tool by tool.
 
-    words : by T number; a tool that is absent is not judged
+    words   : by T number; a tool that is absent is not judged
+    tapped  : (m,) bool, moves on which a tap cuts or is in its hole; it is judged by speed and by feed over speed only
 
     Notes
     -----
@@ -140,11 +146,17 @@ def loads(cuts: CutSequence, tools: Sequence[ToolBody],
     cautions: list[ProgramCaution] = []
     ways = cuts.run.ways.of_moves(cuts.first)
     for k, tool in enumerate(tools):
-        said = words.get(tool.number)
-        rows = np.flatnonzero((cuts.moves.tool == k) & cuts.run.cut & cuts.moves.feed & (cuts.feed > 0.0))
-        if said is None or not len(rows) or tool.named == "tap":
+        said, tap = words.get(tool.number), tool.named == "tap"
+        met = (tapped if tap else cuts.run.cut) & cuts.moves.feed
+        rows = np.flatnonzero((cuts.moves.tool == k) & met & (cuts.feed > 0.0))
+        if said is None or not len(rows):
             continue
         judge = _Judge(cuts, tool, said, rows)
+        if tap:
+            found, caution = judge.speeds(np.full(len(cuts.moves), tool.flute_length))
+            findings.extend([*judge.threads(), *found])
+            cautions.extend(caution)
+            continue
         for found, caution in (judge.chips(), judge.speeds(ways.depth), judge.forces(k)):
             findings.extend(found)
             cautions.extend(caution)
@@ -198,6 +210,29 @@ class _Judge:
         return self._over(rows, speed, bound, wanted, "cutting_speed", text,
                           f"{bound:.0f} m/min is more than any cutter bears in this material",
                           f"recommended are {self.said.speed:g} m/min", "turn slower", self.said.speed)
+
+    def threads(self) -> Iterator[Finding]:
+        """Feed over speed of a tap: its pitch."""
+        rows = self.rows[self.cuts.speed[self.rows] > 0.0]
+        if not len(rows):
+            return
+        pitch, size = self.said.pitch, self.tool.diameter
+        low, high = (FINEST * size, COARSEST * size) if pitch is None else (
+            (1.0 - PITCH_ERROR) * pitch, (1.0 + PITCH_ERROR) * pitch)
+        a_turn = self.cuts.feed[rows] / self.cuts.speed[rows]
+        off = np.maximum(a_turn / high, low / a_turn)
+        worst = int(np.argmax(off))
+        if off[worst] <= 1.0 + ROUNDING:
+            return
+        m, most = int(rows[worst]), float(a_turn[worst])
+        program, line = self.cuts.place(m)
+        x, y, z = (round(float(v), 6) for v in self.cuts.moves.end[m])
+        why = f"its pitch is {pitch:g} mm" if pitch is not None else \
+            f"threads of {size:g} mm have pitches of {low:.3g} to {high:.3g} mm"
+        yield Finding(FindingKind.LOAD, program, line, None, None, (x, y, z), most, high if most > high else low,
+                      f"T{self.tool.number}: the tap goes {most:.3f} mm a turn at F{self.cuts.feed[m]:.6g} "
+                      f"S{self.cuts.speed[m]:g}; {why}: the feed is pitch times spindle speed",
+                      int((off > 1.0 + ROUNDING).sum()), tip=(x, y, z))
 
     def forces(self, k: int) -> Judged:
         """Depth and width of cut, deflection of the tip and stress in the tool; k : its place among the tools."""

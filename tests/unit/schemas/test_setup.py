@@ -83,6 +83,7 @@ def test_a_tool_that_leaves_lengths_out_is_straight():
     (tool(kind="tap", point_angle_deg=60), "the lead of a tap needs tip_diameter_mm"),
     (tool(kind="tap", tip_diameter_mm=2), "needs point_angle_deg"),
     (tool(kind="thread_mill", point_angle_deg=60), "belongs to kinds drill, tap and chamfer"),
+    (tool(kind="drill", pitch_mm=1), "belongs to kinds tap and thread_mill"),
     (tool(taper_angle_deg=3), "not available yet"), (tool(number=0), "greater than or equal to 1"),
     (setup(quality={"scallop_height_mm": 1.5}), "radius 1.5 of the smallest tool T1"),
     (setup(quality={"scallop_height_mm": 0}), "greater than or equal to 0.0001"),

@@ -43,6 +43,8 @@ def test_a_drill_may_go_aside_between_its_holes():
 def test_a_tap_feeds_out_of_its_thread(kind, feeds_out, lines):
     tips = [(0, 0, 5), (0, 0, -3), (0, 0, 5), (9, 0, 5)]
     moves, cut, source = case(tips, [True, feeds_out, False], [True, False, False])
-    found = torn_threads(moves, cut, [drill(kind)], source)
+    inside = np.roll(cut, 1)
+    found = torn_threads(moves, cut, ~cut & cut, [drill(kind)], source)
+    assert torn_threads(moves, ~cut & cut, inside, [drill(kind)], source) == found
     assert [f.line for f in found] == lines
     assert not found or (found[0].depth == pytest.approx(8.0) and "T3 is a tap" in found[0].message)

@@ -9,7 +9,7 @@ import pytest
 from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import tool
-from verify.checks.thread_teeth import drawn_thread_mills, teeth_touch
+from verify.checks.thread_teeth import drawn_thread_mills, taps_in_holes, teeth_touch
 from verify.findings import Source
 from verify.moves import Moves
 from verify.tool_axes import ToolAxes
@@ -40,7 +40,7 @@ def helix(orbit, turns, low, pitch=PITCH, start=0.0, pieces=60):
     return [(orbit * math.cos(a), orbit * math.sin(a), low + pitch * t) for a, t in zip(at, k, strict=True)]
 
 
-def found(tips, feed=(), tree=None, mill=MILL, cut=None, turn=None):
+def found(tips, feed=(), tree=None, mill=MILL, cut=None, turn=None, pitch=None):
     """Depths by line, the number of the tip to which a move goes; ``feed`` : lines at rapid."""
     at = np.array(tips, float)
     n = len(at) - 1
@@ -53,7 +53,8 @@ def found(tips, feed=(), tree=None, mill=MILL, cut=None, turn=None):
     moves = Moves(at[:-1].copy(), at[1:].copy(), go, np.zeros(n, np.int32), axes)
     source = Source(("program",), np.zeros(n, np.int32), np.arange(1, n + 1, dtype=np.int32), np.full(n, 6, np.int32))
     cut = np.zeros(n, bool) if cut is None else np.array(cut, bool)
-    return {f.line: f.depth for f in drawn_thread_mills(moves, cut, [mill], source, tree or tube(BORE), 0.03)}
+    return {f.line: f.depth for f in drawn_thread_mills(moves, cut, [mill], source, tree or tube(BORE), 0.03,
+                                                          {} if pitch is None else {mill.number: pitch})}
 
 
 DOWN = [(0, 0, 15), (0, 0, 2)]
@@ -114,6 +115,25 @@ def test_a_helix_steeper_than_any_thread_is_found():
 def test_a_wall_that_is_entered_without_a_helix_counts():
     assert list(found([*IN, (ORBIT, 0, 8)])) == [3]
     assert found([*IN, (ORBIT, 0, 2.3), (0, 0, 2.3), (0, 0, 15)]) == {}
+
+
+@pytest.mark.parametrize("pieces", [8, 60, 720])
+def test_helices_have_the_pitch_that_the_mill_states(pieces):
+    tips = [*IN, *helix(ORBIT, 3.0, 2.0, pieces=pieces), (0, 0, 4.4), (0, 0, 15)]
+    tips = [(round(x, 6), round(y, 6), round(z, 3)) for x, y, z in tips]
+    assert found(tips) == found(tips, pitch=PITCH) == found(tips, pitch=1.015 * PITCH) == {}
+    for other in (0.75, 1.0):
+        depth = found(tips, pitch=other)
+        assert list(depth.values()) == [pytest.approx(PITCH, rel=0.01)]
+
+
+def test_a_tap_is_in_its_hole_where_it_touches_the_part():
+    tap = replace(tool(5.0, 0.0), named="tap", flute_length=3.0)
+    at = np.array([(0, 0, 15), (0, 0, 11), (0, 0, 4), (0, 0, 11), (0, 0, 15), (9, 0, 15)], float)
+    moves = Moves(at[:-1], at[1:], np.array([1, 1, 1, 0, 1], bool), np.zeros(5, np.int32), None)
+    assert np.argwhere(taps_in_holes(moves, [tap], tube(BORE), 0.03)).tolist() == [[1, 1], [2, 0]]
+    assert not taps_in_holes(moves, [MILL], tube(BORE), 0.03).any()
+    assert not taps_in_holes(moves, [tap], tube(30.0), 0.03).any()
 
 
 def test_a_thread_in_stock_counts_where_the_tool_cut_it():

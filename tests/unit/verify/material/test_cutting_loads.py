@@ -49,6 +49,27 @@ def test_a_feed_per_tooth_over_a_fifth_of_the_diameter_is_a_load():
     assert cautions["chip_load"].limit == pytest.approx(WORDS.per_tooth) and cautions["chip_load"].line == 9
 
 
+@pytest.mark.parametrize(("feed", "pitch", "a_turn"), [
+    (400, None, None), (400, 0.8, None), (407, 0.8, None), (410, 0.8, 0.82), (390, 0.8, 0.78), (1300, None, 2.6),
+    (19, None, 0.038), (21, None, None)])
+def test_a_tap_goes_on_by_its_pitch(feed, pitch, a_turn):
+    tap = replace(MILL, named="tap")
+    words = cutting_words(MATERIALS["C45"], Tool(id="T1", kind="tap", diameter_mm=4.0, pitch_mm=pitch))
+    found, cautions = judged(["S500 M3", "G0 X-26 Y12", "G0 X0 Y0", "Z2", f"G1 Z-3 F{feed}", "Z2"], words, tap)
+    assert "chip_load" not in cautions
+    assert [(f.line, f.depth) for f in found] == ([] if a_turn is None else [(10, pytest.approx(a_turn))])
+    if found:
+        assert ("its pitch is 0.8 mm" if pitch else "pitches of 0.04 to 2 mm") in found[0].message
+
+
+def test_the_speed_of_a_tap_is_bounded_as_that_of_a_mill():
+    words = cutting_words(MATERIALS["C45"], Tool(id="T1", kind="tap", diameter_mm=4.0))
+    for speed, kinds in ((8000, []), (24000, ["cutting_speed"])):
+        found, cautions = judged([f"S{speed} M3", "G0 X0 Y0", "Z2", f"G1 Z-3 F{0.7 * speed:g}", "Z2"], words,
+                                 replace(MILL, named="tap"))
+        assert found == [] and list(cautions) == kinds
+
+
 def test_a_speed_over_thirty_times_the_recommended_one_is_a_load():
     found, _ = judged(slot(0.4, 60000, 400000))
     assert [f.depth for f in found] == [pytest.approx(math.pi * 4.0 * 400.0)] and found[0].limit == 30.0 * 130.0
