@@ -321,10 +321,10 @@ class ContourMotion(Origins):
         """Move straight to ``target`` (3,) mm, setup frame, and turn the axes to ``turn`` (2,) deg, if given."""
         s = self.s
         start = [t if math.isnan(p) else p for p, t in zip(s.position, target, strict=True)]
-        was, s.position = s.position, target
-        level = target[2] == target[2] and was[2] != target[2]
+        was, level = s.position, target[2] == target[2] and s.position[2] != target[2]
         if kind == RAPID and s.offset is None and s.tool > 0 and level:
-            self.log.remark("rapid_offset", f"Z moves with the length offset off (no G43 H{s.tool})", s.tool)
+            target = self._without_length(was, target)
+        s.position = target
         if kind == RAPID and s.offset not in (None, s.tool) and s.tool > 0 and level and not target[2] > was[2]:
             self.log.remark("rapid_stale", f"Z comes down in a rapid with length offset H{s.offset} and tool T{s.tool}",
                             (s.offset, s.tool))
@@ -343,6 +343,19 @@ class ContourMotion(Origins):
             self._write(start, target, kind, feed, axes, turn, minutes)
         elif turn is not None:
             self._stand(turn)
+
+    def _without_length(self, was: list[float], target: list[float]) -> list[float]:
+        """Where the tip goes in a rapid with the length offset off: the spindle face goes to ``target`` (3,) mm.
+
+        Only a tool of known length that goes up so, from a known height, does no harm.
+        """
+        s, hangs = self.s, self.hangs.get(self.s.tool)
+        if hangs is None or s.relative or s.tilted or s.frame is not None or not target[2] - hangs >= was[2]:
+            self.log.remark("rapid_offset", f"Z moves with the length offset off (no G43 H{s.tool})", s.tool)
+            return target
+        self.log.note(f"line {self.log.line}: the length offset is off, so the spindle face goes to Z{target[2]:.6g} "
+                      f"and the tip of T{s.tool} to Z{target[2] - hangs:.6g}")
+        return [target[0], target[1], target[2] - hangs]
 
     def _leave(self, named: Sequence[bool]) -> None:
         """As in ``Rotary``; the place of the tool is unknown along the same axes."""

@@ -21,7 +21,7 @@ class OffsetTables(Modes):
 
     zeros   : mm by name of a work offset, (3,) from the zero of the setup, nan where unknown
     written : mm by name, (3,) as the program wrote them in machine coordinates, nan where it has not
-    lengths : mm by H number, the first value written and the present one
+    lengths : mm by H number, the first value written and the present one; the first is nan where G91 only added to it
     wear    : mm by H number
     registers : mm by D number, radius that the program wrote; radius_wear : mm by D number
     """
@@ -72,19 +72,24 @@ class OffsetTables(Modes):
             self._set_length(number, value)
         elif kind == 11:
             self.wear[number] = value + (self.wear.get(number, 0.0) if s.relative else 0.0)
+        elif kind == 12 and s.relative and number not in self.registers:
+            self.radius_wear[number] = value + self.radius_wear.get(number, 0.0)
         elif kind == 12:
-            self.registers[number] = value + (self.registers.get(number, 0.0) if s.relative else 0.0)
+            self.registers[number] = value + (self.registers[number] if s.relative else 0.0)
         else:
             self.radius_wear[number] = value + (self.radius_wear.get(number, 0.0) if s.relative else 0.0)
 
     def _set_length(self, number: int, value: float) -> None:
-        first, now = self.lengths.get(number, (value, value))
-        self.lengths[number] = first, now + value if self.s.relative and number in self.lengths else value
+        first, now = self.lengths.get(number, (math.nan, 0.0))
+        if self.s.relative and self._foreign:  # adds to what the control holds
+            self.lengths[number] = first, now + value
+        else:
+            self.lengths[number] = value if math.isnan(first) else first, value
 
     def _length_error(self, number: int) -> float:
         """mm, by which length offset H ``number`` differs from the length of its tool."""
         first, now = self.lengths.get(number, (0.0, 0.0))
-        return now - first + self.wear.get(number, 0.0)
+        return now - (0.0 if math.isnan(first) else first) + self.wear.get(number, 0.0)
 
     def _own_register(self, number: int) -> bool:
         """Whether a register that no tool has by number belongs to the tool in the spindle.

@@ -29,6 +29,8 @@ LENGTH_BY_PLANE = Assumed(AssumedKind.LENGTH_AXIS, "Z in the planes G18 and G19 
                           "G43 moves the axis across the plane by the length of the tool, and Z without it",
                           "program G17 before G43")
 _PAIR = re.compile(r"\([^()]*\)")
+_CHANGES = re.compile(r"[XYZABCGTFHDS]|M0*(?:2|3|4|5|6|19|29|30)(?![0-9.])")
+"""Words that move the tool, or that a later move depends on; stops and coolant are not among them."""
 _TAPE = re.compile(r"%[O:]?[0-9]*")
 _DELETED = re.compile(r"(N[0-9]+)?/[1-9]?(?=[A-Z]|$)")
 _FOREIGN: dict[str, frozenset[float]] = {
@@ -156,7 +158,7 @@ class FanucReader(FanucPlanes):
         for letter, digits in words:
             out += self._word(letter, digits, codes, values)
         block = " ".join(out)
-        if deleted and not re.search(r"[XYZABCGTFH]", block):  # nothing of it moves the tool
+        if deleted and not _CHANGES.search(block):
             deleted = False
         return [*before, *([f"/{block}" if deleted else block] if block else []), *self._after(codes)]
 

@@ -110,7 +110,8 @@ def test_speeds_belong_to_the_moves_after_them():
     ("G41 D60 X0. Y0. F800.\n", 5.0), ("G41 D3 X0. Y0. F800.\n", 1.5),
     ("G10 L12 P10 R4.9\nG41 D10 G1 X0. Y0. F800.\n", 4.9), ("G10 L13 P10 R-0.1\nG41 D10 G1 X0. Y0. F800.\n", 4.9),
     ("G10 L12 P10 R0\nG10 L13 P10 R0.05\nG41 D10 G1 X0. Y0. F800.\n", 0.05),
-    ("G10 L12 P10 R9.8\nG41 D10 G1 X0. Y0. F800.\n", 4.9)])
+    ("G10 L12 P10 R9.8\nG41 D10 G1 X0. Y0. F800.\n", 4.9),
+    ("G91 G10 L12 P10 R-0.5\nG90\nG41 D10 G1 X0. Y0. F800.\n", 4.5)])
 def test_which_radius(body, radius):
     """The register of the tool, no compensation, the tool in the spindle, a register of no tool, of another tool."""
     p = read(body + "X40.\nG40 Y20.\n")

@@ -74,6 +74,11 @@ def test_compensation_changes_its_side_in_a_mirror():
     # lengths: wear moves the tip, the first geometry is the tool's own length
     ("G10 L11 P1 R0.2\nG43 H1\nG1 Z1. F100.\n", [[0, 0, 1.2]]),
     ("G10 L10 P1 R150.\nG43 H1\nG1 Z1. F100.\nG10 L10 P1 R150.5\nG43 H1\nZ1.\n", [[0, 0, 1], [0, 0, 1.5]]),
+    # in G91 a value is added, the first one too
+    ("G91 G10 L10 P1 R-1.\nG90\nG43 H1\nG1 Z1. F100.\n", [[0, 0, 0]]),
+    ("G91 G10 L10 P1 R-1.\nG10 L10 P1 R0.5\nG90\nG43 H1\nG1 Z1. F100.\n", [[0, 0, 0.5]]),
+    ("G91 G10 L10 P1 R-1.\nG90 G10 L10 P1 R150.\nG43 H1\nG1 Z1. F100.\n", [[0, 0, 1]]),
+    ("G10 L10 P1 R150.\nG91 G10 L10 P1 R-1.\nG90\nG43 H1\nG1 Z1. F100.\n", [[0, 0, 0]]),
 ])
 def test_tables_that_the_program_writes(body, expected):
     head = HEAD.replace("G0 G54 X0 Y0\nG43 H1 Z10.\n", "G54\n" if "L2" in body else "G0 G54 X0 Y0\nG43 H1 Z10.\n")
@@ -144,6 +149,31 @@ def test_line_ends_tape_codes_and_names_as_they_are(change):
 def test_a_block_with_a_slash_is_a_remark_only_where_it_moves():
     assert any("depends on a switch" in r.message for r in read("/G1 X1. F100.\n").remarks)
     assert any("depends on a switch" in r.message for r in read("N5/2 G1 X1. F100.\n").remarks)
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas"])
+@pytest.mark.parametrize(("words", "told"), [
+    ("S6000 M3", True), ("M3", True), ("2 M03", True), ("S6000", True), ("M5", True), ("M30", True), ("D1", True),
+    ("M8", False), ("M1", False), ("M00", False), ("M31", False)])
+def test_a_block_with_a_slash_is_a_remark_where_a_later_move_depends_on_it(dialect, words, told):
+    p = read(f"/{words}\nG1 X1. F100.\n", dialect)
+    assert any("depends on a switch" in r.message for r in p.remarks) == told
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas"])
+def test_without_a_length_the_spindle_face_goes_to_the_height(dialect):
+    """T1 is 56 mm long: G49 Z200 takes the tip up to 144, and G49 Z30 down to -26."""
+    def body(words):
+        return f"G1 X1. F100.\nG0 Z15.\n{words}\nX5. Y5.\n"
+    for words in ("G49 Z200.", "G49\nZ200.", "G49\nG0 X2. Z200.", "G49 Z80.\nZ200."):
+        p = read(body(words), dialect, lengths={1: 56.0})
+        assert p.remarks == () and p.end[-1].tolist() == [5, 5, 144] and any("to Z144" in n for n in p.notes)
+    again = read(body("G49 Z200.") + "G43 H1 Z15.\nG1 X9. F100.\n", dialect, lengths={1: 56.0})
+    assert again.remarks == () and again.end[-1].tolist() == [9, 5, 15]
+    for words, lengths in (("G49 Z30.", {1: 56.0}), ("G49 Z200.", {}), ("G49 Z70.999", {1: 56.0}),
+                           ("G49\nG91 Z100.\nG90", {1: 56.0})):
+        p = read(body(words), dialect, lengths=lengths)
+        assert any("Z moves with the length offset off" in r.message for r in p.remarks), words
 
 
 def test_a_place_of_the_machine_needs_no_g0_on_these_controls():
