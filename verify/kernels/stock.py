@@ -27,6 +27,8 @@ STUB_TOP, STUB_LOW, STUB_DUG, STUB_PAID, STUB_X0, STUB_X1, STUB_Y0, STUB_Y1 = 0,
 REFRESH = 64
 ARM = 0.05  # mm by which a line that stands over the flutes must reach into them
 UNITS = 1e9  # whole numbers of 1e-9 mm³ and 1e-9 mm: sums do not depend on the order of the blocks
+EDGE = 1e-9  # share of the squared radius by which a line on the edge of a cutter is within it
+RIM, RIM_SHARE = 5e-3, 0.02  # mm, and share of the radius: stock so near the edge says nothing of the depth of a cut
 ROUNDING = 1e-3  # mm, of coordinates and chords: no nearer than a clearance
 
 
@@ -109,7 +111,7 @@ class CutTotals(NamedTuple):
     """What a pass adds up, changed in place.
 
     taken : (p, 2) int64, 1e-9 mm³ that each part of a move takes (parts as in ``EngagedArrays``), and 1e-9 mm: its
-            deepest cut along the tool axis
+            deepest cut along the tool axis, of lines further in than ``RIM``
     open  : (1,) uint8, set where some line would be dug deeper than the skin if nothing paid for it
     """
 
@@ -206,6 +208,7 @@ def _lower(lines, box, a, d, cutter, end, descents, m, history, engaged, totals,
     b0, b1 = _cells(min(a[1], a[1] + d[1]) - radius, max(a[1], a[1] + d[1]) + radius, origin[1], step, j0, j1)
     floor = min(a[2], a[2] + d[2])
     flat, plan2 = radius - corner, d[0] * d[0] + d[1] * d[1]
+    inner = radius - min(RIM, RIM_SHARE * radius)
     along = 1.0 / plan2 if plan2 > 0.0 else 0.0
     plan = math.sqrt(plan2)
     for i in range(a0, a1 + 1):
@@ -224,21 +227,25 @@ def _lower(lines, box, a, d, cutter, end, descents, m, history, engaged, totals,
                 reach = flat + corner * min(over / cone, 1.0)
             elif over < corner:
                 reach = flat + math.sqrt(over * (2.0 * corner - over))
-            if wx * wx + wy * wy > reach * reach + 1e-9 * radius * radius:
+            near = wx * wx + wy * wy
+            if near > reach * reach + EDGE * radius * radius:
                 continue
-            low, s = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, 0.0, cone)
+            # a line on the very edge is lowered whatever rounding says, or the next pass would find it standing
+            low, s = lowest_within(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius * (1.0 + 0.5 * EDGE), flat, corner,
+                                   cone)
             gone = height[i, j] - low
             if gone <= 1e-9:
                 continue
             if height[i, j] > a[2] + s * d[2] + length + 1e-9:
-                under = under or wx * wx + wy * wy < (radius - ARM) * abs(radius - ARM)
+                under = under or near < (radius - ARM) * abs(radius - ARM)
                 continue
             height[i, j] = low
             if gone > 1e-6:
                 cut = True
                 k = min(int(s * count), count - 1)
                 taken[k, 0] += max(round((low + gone - max(low, bottom)) * cell), 1)
-                taken[k, 1] = max(taken[k, 1], round((low + gone - max(a[2] + s * d[2], bottom)) * UNITS))
+                if near < inner * inner:
+                    taken[k, 1] = max(taken[k, 1], round((low + gone - max(a[2] + s * d[2], bottom)) * UNITS))
             if plan > 0.0:
                 # a round end lowers a line bit by bit: what counts is all it takes off the line on its way over it
                 way = gone_on + s * plan
