@@ -33,7 +33,7 @@ from verify.checks.program_sequence import (
     strays_of,
 )
 from verify.checks.repeated_passes import repeats
-from verify.checks.sideways_cuts import sideways_findings, torn_threads
+from verify.checks.sideways_cuts import sideways_findings, tapped_out, torn_threads
 from verify.checks.table_clearance import table_findings
 from verify.checks.thread_teeth import drawn_thread_mills, taps_in_holes
 from verify.findings import (
@@ -161,6 +161,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                 *_idle_findings(framed, run, moves, source, [t for t in fine if t.cone_height <= 0.0], asked),
                 *again, *sideways_findings(moves, run.cut, tools, source),
                 *torn_threads(moves, run.cut, tapped[:, 0], tools, source),
+                *tapped_out(moves, run.cut, tapped[:, 0], tools, source, [p.program.taps for p in framed]),
                 *drawn_thread_mills(moves, run.cut, tools, source, tree, slack, _pitches(setup)),
                 *(box_findings(moves, slides, *dogleg_limits(part.mesh, moves, tools, setup), source)
                   if setup.dogleg else ()),

@@ -6,7 +6,7 @@ the setup frame, lengths in mm.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +66,34 @@ def torn_threads(moves: Moves, cut: NDArray[np.bool_], inside: NDArray[np.bool_]
         f"T{source.tool[m]} is a tap and leaves its thread at rapid; it feeds out as it fed in"))
 
 
+def tapped_out(moves: Moves, cut: NDArray[np.bool_], inside: NDArray[np.bool_], tools: Sequence[ToolBody],
+               source: Source, taps: Sequence[Mapping[int, bool]]) -> list[Finding]:
+    """One finding for each line in which a tap is fed out of its thread although the spindle is not reversed.
+
+    cut    : (m,) bool, whether each move removes stock
+    inside : (m,) bool, whether the teeth touch the part where each move begins
+    taps   : by program, ``Program.taps``; another tool than a tap in such a line is a finding too
+    """
+    if not any(taps) and not any(t.kind == "tap" for t in tools) or len(moves) < 2:
+        return []
+    up = np.tile([0.0, 0.0, 1.0], (len(moves), 1)) if moves.axes is None else moves.axes.axis
+    way = np.linalg.norm(moves.end - moves.start, axis=1)
+    rise = np.einsum("ij,ij->i", moves.end - moves.start, up)
+    is_tap = np.array([t.kind == "tap" for t in tools], np.bool_)[moves.tool]
+    follows = np.zeros(len(moves), np.bool_)
+    follows[1:] = (moves.tool[1:] == moves.tool[:-1]) & (source.program[1:] == source.program[:-1]) & cut[:-1]
+    out = np.flatnonzero(is_tap & moves.feed & (rise > ASIDE) & (follows | inside))
+    torn = np.array([m for m in out.tolist() if not taps[source.program[m]].get(int(source.line[m]), False)], np.intp)
+    odd = np.concatenate([np.zeros(0, np.int64), *(np.flatnonzero(
+        ~is_tap & moves.feed & (way > ASIDE) & (source.program == k) & np.isin(source.line, sorted(lines)))
+        for k, lines in enumerate(taps))])
+    return [*one_a_line(torn, way, moves.start, source, lambda m: (
+        f"T{source.tool[m]} is a tap and is fed out of its thread while the spindle turns on; a tapping cycle turns it "
+        "back")), *one_a_line(odd, way, moves.start, source, lambda m: (
+            f"T{source.tool[m]} is a {tools[moves.tool[m]].kind.replace('_', ' ')} and no tap, and the cycle turns it "
+            "back in its hole"))]
+
+
 def one_a_line(bad: NDArray[np.intp], depth: F64, at: F64, source: Source,
                 words: Callable[[int], str]) -> list[Finding]:
     """Findings of moves, one for each line: the first of its moves counts.
@@ -87,4 +115,4 @@ def one_a_line(bad: NDArray[np.intp], depth: F64, at: F64, source: Source,
     return out
 
 
-__all__ = ["one_a_line", "sideways_findings", "torn_threads"]
+__all__ = ["one_a_line", "sideways_findings", "tapped_out", "torn_threads"]

@@ -299,6 +299,8 @@ class BlockMotion(FrameWords):
         if hole is None or feed is None:
             return None
         self.log.room(repeats * hole.moves)
+        if s.motion in (74, 84) and repeats:
+            self.log.tap(s.motion == 74)
         across = [None if axis == k else a for axis, a in enumerate(axes)]
         if self.control is None and repeats and s.cycle["top"] + s.origin[k] < hole.clear != here[k]:
             self._line_to([hole.clear if axis == k else p for axis, p in enumerate(here)], RAPID, NAN)

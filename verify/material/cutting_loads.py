@@ -217,9 +217,12 @@ class _Judge:
         if not len(rows):
             return
         pitch, size = self.said.pitch, self.tool.diameter
-        low, high = (FINEST * size, COARSEST * size) if pitch is None else (
-            (1.0 - PITCH_ERROR) * pitch, (1.0 + PITCH_ERROR) * pitch)
+        low, high = FINEST * size, COARSEST * size
         a_turn = self.cuts.feed[rows] / self.cuts.speed[rows]
+        if pitch is None and low <= a_turn.min() and a_turn.max() <= high:
+            pitch = float(a_turn[0])  # one tap has one pitch
+        if pitch is not None:
+            low, high = (1.0 - PITCH_ERROR) * pitch, (1.0 + PITCH_ERROR) * pitch
         off = np.maximum(a_turn / high, low / a_turn)
         worst = int(np.argmax(off))
         if off[worst] <= 1.0 + ROUNDING:
@@ -227,8 +230,10 @@ class _Judge:
         m, most = int(rows[worst]), float(a_turn[worst])
         program, line = self.cuts.place(m)
         x, y, z = (round(float(v), 6) for v in self.cuts.moves.end[m])
-        why = f"its pitch is {pitch:g} mm" if pitch is not None else \
-            f"threads of {size:g} mm have pitches of {low:.3g} to {high:.3g} mm"
+        why = f"threads of {size:g} mm have pitches of {low:.3g} to {high:.3g} mm"
+        if pitch is not None:
+            why = f"its pitch is {pitch:.4g} mm" if self.said.pitch is not None else \
+                f"at first it goes {pitch:.4g} mm a turn, and a tap has one pitch"
         yield Finding(FindingKind.LOAD, program, line, None, None, (x, y, z), most, high if most > high else low,
                       f"T{self.tool.number}: the tap goes {most:.3f} mm a turn at F{self.cuts.feed[m]:.6g} "
                       f"S{self.cuts.speed[m]:g}; {why}: the feed is pitch times spindle speed",
@@ -271,10 +276,7 @@ class _Judge:
 
         def text(value: float, i: int) -> str:
             return f"{cut(i)} would bend its tip by {value:.3f} mm"
-        # lines on the very edge of a slot may stay for a pass and show twice its depth: as wide as the tool it is less
-        slot = cutting_forces(said.kc, said.mc, per_tooth[turns], section / tool.diameter,
-                              np.full(len(section), tool.diameter), tool, said.flutes)
-        far, _ = self._over(last, np.minimum(force, slot) * soft, BEND_TIMES * said.bend, math.inf, "load", text,
+        far, _ = self._over(last, force * soft, BEND_TIMES * said.bend, math.inf, "load", text,
                             f"{BEND_TIMES:g} times the limit of {said.bend:.3f} mm is {BEND_TIMES * said.bend:.3f} mm",
                             "", advice)
         _, bent = self._over(last, bend, math.inf, said.bend, "deflection", text, "", f"limit {said.bend:.3f} mm",

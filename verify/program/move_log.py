@@ -31,6 +31,7 @@ class Log:
     functions : first line of each M word that counts as a function of the machine
     speeds, unknown, stops, blend, leaves, changes, unbounded, pauses, places, dwells, swaps, unplaced,
     by_joints, lifts, kept_on : as in ``Program``
+    taps : move that begins a tapping cycle, and whether the spindle turns back on the way out
     rows : latest moves as (start x, y, z, end x, y, z, kind, feed, tool, line), mm and mm/min; call ``flush`` at 65 536
     """
 
@@ -60,6 +61,7 @@ class Log:
         self.lifts: list[tuple[int, bool]] = []
         self.by_joints: set[int] = set()
         self.kept_on: list[int] = []
+        self.taps: list[tuple[int, bool]] = []
         self.unbounded = False
         self.cools = False
         self.path_stated: int | None = None
@@ -67,6 +69,12 @@ class Log:
         self.turned = TurnLog()
         self._remedy: str | None = None
         self._states: list[tuple[int, float, bool]] = [(0, 0.0, False)]
+
+    def tap(self, left: bool, *, out: bool = True) -> None:
+        """The line of the next move taps; left: a left-hand thread; out: the spindle turns back on the way out."""
+        self.taps.append((self.count, out))
+        if left:
+            self.remark("left_tap", "the cycle taps a left-hand thread, and turns the spindle backwards", self.line)
 
     @property
     def count(self) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -154,6 +155,7 @@ class Program:
     lifts   : rows of no length that stand for a way home in Z from a known place: row, and whether it goes along the
               tool, not along Z of the machine
     kept_on : lines that turn tool centre point control on by G43.4 while it is on
+    taps    : lines of tapping cycles and moves, and whether the spindle turns the other way on the way out
     unbounded : whether, somewhere, no word bounds the deviation from the path: ``leaves`` does not hold there
     pauses  : in order
     """
@@ -195,6 +197,7 @@ class Program:
     own_speed: bool = False
     lifts: tuple[tuple[int, bool], ...] = ()
     kept_on: tuple[int, ...] = ()
+    taps: Mapping[int, bool] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.start)

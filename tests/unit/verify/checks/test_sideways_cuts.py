@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.hand_parts import tool
-from verify.checks.sideways_cuts import sideways_findings, torn_threads
+from verify.checks.sideways_cuts import sideways_findings, tapped_out, torn_threads
 from verify.findings import Source
 from verify.moves import Moves
 
@@ -48,3 +48,18 @@ def test_a_tap_feeds_out_of_its_thread(kind, feeds_out, lines):
     assert torn_threads(moves, ~cut & cut, inside, [drill(kind)], source) == found
     assert [f.line for f in found] == lines
     assert not found or (found[0].depth == pytest.approx(8.0) and "T3 is a tap" in found[0].message)
+
+
+@pytest.mark.parametrize(("kind", "taps", "lines"), [
+    ("tap", {}, [2]), ("tap", {1: True, 2: True}, []), ("tap", {1: False, 2: False}, [2]),
+    ("tap", {1: False, 2: True}, []),
+    ("drill", {}, []), ("drill", {1: True, 2: True}, [1, 2])])
+def test_a_tap_is_fed_out_by_a_cycle_that_turns_it_back(kind, taps, lines):
+    tips = [(0, 0, 5), (0, 0, -3), (0, 0, 5), (9, 0, 5), (9, 0, 7)]
+    moves, cut, source = case(tips, [True, True, False, True], [True, False, False, False])
+    none = np.zeros(4, bool)
+    for cuts, inside in ((cut, none), (none, np.array([0, 1, 0, 0], bool))):
+        found = tapped_out(moves, cuts, inside, [drill(kind)], source, [taps])
+        assert [f.line for f in found] == lines
+        assert not found or found[-1].depth == pytest.approx(8.0)
+    assert tapped_out(moves, none, none, [drill("tap")], source, [{}]) == []

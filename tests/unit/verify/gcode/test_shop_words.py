@@ -394,9 +394,11 @@ def test_the_spindle_stands_behind_a_tapping_cycle(dialect, tap, rigid):
         for again in ("", "M3\n"):
             p = read(f"{before}{tap}{again}G1 X1. F100.\n", dialect)
             told = sum("spindle standing" in r.message for r in p.remarks)
+            assert sum("left-hand" in r.message for r in p.remarks) == tap.count("G74")
             assert told == (not again or bool(before and not rigid)), (before, again, p.remarks)
     p = read(f"{tap.replace('G80', 'G81 X9. Z-1. R2.')}G80\nM3\n", dialect)
-    assert ["spindle standing" in r.message for r in p.remarks] == [True] * (tap.count("G80"))
+    assert ["spindle standing" in r.message for r in p.remarks if "left-hand" not in r.message] \
+        == [True] * (tap.count("G80"))
 
 
 @pytest.mark.parametrize("word", ["EQ", "NE", "GT", "GE", "LT", "LE"])
@@ -464,3 +466,14 @@ def test_a_whole_number_that_rounding_decides_is_refused(dialect, text, right):
     with pytest.raises(ProgramError, match="the rounding of the control decides"):
         read(f"{text}G1 X1. F9.\n", dialect)
     assert len(read(f"{right}G1 X1. F9.\n", dialect))
+
+
+@pytest.mark.parametrize(("text", "dialect", "taps", "left"), [
+    ("G99 G84 X1. Y1. Z-2. R2. F400.\nX5.\nG80\n", "fanuc", [8, 9], False),
+    ("G99 G74 X1. Y1. Z-2. R2. F400.\nG80\n", "haas", [8], True),
+    ("G99 G85 X1. Y1. Z-2. R2. F400.\nG80\n", "fanuc", [], False),
+    ("G99 G84 X1 Y1 Z-2 R2 F400\nG80\n", "linuxcnc", [8], False)])
+def test_lines_of_tapping_cycles_are_known(text, dialect, taps, left):
+    p = read(text, dialect)
+    assert p.taps == dict.fromkeys(taps, True)
+    assert any("left-hand" in r.message for r in p.remarks) == left

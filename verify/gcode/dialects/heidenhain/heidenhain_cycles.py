@@ -133,11 +133,13 @@ def _ways(call: CycleCall, machine: Machine, surface: float, depth: float, feed:
     n, unit = call.number, machine.s.scale
     if n in (207, 209):
         speed, pitch = machine.s.speed, abs(call.get("Q239")) * unit
+        machine.log.tap(call.get("Q239") < 0)
         if not speed > 0 or not pitch > 0:
             raise BlockError(f"cycle {n} needs a spindle speed and a pitch (Q239)")
         rate = f"F{digits(pitch * speed / unit)}"
         return {"feed": rate, "out": rate}
     if n == 206:
+        machine.log.tap(False)
         return {"feed": down, "out": down}
     if n in (201, 202):
         return {"feed": down, "out": feed(call.get("Q208")) if call.get("Q208", 0.0) not in (0.0, math.inf) else down}

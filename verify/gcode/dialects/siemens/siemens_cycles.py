@@ -60,7 +60,9 @@ def drilling_blocks(call: DrillingCall, here: Sequence[float], machine: Machine)
     if call.name in ("CYCLE84", "CYCLE840"):
         speed = call.number(10) if call.name == "CYCLE84" else 0.0
         speed = speed or s.speed
-        pitch = _pitch(call, 7 if call.name == "CYCLE84" else 9)
+        at = 7 if call.name == "CYCLE84" else 9
+        pitch = _pitch(call, at)
+        machine.log.tap(min(call.number(at), call.number(at + 1)) < 0)
         if pitch is None and call.name == "CYCLE84":
             raise BlockError("CYCLE84 without a pitch (MPIT, PIT)")
         if pitch is not None:

@@ -319,6 +319,7 @@ class SiemensMoves(SiemensCorners):
             if not pitch or not speed > 0:
                 raise BlockError("G331 and G332 need a pitch (I, J, K) and a speed (S)")
             feed = pitch if self.machine.s.feed_mode == 95 else pitch * speed
+            self.machine.log.tap(any(v < 0 for v, _ in line.centre.values()), out=332 in line.codes)
         if not places:
             raise BlockError("tapping without coordinates")
         old = self.machine.s.feed
