@@ -90,7 +90,8 @@ class Reader(BlockMotion):
                        dialect, log.unbounded, tuple(log.pauses), log.leaves, tuple(log.places), cut_off,
                        open=self._left_open(), cools=log.cools, dwells=tuple(log.dwells),
                        swaps=tuple(log.swaps), unplaced=tuple(log.unplaced), by_joints=frozenset(log.by_joints),
-                       lifts=tuple(log.lifts), kept_on=tuple(log.kept_on), taps={int(table[row, 9]): out for row, out in log.taps if row < len(table)},
+                       lifts=tuple(log.lifts), kept_on=tuple(log.kept_on),
+                       taps={int(table[row, 9]): out for row, out in log.taps if row < len(table)},
                        own_speed=self.control is not None and self.control.own_speed)
 
     def _left_open(self) -> tuple[Assumed, ...]:
