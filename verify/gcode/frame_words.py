@@ -65,8 +65,16 @@ class FrameWords(ContourMotion):
                              "be read")
         if self.rotated is not None:
             raise BlockError("G68 while a rotation is in force: end it with G69 first")
+        centre = self._centre(axes, "G68")
+        plane = PLANE_AXES[self.s.plane][:2]
+        if any(k in self.mirrors for k in plane):
+            raise BlockError("G68 in a mirror of the plane, which turns the other way on some controls",
+                             "rotate first, or write the mirrored contour")
+        if self.scaled is not None and any(abs(self.scaled.out(centre)[k] - centre[k]) > SAME for k in plane):
+            raise BlockError("G68 in a scale that moves its centre, which some controls scale too",
+                             "rotate about the centre of the scale")
         self.turned, self.numbers = "G68", self._here()
-        self.rotated = rotation(self.s.plane, math.radians(values["R"]), self._centre(axes, "G68"))
+        self.rotated = rotation(self.s.plane, math.radians(values["R"]), centre)
 
     def _check_turned(self, axes: Axes) -> None:
         """Refuse the first move behind a rotation that names one axis of the plane, where the other may go two ways.
@@ -92,6 +100,9 @@ class FrameWords(ContourMotion):
 
     def _mirror(self, word: float, axes: Axes) -> None:
         named = {k: a * self.s.scale for k, a in enumerate(axes) if a is not None}
+        if self.rotated is not None or self.scaled is not None:
+            raise BlockError(f"G{word:g} while a rotation or a scale is in force, which Fanuc forbids",
+                             "begin a mirror before them, and end it after them")
         if word == 51.1:
             if not named:
                 raise BlockError("G51.1 needs X, Y or Z")

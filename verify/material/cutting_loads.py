@@ -26,6 +26,8 @@ from verify.moves import Moves
 CHIP_SHARE = 0.2
 """Feed per tooth over the diameter that no cutter bears. High-feed mills reach 0.083 [HighFeed2026], router bits 0.064
 [CutterShop2026]."""
+DRILL_SHARE = 0.1
+"""Feed of a drill in a turn over its diameter that it does not bear. Tables have up to 0.04 [ProtoCutter2026]."""
 SPEED_TIMES = 30.0
 """Cutting speed over the recommended one that no cutter bears. High-speed cutting reaches 28 [Schulz1992]."""
 RECOMMENDED_TIMES = 2.0
@@ -183,12 +185,16 @@ class _Judge:
         rows = self.rows[self.cuts.speed[self.rows] > 0.0]
         per_tooth = self.cuts.feed[rows] / (self.cuts.speed[rows] * self.said.flutes)
         bound, wanted = CHIP_SHARE * self.tool.diameter, RECOMMENDED_TIMES * self.said.per_tooth
+        share = "a fifth of the diameter, is more than any cutter bears"
+        if self.tool.named == "drill":
+            bound, share = DRILL_SHARE * self.tool.diameter / self.said.flutes, \
+                "a tenth of the diameter in a turn, is more than any drill bears"
 
         def text(value: float, i: int) -> str:
             return (f"T{self.tool.number}: the feed per tooth is {value:.3f} mm at F{self.cuts.feed[rows[i]]:.6g} "
                     f"S{self.cuts.speed[rows[i]]:g} with {self.said.flutes} teeth{self._swung(rows[i])}")
         return self._over(rows, per_tooth, bound, wanted, "chip_load", text,
-                          f"{bound:.3f} mm, a fifth of the diameter, is more than any cutter bears",
+                          f"{bound:.3f} mm, {share}",
                           f"recommended are {self.said.per_tooth:.3f} mm", "feed slower or turn faster",
                           self.said.per_tooth)
 

@@ -70,6 +70,16 @@ def test_a_tap_comes_out_with_the_pitch_with_which_it_went_in():
         assert [f.line for f in found] == [] if line is None else [10]
 
 
+@pytest.mark.parametrize(("feed", "harm"), [(95, False), (105, True)])
+def test_a_drill_bears_a_tenth_of_its_diameter_in_a_turn(feed, harm):
+    """4 mm with two lips: 0.4 mm in a turn."""
+    words = cutting_words(MATERIALS["C45"], Tool(id="T1", kind="drill", diameter_mm=4.0))
+    drill = replace(MILL, named="drill", tip_diameter=0.0, cone_height=1.2)
+    found, _ = judged(["S250 M3", "G0 X0 Y0", "Z2", f"G1 Z-3 F{feed}", "G0 Z2"], words, drill)
+    assert [(f.line, f.limit) for f in found] == [(9, pytest.approx(0.2))] * harm
+    assert not harm or "any drill bears" in found[0].message
+
+
 def test_the_speed_of_a_tap_is_bounded_as_that_of_a_mill():
     words = cutting_words(MATERIALS["C45"], Tool(id="T1", kind="tap", diameter_mm=4.0))
     for speed, kinds in ((8000, []), (24000, ["cutting_speed"])):
