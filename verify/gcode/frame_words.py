@@ -69,7 +69,7 @@ class FrameWords(ContourMotion):
         plane = PLANE_AXES[self.s.plane][:2]
         if any(k in self.mirrors for k in plane):
             raise BlockError("G68 in a mirror of the plane, which turns the other way on some controls",
-                             "rotate first, or write the mirrored contour")
+                             "write the mirrored contour out")
         if self.scaled is not None and any(abs(self.scaled.out(centre)[k] - centre[k]) > SAME for k in plane):
             raise BlockError("G68 in a scale that moves its centre, which some controls scale too",
                              "rotate about the centre of the scale")
@@ -102,7 +102,7 @@ class FrameWords(ContourMotion):
         named = {k: a * self.s.scale for k, a in enumerate(axes) if a is not None}
         if self.rotated is not None or self.scaled is not None:
             raise BlockError(f"G{word:g} while a rotation or a scale is in force, which Fanuc forbids",
-                             "begin a mirror before them, and end it after them")
+                             "mirror before them, or write the contour out")
         if word == 51.1:
             if not named:
                 raise BlockError("G51.1 needs X, Y or Z")
