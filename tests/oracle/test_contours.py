@@ -8,7 +8,7 @@ import pytest
 
 from tests.hand_parts import ball, field_of, terraces, tool
 from tests.plan_checks import dense
-from toolpath.passes.contours import contours, wall_distance
+from toolpath.passes.contours import ROUND, contours, lines_at, rings, wall_distance
 
 shapely = pytest.importorskip("shapely")
 
@@ -74,3 +74,25 @@ def test_distances_from_walls_are_exact_and_the_same_on_one_thread_and_two():
     # a chord is off the round by step^2 / (4 r) at the most; cusps are narrower than the lattice sees
     off = np.abs(found[0][rows, cols] - true)
     assert np.quantile(off, 0.97) <= field.lattice.step**2 / (4.0 * body.radius) and off.max() <= field.lattice.step
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_rings_are_lines_of_the_distance_of_all_nodes(seed):
+    """Only nodes that a line may cross beside are measured; the lines have the same bytes."""
+    rng = np.random.default_rng(seed)
+    body = [ball(2.0), tool(3.0, 0.0), tool(4.0, 0.5)][seed % 3]
+    field = field_of(terraces(XS, YS, np.maximum(HEIGHTS, 0.0), -2.0), body)
+    lat, firsts, spacing = field.lattice, tuple(rng.uniform(0.02, 1.5, 2).tolist()), float(rng.uniform(0.2, 1.6))
+    active = np.zeros((lat.ny, lat.nx), bool)
+    low, high = rng.integers(0, 20, 2), [lat.ny, lat.nx] - rng.integers(0, 20, 2)
+    active[low[0]:high[0], low[1]:high[1]] = True
+    far = wall_distance(field, 1.0, np.ones_like(active))
+    widest, found = far[active].max(), list(rings(field, 1.0, active, firsts, spacing))
+    each = [np.arange(min(f, 0.9 * widest), widest, spacing)[::-1] for f in firsts]
+    at = [(d, 0.0 if d == ds[-1] else ROUND * spacing) for ds in each for d in ds]
+    for lines, (distance, rounded) in zip(found, at, strict=True):
+        twin = lines_at(field, 1.0, far, distance, active, (lat.x0, lat.y0), rounded)
+        # places are counted from the corner of the area, or from that of the lattice
+        assert len(lines) == len(twin)
+        for one, other in zip(lines, twin, strict=True):
+            assert one.closed == other.closed and np.abs(one.points - other.points).max() < 1e-12

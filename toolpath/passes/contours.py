@@ -32,7 +32,15 @@ from toolpath.kernels.contour import (
     trace,
 )
 from toolpath.kernels.grown import grow_square
-from toolpath.kernels.wall_distance import from_boundary, from_boundary_parallel, places_of
+from toolpath.kernels.wall_distance import (
+    EVERYWHERE,
+    Bands,
+    Walls,
+    box_of,
+    from_boundary,
+    from_boundary_parallel,
+    places_of,
+)
 from toolpath.lines import Line, dense, pieces_where, smoothed, true_runs
 from zones.kernels.lattice import LatticeFrame
 from zones.lattice import blocked_beside
@@ -42,6 +50,11 @@ THIN = 1.5  # lattice steps: mean width of loops that a slit may have fallen apa
 FINER = 4  # of the lattice, in a slit
 ROUND = 0.5  # of the distance between rings, over which all but those along the walls are smoothed
 MIN_APART = 0.6  # lattice steps between successive crossings; less only where a corner is cut
+SHORT = 1.25
+"""Lattice steps that the boundary is nearer than the nearest blocked node: sqrt(5) / 2 at the most, with some to spare.
+
+A chord across a cell is no farther from its blocked corners.
+"""
 
 
 def dilated(mask: NDArray[np.bool_], cells: float) -> NDArray[np.bool_]:
@@ -234,35 +247,80 @@ def wall_distance(field: TipField, z: float, asked: NDArray[np.bool_]) -> F64 | 
     distance from the nearest blocked node. That stands for it also beside features that the lattice does not see, or
     sees only the end of. A chord is off a round of radius r by no more than step^2 / (4 r).
     """
-    blocked = field.nearest_blocked(z)
-    if blocked is None:
+    walls = _WallDistance.of(field, z, asked)
+    if walls is None:
         return None
-    far, nearest = blocked[0].copy(), blocked[1]
-    free = far > 0.0
-    here = asked & free
-    if not here.any():
-        return far
-    i, j = (np.concatenate([k, nearest[c][here]]) for c, k in enumerate(np.nonzero(here)))
+    walls.find(EVERYWHERE)
+    return walls.far
+
+
+@dataclass(frozen=True, eq=False)
+class _WallDistance:
+    """``wall_distance`` of some nodes, found band by band.
+
+    field        : TipField
+    off, nearest : as ``TipField.nearest_blocked`` gives them
+    asked        : (ny, nx) bool, on the lattice
+    window       : first row and column of the boundary, count of its rows and columns
+    walls        : Walls; None where none of the nodes has a boundary
+    far          : (ny, nx) float64, mm, as far as it is found, else ``off``
+    """
+
+    field: TipField
+    off: F64
+    nearest: NDArray[np.int32]
+    asked: NDArray[np.bool_]
+    window: tuple[int, int, int, int]
+    walls: Walls | None
+    far: F64
+
+    @classmethod
+    def of(cls, field: TipField, z: float, asked: NDArray[np.bool_]) -> _WallDistance | None:
+        """Of the nodes asked for; None where every node is free."""
+        blocked = field.nearest_blocked(z)
+        if blocked is None:
+            return None
+        off, nearest = blocked
+        needed, window, walls = box_of(off, nearest, asked), (0, 0, 0, 0), None
+        if needed[0] + needed[2] <= 0:
+            chains = _chains_in(field, z, needed)
+            if chains is not None:
+                rows, cols = chains.rows, chains.cols
+                window = (rows.start, cols.start, *off[rows, cols].shape)
+                before = np.full(len(chains.ids), -1)
+                follows = np.flatnonzero(chains.after >= 0)
+                before[chains.after[follows]] = follows
+                walls = Walls(places_of(chains.ids, window), chains.after, before, chains.points, chains.begins)
+        return cls(field, off, nearest, asked, window, walls, off.copy())
+
+    def find(self, bands: Bands) -> None:
+        """Find the distances of the nodes asked for that are in some bands."""
+        if self.walls is not None:
+            fill = from_boundary if one_thread(self.far.size) else from_boundary_parallel
+            fill(self.walls, self.window, self.off, self.nearest, self.asked, bands, self.field.lattice.frame, self.far)
+
+    def widest(self, inside: NDArray[np.bool_]) -> float:
+        """The greatest distance of nodes (ny, nx) bool, asked for, mm; found as far as that takes."""
+        far = float(self.off[inside].max())
+        self.find(Bands(far, 1.0, 1, SHORT * self.field.lattice.step, 0.0))
+        return float(self.far[inside].max())
+
+    def along(self, first: float, spacing: float, count: int) -> None:
+        """Find the distances of both ends of each lattice edge that lines at equal distances cross, in mm."""
+        step = self.field.lattice.step
+        self.find(Bands(first, spacing, count, step, (1.0 + SHORT) * step))
+
+
+def _chains_in(field: TipField, z: float, needed: NDArray[np.int64]) -> _Chains | None:
+    """The boundary at a height in a box, as ``box_of`` gives it, or in more; of the last height it is kept."""
     at, box, chains = field.kept.get("walls", (math.nan, None, None))
-    needed = np.array([i.min(), j.min(), -i.max(), -j.max()])
     if at != z or (needed < box).any():
         box = np.minimum(needed, box) if at == z else needed
-        around = np.zeros_like(free)
+        around = np.zeros((field.lattice.ny, field.lattice.nx), np.bool_)
         around[box[0]:1 - box[2], box[1]:1 - box[3]] = True
         chains = _chains(field, z, around)
         field.kept["walls"] = z, box, chains
-    if chains is None:
-        return far
-    before = np.full(len(chains.ids), -1)
-    follows = np.flatnonzero(chains.after >= 0)
-    before[chains.after[follows]] = follows
-    rows, cols = chains.rows, chains.cols
-    window = (rows.start, cols.start, *free[rows, cols].shape)
-    nodes = here | ~free & dilated(here, 2.0)
-    fill = from_boundary if one_thread(int(nodes.sum())) else from_boundary_parallel
-    fill(places_of(chains.ids, window), chains.after, before, chains.points, chains.begins, window, nearest, nodes,
-         field.lattice.frame, far)
-    return far
+    return chains
 
 
 def from_walls(field: TipField, z: float, distance: float) -> NDArray[np.bool_] | None:
@@ -328,18 +386,20 @@ def rings(field: TipField, z: float, active: NDArray[np.bool_], firsts: Sequence
     lat = field.lattice
     rows, cols = _window(active, 1)
     inside = np.ascontiguousarray(active[rows, cols])
-    walls = wall_distance(field, z, dilated(active, 1.0))
-    walled = walls is not None
+    walls = _WallDistance.of(field, z, dilated(active, 1.0))
     if walls is not None:
-        far = np.ascontiguousarray(walls[rows, cols])
+        far, widest = np.zeros(0), walls.widest(active)
     else:
         far = np.ascontiguousarray(blocked_beside(np.pad(inside, 1), lat.step)[0][1:-1, 1:-1])
-    widest = float(far[inside].max())
+        widest = float(far[inside].max())
     corner = lat.x0 + cols.start * lat.step, lat.y0 + rows.start * lat.step
     for first in firsts:
         distances = np.arange(min(first, 0.9 * widest), widest, spacing).tolist()
-        for distance in distances[::-1] if walled else distances:
-            rounded = ROUND * spacing if walled and distance > distances[0] else 0.0
+        if walls is not None and distances:
+            walls.along(distances[0], spacing, len(distances))
+            far = np.ascontiguousarray(walls.far[rows, cols])
+        for distance in distances if walls is None else distances[::-1]:
+            rounded = ROUND * spacing if walls is not None and distance > distances[0] else 0.0
             yield lines_at(field, z, far, distance, inside, corner, rounded)
 
 
