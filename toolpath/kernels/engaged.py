@@ -47,7 +47,17 @@ def _sectors(k, top, x0, y0, step, tips, ways, radius, corner, skin, bits):
     for i in range(i0, i1 + 1):
         if bits[k] == ALL:
             break
-        for j in range(j0, j1 + 1):
+        # of the row, what is within the radius and no more than a step behind, and a node more on both sides
+        wy = y0 + step * i - y
+        right = math.sqrt(max(radius * radius - wy * wy, 0.0))
+        left, ahead = -right, -step - ways[k, 1] * wy
+        if ways[k, 0] > 1e-3:
+            left = max(left, ahead / ways[k, 0])
+        elif ways[k, 0] < -1e-3:
+            right = min(right, ahead / ways[k, 0])
+        if left > right + step:
+            continue
+        for j in range(max(j0, int((x + left - x0) / step) - 1), min(j1, int((x + right - x0) / step) + 2) + 1):
             over = top[i, j] - z
             if over <= skin:
                 continue

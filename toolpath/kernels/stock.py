@@ -31,29 +31,91 @@ def stamp(top, cover, frame: LatticeFrame, points, radius, corner):
     A cell of ``cover`` is lowered only by positions that clear the whole disc of its half diagonal, to what the
     farthest point of the disc is lowered to; positions lie on the polyline, so neither map ever falls too low.
     """
+    for k in range(max(len(points) - 1, 1)):
+        a, b = points[k], points[min(k + 1, len(points) - 1)]
+        length = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2)
+        pieces = max(1, int(np.ceil(length / (0.7 * frame.step))))
+        if a[2] == b[2]:
+            _stamp_level(top, cover, frame, a, b, pieces, radius, corner)
+        else:
+            for s in range(pieces + 1):
+                t = s / pieces
+                _stamp_place(top, cover, frame, a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]),
+                             a[2] + t * (b[2] - a[2]), radius, corner)
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _stamp_place(top, cover, frame: LatticeFrame, x, y, z, radius, corner):
+    """``stamp`` for one position."""
     x0, y0, step = frame
     ny, nx = top.shape
     half = HALF_DIAGONAL * step
     n_r = int(np.ceil(radius / step))
-    for k in range(max(len(points) - 1, 1)):
-        a = points[k]
-        b = points[min(k + 1, len(points) - 1)]
-        length = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2)
-        pieces = max(1, int(np.ceil(length / (0.7 * step))))
-        for s in range(pieces + 1):
-            t = s / pieces
-            x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
-            jc, ic = int(np.rint((x - x0) / step)), int(np.rint((y - y0) / step))
-            for i in range(max(ic - n_r, 0), min(ic + n_r + 1, ny)):
-                for j in range(max(jc - n_r, 0), min(jc + n_r + 1, nx)):
-                    if cover[i, j] <= z:
-                        continue
-                    rho = np.sqrt((x0 + j * step - x) ** 2 + (y0 + i * step - y) ** 2)
-                    if rho > radius:
-                        continue
-                    top[i, j] = min(top[i, j], z + _bottom(rho, radius, corner))
-                    if rho + half <= radius:
-                        cover[i, j] = min(cover[i, j], z + _bottom(rho + half, radius, corner))
+    jc, ic = int(np.rint((x - x0) / step)), int(np.rint((y - y0) / step))
+    for i in range(max(ic - n_r, 0), min(ic + n_r + 1, ny)):
+        for j in range(max(jc - n_r, 0), min(jc + n_r + 1, nx)):
+            if cover[i, j] <= z:
+                continue
+            rho = np.sqrt((x0 + j * step - x) ** 2 + (y0 + i * step - y) ** 2)
+            if rho > radius:
+                continue
+            top[i, j] = min(top[i, j], z + _bottom(rho, radius, corner))
+            if rho + half <= radius:
+                cover[i, j] = min(cover[i, j], z + _bottom(rho + half, radius, corner))
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _stamp_level(top, cover, frame: LatticeFrame, a, b, pieces, radius, corner):
+    """``stamp`` for a level move from a to b: each node is lowered by the nearest of its ``pieces`` + 1 positions."""
+    x0, y0, step = frame
+    ny, nx = top.shape
+    half, z = HALF_DIAGONAL * step, a[2]
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    d2 = dx * dx + dy * dy
+    wide = radius + step
+    for i in range(max(int(np.floor((min(a[1], b[1]) - wide - y0) / step)), 0),
+                   min(int(np.ceil((max(a[1], b[1]) + wide - y0) / step)) + 1, ny)):
+        y = y0 + i * step
+        first, last = 0.0, 1.0  # share of the way that is as near as that to the row
+        if abs(dy) > 1e-9:
+            u, v = (y - wide - a[1]) / dy, (y + wide - a[1]) / dy
+            first, last = max(min(u, v), 0.0), min(max(u, v), 1.0)
+            if first > last:
+                continue
+        left, right = a[0] + min(first * dx, last * dx) - wide, a[0] + max(first * dx, last * dx) + wide
+        for j in range(max(int(np.floor((left - x0) / step)), 0), min(int(np.ceil((right - x0) / step)) + 1, nx)):
+            if cover[i, j] <= z:
+                continue
+            x = x0 + j * step
+            s = 0
+            if d2 > 0.0:
+                s = int(min(max(((x - a[0]) * dx + (y - a[1]) * dy) / d2, 0.0), 1.0) * pieces)
+            near = np.inf
+            for m in range(s, min(s + 1, pieces) + 1):
+                t = m / pieces
+                near = min(near, (x - (a[0] + t * dx)) ** 2 + (y - (a[1] + t * dy)) ** 2)
+            rho = np.sqrt(near)
+            if rho > radius:
+                continue
+            top[i, j] = min(top[i, j], z + _bottom(rho, radius, corner))
+            if rho + half <= radius:
+                cover[i, j] = min(cover[i, j], z + _bottom(rho + half, radius, corner))
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def mark_standing(top, part, z, rows, cols, out):
+    """Set ``out`` in row rows[i] and column cols[j] where more than the part stands above height z at node (i, j).
+
+    top, part  : (ny, nx) float64, mm
+    z          : mm
+    rows, cols : (ny,) and (nx,) int64, index
+    """
+    ny, nx = top.shape
+    for i in range(ny):
+        row = rows[i]
+        for j in range(nx):
+            if top[i, j] > max(part[i, j], z):
+                out[row, cols[j]] = True
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)

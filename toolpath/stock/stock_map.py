@@ -21,7 +21,17 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.flat_grid import drop_over_flats
 from geometry.tool_body import ToolBody
 from toolpath.kernels.shell import Ceilings, PoseArrays, highest_of_four, stands_in
-from toolpath.kernels.stock import HALF_DIAGONAL, meets, overlaps, sink, stamp, stamp_balls, stamp_leaning, standing
+from toolpath.kernels.stock import (
+    HALF_DIAGONAL,
+    mark_standing,
+    meets,
+    overlaps,
+    sink,
+    stamp,
+    stamp_balls,
+    stamp_leaning,
+    standing,
+)
 from toolpath.poses import between, places_along
 from toolpath.stock.tool_shell import Shell
 from zones.lattice import Lattice
@@ -323,14 +333,10 @@ class StockMap:
 
         Returns (ny, nx) bool, on ``lattice``.
         """
-        stands, lat = self.top > np.maximum(self.part, z), self.lattice
-        out = np.zeros((lattice.ny, lattice.nx), np.bool_)
-        if stands.any():
-            rows = lattice.cells(lat.nodes(np.arange(lat.ny), np.zeros(lat.ny, np.int64), z))[0]
-            cols = lattice.cells(lat.nodes(np.zeros(lat.nx, np.int64), np.arange(lat.nx), z))[1]
-            first, second = (np.flatnonzero(np.diff(k, prepend=-1)) for k in (rows, cols))
-            near = np.logical_or.reduceat(np.logical_or.reduceat(stands, first, axis=0), second, axis=1)
-            out[np.ix_(rows[first], cols[second])] = near
+        lat, out = self.lattice, np.zeros((lattice.ny, lattice.nx), np.bool_)
+        rows = lattice.cells(lat.nodes(np.arange(lat.ny), np.zeros(lat.ny, np.int64), z))[0]
+        cols = lattice.cells(lat.nodes(np.zeros(lat.nx, np.int64), np.arange(lat.nx), z))[1]
+        mark_standing(self.top, self.part, z, rows, cols, out)
         return out
 
     def standing(self, tips: F64, tool: ToolBody) -> F64:
