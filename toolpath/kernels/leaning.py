@@ -153,7 +153,8 @@ def _lower_part(points, cells, part, cutter, margin, least, stack):
     The tool halfway, thicker by half of what its places go, covers the shadow of all of it in plan. And since s and s'
     halfway bound s all along, most samples in that shadow are asked once only.
     """
-    cell_start, cell_items, gx, gy, cell, ncx, ncy = cells
+    cell_start, cell_items, gx, gy, cell = cells.start, cells.items, cells.x0, cells.y0, cells.size
+    ncx, ncy = cells.ncx, cells.ncy
     radius, corner, flute, _cone = cutter
     theta = part[12]
     cosine, sine = np.cos(0.5 * theta), np.sin(0.5 * theta)

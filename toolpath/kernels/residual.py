@@ -37,6 +37,7 @@ class SampleCells(NamedTuple):
     x0, y0   : float, mm, lower corner of cell (0, 0)
     size     : float, mm, side of a cell
     ncx, ncy : int, count of cells along x and y
+    low, high : (ncx ncy,) float64, mm, lowest and highest sample of each cell; inf and -inf where it has none
     """
 
     start: NDArray[np.int64]
@@ -46,6 +47,8 @@ class SampleCells(NamedTuple):
     size: float
     ncx: int
     ncy: int
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True, inline="always")
@@ -115,7 +118,8 @@ def _farthest_corner(p, squares: PlaceSquares, s, a, b, radius, corner, level, z
 def lower(points, level, squares: PlaceSquares, cells: SampleCells, path, cutter: CutterSizes, margin, residual):
     """Lower residual (n,) by one polyline of tips (m, 3); samples are binned in square cells in plan.
 
-    level (n,): 1 on a level plane, 2 on a wall, else 0; margin: mm beyond the cutter within which it is measured.
+    points (n, 3), level (n,) and squares are in the order of ``cells.items``, residual in that of the samples. level: 1
+    on a level plane, 2 on a wall, else 0; margin: mm beyond the cutter within which it is measured.
     """
     _lower_rows(points, level, squares, cells, path, cutter, margin, 0, cells.ncy, residual)
 
@@ -133,7 +137,7 @@ def lower_parallel(points, level, squares: PlaceSquares, cells: SampleCells, pat
 def _lower_rows(points, level, squares: PlaceSquares, cells: SampleCells, path, cutter: CutterSizes, margin, first, end,
                 residual):
     """``lower`` for the samples in the rows of cells from ``first`` to before ``end``."""
-    cell_start, cell_items, gx, gy, cell, ncx, _ncy = cells
+    cell_start, cell_items, gx, gy, cell, ncx = cells.start, cells.items, cells.x0, cells.y0, cells.size, cells.ncx
     radius, corner, flute, _cone = cutter
     for k in range(len(path) - 1):
         a, b = path[k], path[k + 1]
@@ -148,25 +152,28 @@ def _lower_rows(points, level, squares: PlaceSquares, cells: SampleCells, path, 
         for i in range(i0, i1 + 1):
             for j in range(j0, j1 + 1):
                 c = i * ncx + j
+                if cells.high[c] < z_lo or cells.low[c] > z_hi:
+                    continue
                 for q in range(cell_start[c], cell_start[c + 1]):
+                    z = points[q, 2]
+                    if z < z_lo or z > z_hi:
+                        continue
                     s = cell_items[q]
-                    if residual[s] <= 0.0 or points[s, 2] < z_lo or points[s, 2] > z_hi:
+                    left, kind = residual[s], level[q]
+                    low = min(a[2], b[2]) - z
+                    if left <= 0.0 or kind == LEVEL_PLANE and low >= left:
                         continue
-                    low = min(a[2], b[2]) - points[s, 2]
-                    if level[s] == LEVEL_PLANE and low >= residual[s]:
-                        continue
-                    if level[s] == UPRIGHT and corner == 0.0 and low > BELOW:
+                    if kind == UPRIGHT and corner == 0.0 and low > BELOW:
                         continue
                     # in plan no point of the cutter is nearer than that: most samples were cut as far before
-                    ex, ey = points[s, 0] - a[0], points[s, 1] - a[1]
+                    ex, ey = points[q, 0] - a[0], points[q, 1] - a[1]
                     f = min(max((ex * dx + ey * dy) / d2, 0.0), 1.0) if d2 > 0.0 else 0.0
                     ex, ey = ex - f * dx, ey - f * dy
-                    near = radius if level[s] == LEVEL_PLANE else radius + residual[s]
+                    near = radius if kind == LEVEL_PLANE else radius + left
                     if ex * ex + ey * ey > near * near:
                         continue
-                    d = _segment_gap(points[s], a, b, radius, corner, level[s])
-                    if d < residual[s] and squares.half[s] > 0.0:
-                        d = max(d, _farthest_corner(points[s], squares, s, a, b, radius, corner, level[s], z_hi,
-                                                    residual[s]))
-                    if d < residual[s]:
+                    d = _segment_gap(points[q], a, b, radius, corner, kind)
+                    if d < left and squares.half[q] > 0.0:
+                        d = max(d, _farthest_corner(points[q], squares, q, a, b, radius, corner, kind, z_hi, left))
+                    if d < left:
                         residual[s] = d

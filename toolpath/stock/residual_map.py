@@ -43,12 +43,15 @@ class ResidualMap:
     def __init__(self, points: F64, normals: F64, cell: float = CELL, margin: float = MIN_MARGIN,
                  covers: F64 | None = None) -> None:
         self.points = np.ascontiguousarray(points)
-        upright = np.abs(normals[:, 2]) < 0.5
-        self.level = np.where(normals[:, 2] > 1.0 - 1e-6, LEVEL_PLANE, np.where(upright, UPRIGHT, 0))
         self.residual = np.full(len(points), UNTOUCHED)
         self.margin = max(margin, MIN_MARGIN)
-        self._squares = _squares(normals, self.level, covers)
         self._cells = _binned(points, cell)
+        # in the order of the cells: a pass looks at the samples of a cell together
+        order = self._cells.items
+        upright = np.abs(normals[:, 2]) < 0.5
+        level = np.where(normals[:, 2] > 1.0 - 1e-6, LEVEL_PLANE, np.where(upright, UPRIGHT, 0)).astype(np.int8)
+        self._by_cell, self._level = self.points[order], level[order]
+        self._squares = _squares(normals[order], self._level, None if covers is None else covers[order])
 
     def copied(self) -> ResidualMap:
         """A copy with a residual of its own."""
@@ -68,7 +71,7 @@ class ResidualMap:
         way = np.hypot(*np.diff(path[:, :2], axis=0).T).sum()
         share = min(1.0, float(2.0 * way * (tool.radius + self.margin)) / (cells.ncx * cells.ncy * cells.size**2))
         call = lower if one_thread(int(share * len(self.points))) else lower_parallel
-        call(self.points, self.level, self._squares, cells, np.ascontiguousarray(path), sizes, self.margin,
+        call(self._by_cell, self._level, self._squares, cells, np.ascontiguousarray(path), sizes, self.margin,
              self.residual)
 
     def cut_leaning(self, tips: F64, axes: F64, tool: ToolBody) -> None:
@@ -77,7 +80,7 @@ class ResidualMap:
         tips, axes : (m, 3) float64, mm and unit, tip to spindle, access frame, as for ``leaning_depths``
 
         Samples farther than ``margin`` from the tool keep their residual, and so do those that would be lowered by no
-        more than 1e-6 mm. ``level`` does not count: a tilted end has no plane of its own.
+        more than 1e-6 mm. Level planes do not count: a tilted end has no plane of its own.
 
         Raises
         ------
@@ -139,7 +142,7 @@ def _sizes(tool: ToolBody) -> CutterSizes:
     return CutterSizes(tool.radius, tool.corner_radius, tool.flute_length)
 
 
-def _squares(normals: F64, level: NDArray[np.int64], covers: F64 | None) -> PlaceSquares:
+def _squares(normals: F64, level: NDArray[np.int8], covers: F64 | None) -> PlaceSquares:
     """The squares that hold the places of samples; tilted faces have none."""
     half = np.zeros(len(normals)) if covers is None else np.where(level != 0, covers, 0.0)
     upright = (level == UPRIGHT) & (half > 0.0)
@@ -156,4 +159,9 @@ def _binned(points: F64, cell: float) -> SampleCells:
         c = np.floor((points[:, :2] - lo) / cell).astype(np.int64)
         key = c[:, 1] * ncx + c[:, 0]
     items, starts = by_cell(key, ncx * ncy)
-    return SampleCells(starts, items, float(lo[0]), float(lo[1]), cell, ncx, ncy)
+    low, high = np.full(ncx * ncy, np.inf), np.full(ncx * ncy, -np.inf)
+    full = np.flatnonzero(np.diff(starts))
+    if len(full):
+        z = points[items, 2]
+        low[full], high[full] = np.minimum.reduceat(z, starts[full]), np.maximum.reduceat(z, starts[full])
+    return SampleCells(starts, items, float(lo[0]), float(lo[1]), cell, ncx, ncy, low, high)
