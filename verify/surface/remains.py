@@ -28,7 +28,8 @@ from verify.surface.guard_points import gouge_depths, inside_part
 from verify.tool_axes import ToolAxes
 
 WHOLE = 0.99  # of the way along a ray: a gouge that deep is measured by its ray
-BATCH = 64  # places of one call: near each other, so that few moves have to be looked through
+BATCH = 64  # places of one call at most: near each other, so that few moves have to be looked through
+SHARES = 8  # calls a thread at least, where there are as many places: places differ much in what they take
 CELL = 5.0  # mm: of the places in such a cell only those are measured that may be the farthest
 APART = 0.05  # mm
 MANY_RAYS = 250_000  # whose ends are computed at a time
@@ -79,7 +80,8 @@ class Remains:
                 out[rows] = found
             return work
 
-        run_tiles([job(order[i:i + BATCH]) for i in range(0, len(order), BATCH)], self.threads, progress)
+        batch = max(1, min(BATCH, len(order) // (SHARES * self.threads)))
+        run_tiles([job(order[i:i + batch]) for i in range(0, len(order), batch)], self.threads, progress)
         return out
 
     def gone(self, points: F64, tolerance: float, progress: Progress | None = None) -> NDArray[np.bool_]:

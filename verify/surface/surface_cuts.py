@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from geometry.mesh import F64, I32, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
-from geometry.sampling import SurfaceSamples
 from geometry.tool_body import ToolBody
 from verify.assumptions import Assumed
 from verify.blank.blank import stock_on_normals
@@ -146,11 +145,13 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
     Returns SurfaceCuts; the same bytes for any number of threads.
     """
     s, shot = scored.samples, _Shooting(part.mesh.bounds, moves, tools, setup, threads, reach_of(setup))
-    rays, guarded = _even_rays(s, part.mesh, tell)
-    first, on_edge = len(rays[0]), len(s) + guarded
-    parts = [shot.rays(*rays, lambda f: tell(0.1 + 0.6 * f))]
-    del rays
-    left_on = parts[0].residual[:len(s)]
+    watching, guarded = _watching(part.mesh, tell)
+    first, on_edge = len(s) + len(watching[0]), len(s) + guarded
+    # one after the other: the memory of the proof peaks here
+    parts = [shot.rays(s.points, s.normals, s.face, s.area, lambda f: tell(0.1 + 0.4 * f)),
+             shot.rays(*watching, lambda f: tell(0.5 + 0.2 * f))]
+    del watching
+    left_on = parts[0].residual
     places = judged_places(s, left_on, part.mesh.bounds, moves, tools, setup, shot.reach, threads,
                            lambda f: tell(0.7 + 0.05 * f))
     close = close_points(s, left_on, places, setup)
@@ -185,16 +186,14 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
         _thread_notes(np.unique(moves.tool[table.mover[gouged]]).tolist(), tools))
 
 
-def _even_rays(samples: SurfaceSamples, mesh: TriangleMesh, tell: Report) -> tuple[tuple[F64, F64, I32, F64], int]:
-    """Points, normals, faces and areas of samples, guard points and places on edges; and how many guard points."""
+def _watching(mesh: TriangleMesh, tell: Report) -> tuple[tuple[F64, F64, I32, F64], int]:
+    """Points, normals, faces and areas of guard points and places on edges; and how many guard points."""
     guard = guard_samples(mesh)
     tell(0.05)
     edge, bisector, edge_face = convex_edges(mesh)
     tell(0.1)
-    return (np.concatenate([samples.points, guard.points, edge]),
-            np.concatenate([samples.normals, guard.normals, bisector]),
-            np.concatenate([samples.face, guard.face, edge_face]),
-            np.concatenate([samples.area, guard.area, np.zeros(len(edge))])), len(guard)
+    return (np.concatenate([guard.points, edge]), np.concatenate([guard.normals, bisector]),
+            np.concatenate([guard.face, edge_face]), np.concatenate([guard.area, np.zeros(len(edge))])), len(guard)
 
 
 def _thread_notes(cutting: Sequence[int], tools: Sequence[ToolBody]) -> list[str]:
