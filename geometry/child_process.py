@@ -6,6 +6,7 @@ whole group, signals. Whatever happens, nothing of it is left running when ``run
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import gc
 import json
@@ -18,13 +19,14 @@ import tempfile
 import threading
 import time
 from collections.abc import Sequence
+from concurrent.futures import Future, wait
 from pathlib import Path
 
 import psutil
 
 from geometry.errors import ResourceError, error_from_dict
 
-POLL = 0.02
+POLL, LONG_POLL = 0.02, 0.1  # s, of a child at work and of one that waits
 _PR_SET_PDEATHSIG = 1
 GARBAGE = 100_000, 20, 20  # new containers between two searches for garbage, and searches of each age between the next
 RESULT_VARIABLE = "ZONEMILL_CHILD_RESULT"
@@ -36,13 +38,13 @@ TYPED_ERROR = 3
 ADDRESS_ROOM = 4e9
 
 
-def run_limited(command: Sequence[str], request: bytes, *, time_limit: float, memory_limit: float,
+def run_limited(command: Sequence[str], request: bytes | Future[bytes], *, time_limit: float, memory_limit: float,
                 name: str = "reader", stop: threading.Event | None = None) -> bytes:
     """Run a command, feed it a request on stdin, and return the content of its result file.
 
     command      : arguments; the child finds the name of its result file in ``ZONEMILL_CHILD_RESULT``
-    request      : bytes, stdin of the child
-    time_limit   : float, s of wall time
+    request      : bytes, stdin of the child; one to come, for a child that is started before and waits for it
+    time_limit   : float, s of wall time, from the request on
     memory_limit : float, bytes resident in the child and its descendants together
     name         : first word of the error codes
     stop         : once set, the child is ended as if its time were over
@@ -59,15 +61,18 @@ def run_limited(command: Sequence[str], request: bytes, *, time_limit: float, me
     with tempfile.TemporaryDirectory(prefix="zonemill-") as folder:
         result = Path(folder, "result")
         log = Path(folder, "log")
-        Path(folder, "request").write_bytes(request)
+        known = isinstance(request, bytes)
+        Path(folder, "request").write_bytes(request if isinstance(request, bytes) else b"")
         environment = {**os.environ, RESULT_VARIABLE: str(result), MEMORY_VARIABLE: str(int(memory_limit)),
                        PARENT_VARIABLE: str(os.getpid()),
                        "PYTHONPATH": os.pathsep.join(filter(None, [str(Path(__file__).resolve().parent.parent),
                                                                   os.environ.get("PYTHONPATH", "")]))}
         with log.open("wb") as out, Path(folder, "request").open("rb") as stdin:
-            child = subprocess.Popen(list(command), stdin=stdin, stdout=out, stderr=subprocess.STDOUT,
-                                     start_new_session=True, env=environment)
+            child = subprocess.Popen(list(command), stdin=stdin if known else subprocess.PIPE, stdout=out,
+                                     stderr=subprocess.STDOUT, start_new_session=True, env=environment)
             try:
+                if not isinstance(request, bytes):
+                    _hand_over(child, request, stop)
                 _watch(child, time_limit, memory_limit, name, stop)
             finally:
                 _kill_group(child)
@@ -90,6 +95,15 @@ def guard_child() -> Path:
     room = int(float(os.environ.get(MEMORY_VARIABLE, "0")) + ADDRESS_ROOM)
     resource.setrlimit(resource.RLIMIT_AS, (room, room))
     return Path(os.environ[RESULT_VARIABLE])
+
+
+def _hand_over(child: subprocess.Popen[bytes], request: Future[bytes], stop: threading.Event | None) -> None:
+    """Wait for a request and write it to a child; nothing where the child ends before, or ``stop`` is set."""
+    while not (request.done() or child.poll() is not None or stop is not None and stop.is_set()):
+        wait([request], timeout=LONG_POLL)
+    with contextlib.suppress(BrokenPipeError), contextlib.closing(child.stdin) as pipe:  # type: ignore[type-var]
+        if request.done() and not request.cancelled():
+            pipe.write(request.result())  # type: ignore[union-attr]
 
 
 def _watch(child: subprocess.Popen[bytes], time_limit: float, memory_limit: float, name: str,

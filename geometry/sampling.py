@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from geometry.kernels.sampling import COSINE, SINE, graded_places, lattice_places, mark_near
 from geometry.mesh import F64, I32, TriangleMesh
+from geometry.mesh_queries.keyed_nearest import KeyedPoints
 
 # Least cosine between the normals of facet and surface. Below it the facet is a sliver or folded, or the surface is
 # singular.
@@ -38,6 +40,11 @@ class SurfaceSamples:
 
     def __len__(self) -> int:
         return len(self.points)
+
+    @cached_property
+    def by_face(self) -> KeyedPoints:
+        """The points with their faces as keys."""
+        return KeyedPoints(self.face.astype(np.int64), self.points)
 
     def subset(self, keep: np.ndarray) -> SurfaceSamples:
         """The selected samples. keep : (n,) bool mask, or (k,) int64 index of the samples."""

@@ -13,6 +13,7 @@ from typing import Any
 
 import numba
 
+from geometry.child_process import give_back_memory
 from geometry.errors import CamError
 from schemas.setup import Setup
 from service.checkpoint_store import Kept
@@ -26,7 +27,7 @@ from service.part_reading import PartReading
 from service.pictures.proof_picture import MAP_NAME
 from service.report import report as reporting
 from service.report.computed_ahead import ComputedAhead
-from service.stages.access_settings import proof_setup
+from service.stages.access_settings import FirstAccess, planning_stock, proof_setup
 from service.stages.cautions import sentences
 from service.stages.job_part import read_job_part
 from service.stages.plan_prove_loop import Planner, Progress, ProvedPlan, plan_and_prove
@@ -40,7 +41,9 @@ from service.verification.program_proof import proved_program
 from service.viewer.view_data import verification_view
 from toolpath.passes.trimmed_faces import Faces
 from toolpath.planning.job_plan import plan_job
+from toolpath.stock.stock_map import StockMap
 from verify.model import Proof
+from zones.reach.access_view import View
 
 
 def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: MeshWish | None = None,
@@ -75,6 +78,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     with StepncUnderWay(out) as stepnc, reporting.known_before_planning(ready) as known:
         job = _proved_plan(part_path, warned(ready, sentences(cautions)), kept or Kept(), planner, progress, stepnc,
                            known)
+        give_back_memory()
         report = deliver_job(job, cautions, out, mesh, progress, stepnc, known)
     progress("done", 1.0)
     return report
@@ -98,11 +102,13 @@ def _proved_plan(part_path: Path, ready: Prepared, kept: Kept, planner: Planner,
                  stepnc: StepncUnderWay | None = None,
                  known: ComputedAhead[dict[str, Any]] | None = None) -> ProvedPlan:
     """The last plan of a prepared job, with its proof, during which ``stepnc`` and ``known`` begin."""
-    ready, trimmed, scored = _trimmed_and_scored(part_path, ready)
+    ready, trimmed, scored, first = _begun(part_path, ready)
     frame = proof_frame(ready)
     samples = frame.into(scored.samples, ready.views[0])
     resumed = Resumed(kept, ready, scored.checks(ready), samples)
     conditions = proof_setup(ready, frame)
+    if stepnc is not None:
+        stepnc.expect()
 
     def begin(written: Sequence[WrittenProgram]) -> None:
         if stepnc is not None:
@@ -110,19 +116,25 @@ def _proved_plan(part_path: Path, ready: Prepared, kept: Kept, planner: Planner,
         if known is not None:
             known.begin()
 
-    return plan_and_prove(resumed, scored, trimmed, frame, conditions, planner, progress, begin)
+    def blank(view: View) -> StockMap:
+        return first.stock if view is first.view else planning_stock(ready, view)
+
+    return plan_and_prove(resumed, scored, trimmed, frame, conditions, planner, progress, begin, blank)
 
 
-def _trimmed_and_scored(part_path: Path, ready: Prepared) -> tuple[Prepared, Mapping[str, Sequence[Faces]], Score]:
-    """The exact faces by zone, which another process reads meanwhile, and the samples of the proof."""
+def _begun(part_path: Path, ready: Prepared) -> tuple[Prepared, Mapping[str, Sequence[Faces]], Score, FirstAccess]:
+    """The exact faces by zone, which another process reads meanwhile, the samples of the proof, and the stock."""
     # one thread of numba there: no two threads may enter its threading layer at once
-    with ThreadPoolExecutor(1, initializer=numba.set_num_threads, initargs=(1,)) as pool:
+    with ThreadPoolExecutor(2, initializer=numba.set_num_threads, initargs=(1,)) as pool:
         faces = pool.submit(trimmed_faces, part_path, ready) if ready.inputs.operations.finishing else None
+        first = pool.submit(FirstAccess.of, ready)
         scored = score(ready)
+    first.result().settle()
     try:
-        return ready, faces.result() if faces is not None else {}, scored
+        return ready, faces.result() if faces is not None else {}, scored, first.result()
     except CamError as refusal:  # the part itself is read, and other strategies need no exact faces
-        return warned(ready, [f"no passes along the borders of faces: {refusal.message}"]), {}, scored
+        return (warned(ready, [f"no passes along the borders of faces: {refusal.message}"]), {}, scored,
+                first.result())
 
 
 def zones_only(part_path: Path, setup: Setup, progress: Progress, blank_path: Path | None = None,

@@ -6,10 +6,12 @@ Programs and STEP-NC are among the files only where the proof found nothing.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -83,12 +85,15 @@ def deliver_job(job: ProvedPlan, cautions: Sequence[JobCaution], out: Path, mesh
     if proved:
         files.update(_program_files(reported.written))
     files["zones.json"] = ("zones", "", None, json_bytes(reporting.zones_document(report)))
-    page = plan_view(ready, job.frame, job.scored, job.zone, reported.uncut, reported.remainder, job.proof,
-                     programs, job.conditions, report)
-    if page:
-        files[PREVIEW_NAME] = ("preview", "", None, _preview(ready, page[VIEW_NAME][3], report, out / PREVIEW_NAME))
-    files[MAP_NAME] = ("deviation", "", None, deviation_map(ready, job.frame, job.samples, job.proof,
-                                                            job.conditions, report, out / MAP_NAME))
+    # one thread of numba there: no two threads may enter its threading layer at once
+    with ThreadPoolExecutor(1, initializer=numba.set_num_threads, initargs=(1,)) as pool:
+        deviation = pool.submit(deviation_map, ready, job.frame, job.samples, job.proof, job.conditions, report,
+                                out / MAP_NAME)
+        page = plan_view(ready, job.frame, job.scored, job.zone, reported.uncut, reported.remainder, job.proof,
+                         programs, job.conditions, report)
+        if page:
+            files[PREVIEW_NAME] = ("preview", "", None, _preview(ready, page[VIEW_NAME][3], report, out / PREVIEW_NAME))
+        files[MAP_NAME] = ("deviation", "", None, deviation.result())
     if mesh is not None and programs:
         figures, data = machined_part(mesh, programs, job.frame.part, tools, job.conditions, _mesh_share(progress))
         report["machined"] = {"file": MESH_NAME, "access": first_access, **figures}

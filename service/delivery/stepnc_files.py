@@ -35,6 +35,7 @@ FORMS: tuple[tuple[str, str, Stream], ...] = (
     ("stepnc", "stpnc", stream_stepnc_aim), ("stepnc-arm", "arm.stpnc", stream_stepnc_arm))
 """Kind and file ending of both forms, and the function that writes each."""
 LONG = 400_000  # characters of programs; from there on another process saves more than its start costs
+LESS_LONG, SOON = 100_000, 3.0  # characters from which on one that waits saves time; s of planning that make one wait
 TIME_LIMIT, MEMORY_LIMIT = 7200.0, 8e9  # s, bytes
 
 
@@ -44,7 +45,8 @@ class StepncUnderWay:
     A context: what is still running at its end is stopped, and files that were not taken are deleted. The other process
     writes the header without the figures of the proof, which are filled in when the files are taken. Short programs
     are written by this process when their files are asked for. So are those that the other process cannot write for
-    want of memory or time.
+    want of memory or time. A job whose planning takes long starts the other process before there are programs: it then
+    waits for them with everything imported, and takes shorter ones too.
 
     out : folder of the files, each beside its final place
     """
@@ -52,7 +54,10 @@ class StepncUnderWay:
     def __init__(self, out: Path) -> None:
         self.out = out
         self._pool = ThreadPoolExecutor(1)
+        self._lock = threading.Lock()
+        self._timer: threading.Timer | None = None
         self._stop = threading.Event()
+        self._request: Future[bytes] | None = None  # what the other process waits for
         self._begun: Future[bytes] | None = None
         self._texts: list[str] = []
         self._places: list[Path] = []
@@ -61,8 +66,16 @@ class StepncUnderWay:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._drop()
+        with self._lock:
+            self._drop()
         self._pool.shutdown()
+
+    def expect(self) -> None:
+        """Planning begins: start the other process where that takes longer than ``SOON`` s."""
+        if (os.cpu_count() or 1) >= 2:
+            self._timer = threading.Timer(SOON, self._start_early)
+            self._timer.daemon = True
+            self._timer.start()
 
     def begin(self, programs: Sequence[WrittenProgram], part: Part, tools: Sequence[ToolBody],
               setup: ProofSetup) -> None:
@@ -70,15 +83,38 @@ class StepncUnderWay:
 
         part, tools, setup : of the proof, as ``verify.prove.prove`` takes them
         """
-        self._drop()
-        if sum(len(p.text) for p in programs) < LONG or (os.cpu_count() or 1) < 2:
-            return
-        self._stop, self._texts = threading.Event(), [p.text for p in programs]
-        self._places = [_beside(self.out, p.file_name("job", ending)) for p in programs for _, ending, _ in FORMS]
+        with self._lock:
+            waits = self._request is not None and not self._request.done()
+            length = sum(len(p.text) for p in programs)
+            if length < (LESS_LONG if waits else LONG) or (os.cpu_count() or 1) < 2:
+                self._drop()
+                return
+            if not waits:
+                self._drop()
+            request = self._request or self._start()
+            self._cancel_timer()
+            self._texts = [p.text for p in programs]
+            self._places = [_beside(self.out, p.file_name("job", ending)) for p in programs for _, ending, _ in FORMS]
+            request.set_result(pickle.dumps((programs, part, tools, setup, self.out)))
+
+    def _start_early(self) -> None:
+        with self._lock:
+            if self._timer is not None:
+                self._start()
+
+    def _start(self) -> Future[bytes]:
+        """Start the other process; returns the request that it waits for."""
+        request = Future[bytes]()
+        self._stop, self._request = threading.Event(), request
         command = [sys.executable, "-m", "service.delivery.stepnc_process"]
-        self._begun = self._pool.submit(run_limited, command, pickle.dumps((programs, part, tools, setup, self.out)),
-                                        time_limit=TIME_LIMIT, memory_limit=MEMORY_LIMIT, name="stepnc",
-                                        stop=self._stop)
+        self._begun = self._pool.submit(run_limited, command, request, time_limit=TIME_LIMIT,
+                                        memory_limit=MEMORY_LIMIT, name="stepnc", stop=self._stop)
+        return request
+
+    def _cancel_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = None
 
     def files(self, proved: Sequence[WrittenProgram], delivered: Sequence[WrittenProgram], part: Part,
               tools: Sequence[ToolBody], setup: ProofSetup) -> Files:
@@ -93,12 +129,14 @@ class StepncUnderWay:
             As ``stepnc_files``.
         """
         if self._begun is None or [p.text for p in proved] != self._texts:
-            self._drop()
+            with self._lock:
+                self._drop()
             return stepnc_files(delivered, part, tools, setup, self.out)
         try:
             files = _named(self._begun)
         except ResourceError:
-            self._drop()
+            with self._lock:
+                self._drop()
             return stepnc_files(delivered, part, tools, setup, self.out)
         for program in delivered:
             for _, ending, _ in FORMS:
@@ -107,12 +145,13 @@ class StepncUnderWay:
         return files
 
     def _drop(self) -> None:
+        self._cancel_timer()
         self._stop.set()
         if self._begun is not None:
             wait([self._begun])
         for place in self._places:
             place.unlink(missing_ok=True)
-        self._begun, self._places, self._texts = None, [], []
+        self._begun, self._request, self._places, self._texts = None, None, [], []
 
 
 def _fill(path: Path, figures: Sequence[str]) -> None:

@@ -106,7 +106,7 @@ def draw_deviation(part: Part, measured: Measured, marks: Sequence[Mark], out_pa
     """
     width, height = (SIZE[0] - GUTTER) // 2, SIZE[1] - HEADER - LEGEND
     classes = measured.classes
-    near = KeyedPoints(measured.samples.face.astype(np.int64), measured.samples.points)
+    near = measured.samples.by_face
     cameras = choose_views(part.mesh, measured.samples, classes != GREEN, (2 * width, 2 * height))
     sheet = Image.new("RGB", SIZE, bytes_of(WHITE))
     pen = ImageDraw.Draw(sheet)

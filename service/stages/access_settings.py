@@ -6,10 +6,11 @@ Lengths are mm in the frame of the access, or of the proof.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.mesh import TriangleMesh
+from geometry.mesh import F64, TriangleMesh
 from geometry.sampling import lattice_samples
 from schemas.setup import Lean
 from service.from_wire import change_in_frame, face_numbers, gauges_given
@@ -29,6 +30,7 @@ from verify.checks.program_assumptions import FREE_PATH
 from verify.gcode.dialects import CONTROLS, OWN_SPEED_RAPIDS
 from verify.model import ProofSetup
 from zones.reach.access_view import View
+from zones.reach.tip_field import TipField
 
 STOCK_STEP = 0.08  # mm, the planner's stock lattice; wider where that would take more than STOCK_CELLS
 STOCK_CELLS = 4e6
@@ -41,6 +43,36 @@ def planning_stock(ready: Prepared, view: View) -> StockMap:
     lo, hi = ready.blank.corners(view.rotation)
     step = max(min(STOCK_STEP, ready.inputs.engagement_spacing), float(np.sqrt(np.prod(hi[:2] - lo[:2]) / STOCK_CELLS)))
     return ready.blank.planned(view, step)
+
+
+@dataclass(frozen=True, eq=False)
+class FirstAccess:
+    """The stock of the first access, and the tip limits of the tool whose layers come first there.
+
+    view    : View
+    stock   : StockMap, as ``planning_stock`` gives it
+    field   : TipField of the tool; None where no layers are asked for
+    heights : (ny, nx) float64, mm, as ``TipField.cut_height``; None with ``field``
+    """
+
+    view: View
+    stock: StockMap
+    field: TipField | None
+    heights: F64 | None
+
+    @classmethod
+    def of(cls, ready: Prepared) -> FirstAccess:
+        """Computed here; no other thread sees a change of the job."""
+        view = ready.views[0]
+        stock = planning_stock(ready, view)
+        tools = [z.tool.id for z in ready.zones if z.access == view.id] if ready.inputs.operations.roughing else []
+        field = view.fields[tools[0]] if tools else None
+        return cls(view, stock, field, None if field is None else field.cut_heights())
+
+    def settle(self) -> None:
+        """Give the field its heights, once no other thread uses it."""
+        if self.field is not None and self.heights is not None:
+            self.field.know(self.heights)
 
 
 def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:

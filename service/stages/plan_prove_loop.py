@@ -80,7 +80,8 @@ class ProvedPlan:
 
 def plan_and_prove(resumed: Resumed, scored: Score, trimmed: Mapping[str, Sequence[Faces]], frame: ProofFrame,
                    conditions: ProofSetup, planner: Planner, progress: Progress,
-                   beside: Callable[[Sequence[WrittenProgram]], None] | None = None) -> ProvedPlan:
+                   beside: Callable[[Sequence[WrittenProgram]], None] | None = None,
+                   blanks: Callable[[View], StockMap] | None = None) -> ProvedPlan:
     """Plan and prove a job until nothing is found, or until another plan would not help.
 
     resumed    : the job as prepared, with what an earlier attempt at it kept
@@ -88,6 +89,7 @@ def plan_and_prove(resumed: Resumed, scored: Score, trimmed: Mapping[str, Sequen
     conditions : what the proof holds the programs to, in ``frame``
     planner    : what makes workingsteps of the zones of an access, with the arguments of ``plan_job``
     beside     : called with the programs of each plan before their proof, which runs while it works
+    blanks     : the stock that the planner of an access starts from; None: computed here
 
     Raises
     ------
@@ -95,7 +97,7 @@ def plan_and_prove(resumed: Resumed, scored: Score, trimmed: Mapping[str, Sequen
         As planner, writers and proof.
     """
     ready, samples = resumed.ready, resumed.samples
-    accesses = _Accesses(ready, resumed.checks, trimmed, planner)
+    accesses = _Accesses(ready, resumed.checks, trimmed, planner, blanks or partial(planning_stock, ready))
     feedback, begun = ProofFeedback(), PREPARED
     access_plans: list[AccessPlan] = []
     finding_counts: list[int] = []
@@ -156,11 +158,12 @@ class _Accesses:
 
     checks  : what the passes of each zone are measured at, in the order of the zones
     trimmed : exact faces by zone, in the frame of its access
+    blank   : the stock that the planner of an access starts from
     """
 
     def __init__(self, ready: Prepared, checks: Sequence[FinishTarget], trimmed: Mapping[str, Sequence[Faces]],
-                 planner: Planner) -> None:
-        self.ready, self.checks, self.trimmed, self.planner = ready, checks, trimmed, planner
+                 planner: Planner, blank: Callable[[View], StockMap]) -> None:
+        self.ready, self.checks, self.trimmed, self.planner, self.blank = ready, checks, trimmed, planner, blank
         self.blanks: dict[str, StockMap] = {}
         self.layouts: dict[str, dict[str, ZoneLayout]] = {}
 
@@ -175,7 +178,7 @@ class _Accesses:
         ready = self.ready
         turned, step_count = ready.inputs.turns, sum(len(a.plan.steps) for a in before)
         if view.id not in self.blanks:
-            self.blanks[view.id] = planning_stock(ready, view)
+            self.blanks[view.id] = self.blank(view)
         stock = self.blanks[view.id].copied()
         found = feedback.along(view.id)
         settings = replace(plan_settings(ready, view, stock), found=found,

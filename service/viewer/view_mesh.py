@@ -84,7 +84,7 @@ def facets_of(part: Part, judged: Judged) -> Facets:
     s = judged.samples
     faces = [int(f) for f in np.unique(s.face)]
     others = [f.number for f in part.faces if f.number not in set(faces)]
-    sheets, near = [], KeyedPoints(s.face.astype(np.int64), s.points)
+    sheets, near = [], s.by_face
     if faces:
         def label(points: F64, _normals: F64, face: I32) -> I64:
             row = near.nearest(face.astype(np.int64), points)[:, 0]

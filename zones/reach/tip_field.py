@@ -154,10 +154,21 @@ class TipField:
     def cut_height(self) -> F64:
         """(ny, nx) float64, mm: tip limit of the cutting part alone at the lattice nodes."""
         if self._cut is None:
-            lat = self.lattice
-            self._cut = drop_over_flats(self.tree, lat.x0, lat.y0, lat.step, lat.nx, lat.ny, self.grown_radius,
-                                        self.grown_corner) + self.allowance
+            self._cut = self.cut_heights()
         return self._cut
+
+    def cut_heights(self) -> F64:
+        """(ny, nx) float64, mm: ``cut_height`` computed anew, not kept: other threads may use the field meanwhile."""
+        lat = self.lattice
+        return drop_over_flats(self.tree, lat.x0, lat.y0, lat.step, lat.nx, lat.ny, self.grown_radius,
+                               self.grown_corner) + self.allowance
+
+    def know(self, heights: F64) -> None:
+        """Take over what ``cut_heights`` has computed.
+
+        heights : (ny, nx) float64, mm
+        """
+        self._cut = heights
 
     @property
     def height(self) -> F64:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import replace
 
 import pytest
@@ -60,6 +61,41 @@ def test_short_programs_are_written_here(job, monkeypatch, tmp_path):
     with StepncUnderWay(tmp_path) as under_way:
         under_way.begin(*job)
         assert not list(tmp_path.iterdir())
+        assert len(under_way.files(job[0], delivered(job), *job[1:])) == 2
+
+
+@pytest.mark.parametrize("least", [1, 10**9])
+def test_a_process_that_waits_takes_shorter_programs(job, monkeypatch, tmp_path, least):
+    monkeypatch.setattr(stepnc, "SOON", 0.0)
+    monkeypatch.setattr(stepnc, "LESS_LONG", least)
+    monkeypatch.setattr(stepnc.os, "cpu_count", lambda: 2)
+    here, there = tmp_path / "here", tmp_path / "there"
+    here.mkdir()
+    there.mkdir()
+    started, requests = threading.Event(), []
+    run = stepnc.run_limited
+
+    def noted(command, request, **more):
+        started.set()
+        requests.append(request)
+        return run(command, request, **more)
+
+    monkeypatch.setattr(stepnc, "run_limited", noted)
+    with StepncUnderWay(there) as under_way:
+        under_way.expect()
+        assert started.wait(60.0)
+        under_way.begin(*job)
+        found = written(under_way.files(job[0], delivered(job), *job[1:]))
+    assert found == written(stepnc_files(delivered(job), *job[1:], here))
+    assert [request.done() for request in requests] == [least == 1]
+
+
+def test_planning_that_ends_soon_starts_no_process(job, monkeypatch, tmp_path):
+    monkeypatch.setattr(stepnc, "run_limited", None)
+    monkeypatch.setattr(stepnc.os, "cpu_count", lambda: 2)
+    with StepncUnderWay(tmp_path) as under_way:
+        under_way.expect()
+        under_way.begin(*job)
         assert len(under_way.files(job[0], delivered(job), *job[1:])) == 2
 
 
