@@ -15,30 +15,34 @@ def grow_square(mask: NDArray[np.bool_], reach: int, out: NDArray[np.bool_]) -> 
 
     mask : (ny, nx) bool; reach : nodes; out : (ny, nx) bool, out
 
-    One run along the rows and one along the columns, forwards and backwards; the time does not depend on ``reach``.
+    Along the rows each run of set nodes grows at both ends; down the columns a window counts what is set in it. The
+    time does not depend on ``reach``.
     """
     ny, nx = mask.shape
-    along = np.zeros((ny, nx), np.bool_)
+    along = np.zeros((ny, nx), np.uint8)
     for i in range(ny):
-        last = -reach - 1
+        row, grown = mask[i], along[i]
+        j, filled = 0, 0
+        while j < nx:
+            if not row[j]:
+                j += 1
+                continue
+            first = max(j - reach, filled)
+            while j < nx and row[j]:
+                j += 1
+            filled = min(j + reach, nx)
+            for k in range(first, filled):
+                grown[k] = 1
+    count = np.zeros(nx, np.int32)
+    for i in range(min(reach, ny)):
         for j in range(nx):
-            if mask[i, j]:
-                last = j
-            along[i, j] = j - last <= reach
-        last = nx + reach
-        for j in range(nx - 1, -1, -1):
-            if mask[i, j]:
-                last = j
-            along[i, j] |= last - j <= reach
-    below = np.full(nx, -reach - 1)
+            count[j] += along[i, j]
     for i in range(ny):
+        if i + reach < ny:
+            for j in range(nx):
+                count[j] += along[i + reach, j]
+        if i > reach:
+            for j in range(nx):
+                count[j] -= along[i - reach - 1, j]
         for j in range(nx):
-            if along[i, j]:
-                below[j] = i
-            out[i, j] = i - below[j] <= reach
-    below[:] = ny + reach
-    for i in range(ny - 1, -1, -1):
-        for j in range(nx):
-            if along[i, j]:
-                below[j] = i
-            out[i, j] |= below[j] - i <= reach
+            out[i, j] = count[j] > 0
