@@ -115,35 +115,39 @@ def _farthest_corner(p, squares: PlaceSquares, s, a, b, radius, corner, level, z
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def lower(points, level, squares: PlaceSquares, cells: SampleCells, path, cutter: CutterSizes, margin, residual):
-    """Lower residual (n,) by one polyline of tips (m, 3); samples are binned in square cells in plan.
+def lower(points, level, squares: PlaceSquares, cells: SampleCells, path, starts, cutter: CutterSizes, margin,
+          residual):
+    """Lower residual (n,) by polylines of tips, path[starts[k]:starts[k + 1]]; samples are in square cells in plan.
 
     points (n, 3), level (n,) and squares are in the order of ``cells.items``, residual in that of the samples. level: 1
     on a level plane, 2 on a wall, else 0; margin: mm beyond the cutter within which it is measured.
     """
-    _lower_rows(points, level, squares, cells, path, cutter, margin, 0, cells.ncy, residual)
+    _lower_rows(points, level, squares, cells, path, starts, cutter, margin, 0, cells.ncy, residual)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True, parallel=True)
-def lower_parallel(points, level, squares: PlaceSquares, cells: SampleCells, path, cutter: CutterSizes, margin,
+def lower_parallel(points, level, squares: PlaceSquares, cells: SampleCells, path, starts, cutter: CutterSizes, margin,
                    residual):
     """``lower`` on the threads numba has, each over bands of rows of cells; the same bytes on any number of them."""
     for band in prange(BANDS):
-        _lower_rows(points, level, squares, cells, path, cutter, margin, cells.ncy * band // BANDS,
+        _lower_rows(points, level, squares, cells, path, starts, cutter, margin, cells.ncy * band // BANDS,
                     cells.ncy * (band + 1) // BANDS, residual)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _lower_rows(points, level, squares: PlaceSquares, cells: SampleCells, path, cutter: CutterSizes, margin, first, end,
-                residual):
+def _lower_rows(points, level, squares: PlaceSquares, cells: SampleCells, path, starts, cutter: CutterSizes, margin,
+                first, end, residual):
     """``lower`` for the samples in the rows of cells from ``first`` to before ``end``."""
     cell_start, cell_items, gx, gy, cell, ncx = cells.start, cells.items, cells.x0, cells.y0, cells.size, cells.ncx
     radius, corner, flute, _cone = cutter
+    r, line = radius + margin, 1
     for k in range(len(path) - 1):
+        if k + 1 == starts[line]:
+            line += 1  # from one polyline to the next
+            continue
         a, b = path[k], path[k + 1]
         dx, dy = b[0] - a[0], b[1] - a[1]
         d2 = dx * dx + dy * dy
-        r = radius + margin
         j0 = max(int((min(a[0], b[0]) - r - gx) / cell), 0)
         j1 = min(int((max(a[0], b[0]) + r - gx) / cell), ncx - 1)
         i0 = max(int((min(a[1], b[1]) - r - gy) / cell), first)

@@ -8,7 +8,7 @@ This is for deciding (is there something to cut, may the tool come down here); t
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 
 from zones.kernels.lattice import LatticeFrame
 
@@ -119,6 +119,46 @@ def mark_standing(top, part, z, rows, cols, out):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _overlap(heights, pooled, side, frame: LatticeFrame, tip, radius, corner, margin, half, least):
+    """``overlaps`` at one tip."""
+    x0, y0, step = frame
+    ny, nx = heights.shape
+    rows, cols = pooled.shape
+    inner = max(radius + margin, 0.35 * radius)
+    n_r = int(np.ceil(inner / step))
+    x, y, z = tip
+    jc, ic = int(np.rint((x - x0) / step)), int(np.rint((y - y0) / step))
+    i0, i1 = max(ic - n_r, 0), min(ic + n_r, ny - 1)
+    j0, j1 = max(jc - n_r, 0), min(jc + n_r, nx - 1)
+    worst = least
+    if i1 >= i0 and j1 >= j0:
+        for row in range(i0 // side, min(i1 // side, rows - 1) + 1):
+            for col in range(j0 // side, min(j1 // side, cols - 1) + 1):
+                if pooled[row, col] - z <= worst:  # the bottom is nowhere lower than the tip
+                    continue
+                highest = -np.inf
+                for i in range(row * side, min((row + 1) * side, ny)):
+                    dy = y0 + i * step - y
+                    for j in range(col * side, min((col + 1) * side, nx)):
+                        h = heights[i, j]
+                        highest = max(highest, h)
+                        if h - z <= worst:
+                            continue
+                        rho = np.sqrt((x0 + j * step - x) ** 2 + dy * dy)
+                        if rho <= inner:
+                            worst = max(worst, h - z - _bottom(min(rho - half, radius), radius, corner))
+                pooled[row, col] = highest
+    return worst
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True, parallel=True)
+def overlaps_parallel(heights, pooled, side, frame: LatticeFrame, tips, radius, corner, margin, half, least, out):
+    """``overlaps`` on the threads numba has. Those that lower a square lower it to the same height."""
+    for k in prange(len(tips)):
+        out[k] = _overlap(heights, pooled, side, frame, tips[k], radius, corner, margin, half, least)
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def overlaps(heights, pooled, side, frame: LatticeFrame, tips, radius, corner, margin, half, least, out):
     """How far the stock stands above the cutter's bottom at tips (n, 3), mm: greatest over the disc; <= 0 is air.
 
@@ -129,35 +169,8 @@ def overlaps(heights, pooled, side, frame: LatticeFrame, tips, radius, corner, m
     half    : mm round a node that its height stands for: 0 for a point, half a diagonal for a cell
     least   : mm; what is less comes out as this, and squares that hold no more are not looked at
     """
-    x0, y0, step = frame
-    ny, nx = heights.shape
-    rows, cols = pooled.shape
-    inner = max(radius + margin, 0.35 * radius)
-    n_r = int(np.ceil(inner / step))
     for k in range(len(tips)):
-        x, y, z = tips[k]
-        jc, ic = int(np.rint((x - x0) / step)), int(np.rint((y - y0) / step))
-        i0, i1 = max(ic - n_r, 0), min(ic + n_r, ny - 1)
-        j0, j1 = max(jc - n_r, 0), min(jc + n_r, nx - 1)
-        worst = least
-        if i1 >= i0 and j1 >= j0:
-            for row in range(i0 // side, min(i1 // side, rows - 1) + 1):
-                for col in range(j0 // side, min(j1 // side, cols - 1) + 1):
-                    if pooled[row, col] - z <= worst:  # the bottom is nowhere lower than the tip
-                        continue
-                    highest = -np.inf
-                    for i in range(row * side, min((row + 1) * side, ny)):
-                        dy = y0 + i * step - y
-                        for j in range(col * side, min((col + 1) * side, nx)):
-                            h = heights[i, j]
-                            highest = max(highest, h)
-                            if h - z <= worst:
-                                continue
-                            rho = np.sqrt((x0 + j * step - x) ** 2 + dy * dy)
-                            if rho <= inner:
-                                worst = max(worst, h - z - _bottom(min(rho - half, radius), radius, corner))
-                    pooled[row, col] = highest
-        out[k] = worst
+        out[k] = _overlap(heights, pooled, side, frame, tips[k], radius, corner, margin, half, least)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)

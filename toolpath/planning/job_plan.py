@@ -106,6 +106,8 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields: 
     work = keeper.taken(begin) or begin()
     begun, all_zones, done = work.acts, len(zones) * (len(settings.planes) + 1), 0
     with computed_ahead([layouts[z.id] for z in zones] if settings.finishing and not begun else []) as settle:
+        for job in work.jobs:
+            job.settle = settle
         for k, (finished, act) in enumerate(work.to_do()):
             if k >= begun:
                 settle()
@@ -167,6 +169,10 @@ class _Work:
                 yield 0, partial(job.again, zone, settings.scallop_height)
 
 
+def _nothing_ahead() -> None:
+    """Nothing is computed by other threads."""
+
+
 def _nothing(number: int) -> list[Workingstep]:
     del number
     return []
@@ -181,6 +187,7 @@ class _ToolJob:
         self.settings, self.layouts, self.under = settings, layouts, under
         self.walked, self.depths = Walked(), Depths(stock.lattice)
         self.layers: _Layers | None = None
+        self.settle: Callable[[], None] = _nothing_ahead  # called now and then, see ``computed_ahead``
         self.layered: list[Workingstep] = []
         self.finishes: dict[str, Finish] = {}
         self.before: Sequence[_ToolJob] = ()  # of the tools before this one
@@ -204,7 +211,7 @@ class _ToolJob:
         """
         if self.layers is None:
             self.layers = self._layers()
-        made = self.layers.down_to(plane - self.under, number, self._sized_walls())
+        made = self.layers.down_to(plane - self.under, number, self._sized_walls(), self.settle)
         self.layered.extend(made)
         for f in self.begun:
             for step in made:
@@ -301,11 +308,12 @@ class _Layers:
         """State of the layers."""
         return LayersSnapshot(self.top, self.swept, self.above, len(self.left))
 
-    def down_to(self, lowest: float, number: int, sized: SizedWalls) -> list[Workingstep]:
+    def down_to(self, lowest: float, number: int, sized: SizedWalls, settle: Callable[[], None]) -> list[Workingstep]:
         """The layers from ``lowest`` mm up that were not cut before, as one workingstep.
 
         number : of the first workingstep
         sized  : SizedWalls, which get no rims
+        settle : called before each layer
 
         Where even stock is required the cuts between them follow as another workingstep.
         """
@@ -314,6 +322,7 @@ class _Layers:
         chord = settings.budget.chord
         between: list[float] = []
         while self.left and self.left[0][0] >= lowest - 1e-9:
+            settle()
             z, below = self.left.pop(0)
             self.stock.settle()
             between.extend(depth_layers.between(self.above, z, cut.step_down))

@@ -130,9 +130,7 @@ class Finish:
     def measure(self, layers: Workingstep) -> None:
         """Count what layers have cut: where they leave no more than the scallop, as along slots, no pass follows."""
         self.layers = layers
-        for t in layers.trajectories:
-            if t.motion is TrajectoryKind.CUT:
-                self.residual.cut(t.points, layers.tool)
+        self.residual.cut_all([t.points for t in layers.trajectories if t.motion is TrajectoryKind.CUT], layers.tool)
 
     def above(self, plane: float) -> NDArray[np.bool_]:
         """Whether checks are finished above a height of contact, mm, with a tip that stays above it, (n,) bool."""

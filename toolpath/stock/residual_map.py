@@ -8,6 +8,7 @@ Arrays are float64. Places are in mm, normals and axes dimensionless unit vector
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,13 +67,26 @@ class ResidualMap:
 
         A flat end that only just comes down to a place at the top of a wall passes over it where rounding lifts it.
         """
-        path = np.column_stack([path[:, :2], np.rint(path[:, 2] * PER_MM) / PER_MM])
+        self.cut_all([path], tool)
+
+    def cut_all(self, paths: Sequence[F64], tool: ToolBody) -> None:
+        """Lower the residual by polylines of tips, one after the other, as ``cut`` does.
+
+        paths : each (m, 3) float64, mm, access frame
+        """
+        paths = [p for p in paths if len(p)]
+        if not paths:
+            return
+        path = np.vstack(paths)
+        path[:, 2] = np.rint(path[:, 2] * PER_MM) / PER_MM
+        starts = np.cumsum([0, *map(len, paths)])
         cells, sizes = self._cells, _sizes(tool)
-        way = np.hypot(*np.diff(path[:, :2], axis=0).T).sum()
-        share = min(1.0, float(2.0 * way * (tool.radius + self.margin)) / (cells.ncx * cells.ncy * cells.size**2))
+        steps = np.hypot(*np.diff(path[:, :2], axis=0).T)
+        steps[starts[1:-1] - 1] = 0.0
+        area = cells.ncx * cells.ncy * cells.size**2
+        share = min(1.0, float(2.0 * steps.sum() * (tool.radius + self.margin)) / area)
         call = lower if one_thread(int(share * len(self.points))) else lower_parallel
-        call(self._by_cell, self._level, self._squares, cells, np.ascontiguousarray(path), sizes, self.margin,
-             self.residual)
+        call(self._by_cell, self._level, self._squares, cells, path, starts, sizes, self.margin, self.residual)
 
     def cut_leaning(self, tips: F64, axes: F64, tool: ToolBody) -> None:
         """Lower the residual by poses of a tilted tool: to the least signed distance, below 0 where it gouges.

@@ -18,6 +18,7 @@ from scipy import ndimage
 
 from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.drop import one_thread
 from geometry.mesh_queries.flat_grid import drop_over_flats
 from geometry.tool_body import ToolBody
 from toolpath.kernels.shell import Ceilings, PoseArrays, highest_of_four, stands_in
@@ -26,6 +27,7 @@ from toolpath.kernels.stock import (
     mark_standing,
     meets,
     overlaps,
+    overlaps_parallel,
     sink,
     stamp,
     stamp_balls,
@@ -308,8 +310,9 @@ class StockMap:
         """
         out = np.empty(len(tips))
         lat = self.lattice
-        overlaps(self.top, self._pooled, POOLED, lat.frame, np.ascontiguousarray(tips), tool.radius, tool.corner_radius,
-                 rim * lat.step, 0.0, lower_bound, out)
+        call = overlaps if one_thread(len(tips)) else overlaps_parallel
+        call(self.top, self._pooled, POOLED, lat.frame, np.ascontiguousarray(tips), tool.radius, tool.corner_radius,
+             rim * lat.step, 0.0, lower_bound, out)
         return out
 
     def under_end(self, tips: F64, tool: ToolBody, *, lower_bound: float = -np.inf) -> F64:
