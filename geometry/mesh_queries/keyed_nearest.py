@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from geometry.binning import limits_of
 from geometry.mesh import F64
 
+AT_ONCE = 500_000  # points asked for in one call, whose results take as much memory as they
 APART = 4.0  # times the extent of the points: how far one key is from the next along the added axis
 
 
@@ -39,7 +40,9 @@ class KeyedPoints:
             return out
         place = np.minimum(np.searchsorted(self.keys, key), len(self.keys) - 1)
         known = np.flatnonzero(self.keys[place] == key)
-        at = np.column_stack([points[known], self.step * place[known]])
-        _, row = self.tree.query(at, k=list(range(1, k + 1)), distance_upper_bound=self.reach, workers=2)
-        out[known] = np.where(row < self.tree.n, row, -1)
+        for first in range(0, len(known), AT_ONCE):
+            asked = known[first:first + AT_ONCE]
+            at = np.column_stack([points[asked], self.step * place[asked]])
+            _, row = self.tree.query(at, k=list(range(1, k + 1)), distance_upper_bound=self.reach, workers=2)
+            out[asked] = np.where(row < self.tree.n, row, -1)
         return out
