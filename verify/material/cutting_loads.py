@@ -39,6 +39,7 @@ FINEST, COARSEST = 0.01, 0.5
 fine threads of 1 mm go up to 100 mm."""
 PITCH_ERROR = 0.02
 """Share by which feed over speed of a tap may differ from its pitch: what a floating holder takes up."""
+MIN_TAKEN = 0.25  # of the volume of a window, taken at a feed or faster, so that the feed counts for all of it
 WINDOW, SPACINGS = 0.5, 4.0  # radii of way, and spacings of the stock, over which a cut is measured; the greater counts
 DWELL_TURNS = 10.0  # turns of the spindle that a tool may stand in its cut: a spot face takes three
 ROUNDING = 1e-6
@@ -129,6 +130,22 @@ def _lengths(moves: Moves, depth: F64, tools: Sequence[ToolBody]) -> tuple[F64, 
     return np.maximum.reduce([tip, *ways[:3]]), ways[3]
 
 
+def _fastest(volume: F64, feed: F64, at: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The stretch of each window whose feed counts: the fastest of those that took ``MIN_TAKEN`` of its volume.
+
+    volume, feed : (p,) float64, mm³ and mm/min, of stretches
+    at           : (w,) int64, first stretch of each window
+
+    Returns (w,) int64, index: stretches at the feed of this one or faster took the share.
+    """
+    window = np.repeat(np.arange(len(at)), np.diff(np.r_[at, len(volume)]))
+    order = np.lexsort((-feed, window))
+    taken = np.cumsum(volume[order])
+    before = np.r_[0.0, taken][at]
+    enough = taken - before[window] >= MIN_TAKEN * np.add.reduceat(volume, at)[window] - 1e-12
+    return order[np.minimum.reduceat(np.where(enough, np.arange(len(volume)), len(volume) - 1), at)]
+
+
 def loads(cuts: CutSequence, tools: Sequence[ToolBody], words: Mapping[int, CuttingWords],
           tapped: NDArray[np.bool_]) -> tuple[list[Finding], list[ProgramCaution]]:
     """Findings of loads that no cutter bears, and cautions where a program exceeds its tools' words, tool by tool.
@@ -140,7 +157,8 @@ def loads(cuts: CutSequence, tools: Sequence[ToolBody], words: Mapping[int, Cutt
     -----
     Depth and width of a cut are measured on the stock over ``WINDOW`` of the radius: the depth a is the highest stock
     over the tip that went, the width V / (L a), known to one spacing of the stock. L and the feed are those half way up
-    the cut, where the tool swings; the feed per tooth is that of the fastest place in the cut. Force, deflection and
+    the cut, where the tool swings; of moves that share a window the fastest feed at which a quarter of V was taken counts.
+    The feed per tooth is that of the fastest place in the cut. Force, deflection and
     stress follow from them [Kienzle1952] [Timoshenko1955]. Ways down steeper than 45 degrees have no such force; of a
     way up, L and the feed are the shares square to the tool axis.
     """
@@ -290,7 +308,7 @@ class _Judge:
         return [*findings, *([] if findings else far)], [*cautions, *bent]
 
     def _sections(self, k: int) -> tuple[NDArray[np.int64], F64, F64, F64]:
-        """Cuts by windows of way: last move, its share square to the axis, depth in mm, depth times width in mm²."""
+        """Cuts by windows of way: fastest move, its share square to the axis, depth in mm, depth times width in mm²."""
         cuts, tool = self.cuts, self.tool
         way = cuts.stretches.end - cuts.stretches.start
         if cuts.moves.axes is not None:
@@ -310,7 +328,7 @@ class _Judge:
         volume = np.add.reduceat(cuts.run.ways.volume[own], at)
         depth = np.minimum(np.maximum.reduceat(cuts.run.ways.depth[own], at), tool.flute_length)
         long = np.maximum(np.add.reduceat(length[own], at), SPACINGS * cuts.spacing)
-        end = own[np.r_[at[1:], len(own)] - 1]
+        end = own[_fastest(cuts.run.ways.volume[own], cuts.middle[cuts.of[own]], at)]
         cut = (volume > 0.0) & (depth > ROUNDING)
         section = np.minimum(volume[cut] / long[cut], tool.diameter * depth[cut])
         return cuts.of[end[cut]], (length[end] / whole[end])[cut], depth[cut], section

@@ -124,6 +124,22 @@ def test_a_load_does_not_depend_on_how_the_program_is_divided():
     assert judged([*slot(6.0, 3000)[:-1], *shallow, "Y12", "X26"])[0]
 
 
+@pytest.mark.parametrize("last", [0.2, 0.4, 0.7])
+def test_a_link_that_begins_where_a_cut_ends_does_not_count_at_its_feed(last):
+    """The last piece of the cut and the first of the way back through air share a window."""
+    cut = [*slot(3.0, 300)[:-1], "G1 X0 F300", f"X{last}"]
+    assert judged([*cut, "X-26 F12000"])[0] == []
+    (found,) = judged([*cut, f"X{last + 0.5} F12000"])[0]  # ahead it goes into stock
+    assert "F12000" in found.message
+
+
+def test_short_bursts_in_a_cut_count_at_their_feed():
+    bursts = [f"G1 X{-26 + 0.2 * k:.3f} F{3000 if k % 2 else 60}" for k in range(1, 261)]
+    assert closed_form(6.0, 4.0, 60, 8000)[0] < closed_form(6.0, 4.0, 60, 8000)[1]
+    found, _ = judged([*slot(6.0, 3000)[:-1], *bursts])
+    assert found and "F3000" in found[0].message
+
+
 def test_a_tool_that_bends_ten_times_its_limit_is_a_load():
     slim = replace(MILL, stickout=60.0)
     for deep, harm in ((0.25, False), (0.6, True)):
