@@ -157,10 +157,10 @@ def loads(cuts: CutSequence, tools: Sequence[ToolBody], words: Mapping[int, Cutt
     -----
     Depth and width of a cut are measured on the stock over ``WINDOW`` of the radius: the depth a is the highest stock
     over the tip that went, the width V / (L a), known to one spacing of the stock. L and the feed are those half way up
-    the cut, where the tool swings; of moves that share a window the fastest feed at which a quarter of V was taken counts.
-    The feed per tooth is that of the fastest place in the cut. Force, deflection and
-    stress follow from them [Kienzle1952] [Timoshenko1955]. Ways down steeper than 45 degrees have no such force; of a
-    way up, L and the feed are the shares square to the tool axis.
+    the cut, where the tool swings. Of moves that share a window the fastest feed at which a quarter of V was taken
+    counts. The feed per tooth is that of the fastest place in the cut. Force, deflection and stress follow from them
+    [Kienzle1952] [Timoshenko1955]. Ways down steeper than 45 degrees have no such force; of a way up, L and the feed
+    are the shares square to the tool axis.
     """
     findings: list[Finding] = []
     cautions: list[ProgramCaution] = []
