@@ -282,6 +282,8 @@ class _Layers:
         lat, tool = field.lattice, field.tool
         self.tips = tips = np.vstack([z.tips for z in zones])
         self.allowance = left_by_layers(cut.step_down, lat.step)
+        # rims are no higher than the tool bears, at the stock that layers leave
+        self.rim_depth = (cut.finish or cut).bearable(FLUTE_SHARE * tool.flute_length, self.allowance)
         # without a finish, rims take every wall to size layer by layer, while the stock below still supports it
         steep = [z.tips for z in zones if z.form is AreaForm.STEEP and settings.finishing]
         self.walls = np.vstack([np.zeros((0, 3)), *steep])
@@ -329,11 +331,11 @@ class _Layers:
             self.above = z
             self._walk(linker, z, below, 0.0 if settings.semi_finishing else ISLAND * cut.step_down)
             finished = lat.mask(self.walls[np.abs(self.walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
-            unseen = z <= self.swept - FLUTE_SHARE * tool.flute_length
+            unseen = z <= self.swept - self.rim_depth
             if settings.finishing and not unseen and self.left and self.left[0][0] >= lowest - 1e-9:
                 continue  # flutes reach up to the rims of an earlier layer
             self.swept = z if unseen else self.swept
-            deep = FLUTE_SHARE * tool.flute_length if unseen or settings.finishing else cut.step_down
+            deep = self.rim_depth + cut.step_down if unseen or settings.finishing else cut.step_down
             bare = sized.along(lat, z + tool.corner_radius, z + deep)
             alone = lat.mask(self.alone[np.abs(self.alone[:, 2] - z) <= 2.0 * cut.step_down, :2])
             rims = depth_layers.rim(field, self.stock, z, below, finished, self.allowance, chord, unseen,
