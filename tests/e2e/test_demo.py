@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 from typer.testing import CliRunner
@@ -133,21 +134,25 @@ def test_linuxcnc_accepts_the_program(demo_job):
 def lowered(program, report):
     """The program with one G1 of a floor pass set lower, and its line number.
 
-    A line of the finishing pass on the base that names X or Y alone stands on the base, or no higher than a touch.
+    A line of the finishing pass on the base that names X or Y alone stands on the base, or no higher than a touch. Of
+    these the one farthest inside the outline counts: at its edge another line may have cut the side below.
     """
     zone = next(z for z in report["zones"] if z["region"] == "floor" and z["strategy"] == "planar_floor")
     height = zone["depth_mm"][1]
     lines = program.split("\n")
     begin = next(k for k, line in enumerate(lines) if line.startswith(f"({zone['step']} "))
     end = next(k for k in range(begin + 2, len(lines)) if lines[k].startswith("(S"))
-    z, level = None, []
+    z, level, here = None, [], np.full(2, np.nan)
+    outline = np.array(report["part"]["bbox_mm"])[:, :2]
     for k in range(begin + 1, end):
         word = re.search(r"Z(-?[\d.]+)", lines[k])
         z = float(word[1]) if word else z
+        for axis, value in re.findall(r"([XY])(-?[\d.]+)", lines[k]):
+            here["XY".index(axis)] = float(value)
         plain = re.fullmatch(r"(X-?[\d.]+)?\s*(Y-?[\d.]+)?", lines[k]) and lines[k]
         if plain and not word and z is not None and abs(z - height) < 0.005 and not re.search(r"[ZFG(]", lines[k + 1]):
-            level.append(k)
-    at = level[len(level) // 2]
+            level.append((float(min(*(here - outline[0]), *(outline[1] - here))), k))
+    at = max(level)[1]
     lines[at] += f" Z{height - LOWERED:g}"
     lines[at + 1] += f" Z{height + 0.005:g}"
     return "\n".join(lines), at + 1
