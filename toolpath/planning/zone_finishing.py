@@ -307,9 +307,12 @@ class Finish:
         return self.strategy.rounds(k, failing)
 
     def _needed(self, k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
-        """Lines of round k, as far as a failing sample needs them."""
+        """Lines of round k, of the first one as far as a failing sample needs them.
+
+        Later rounds come to what the first one left, also where stock was in the way of the line that it needed.
+        """
         groups, tool, settings = self._groups(k, failing), self.field.tool, self.settings
-        if k > REFINEMENTS:
+        if k:
             return groups
         overrun = OVERRUN * tool.radius
         reach = Reach(self.strategy.side_step + self.checks.spacing, self.checks.spacing, overrun,
