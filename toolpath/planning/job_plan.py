@@ -336,11 +336,11 @@ class _Layers:
                 continue  # flutes reach up to the rims of an earlier layer
             self.swept = z if unseen else self.swept
             deep = self.rim_depth + cut.step_down if unseen or settings.finishing else cut.step_down
-            bare = sized.along(lat, z + tool.corner_radius, z + deep)
+            at_size = sized.along(lat, z + tool.corner_radius, z + deep)
             alone = lat.mask(self.alone[np.abs(self.alone[:, 2] - z) <= 2.0 * cut.step_down, :2])
             rims = depth_layers.rim(field, self.stock, z, below, finished, self.allowance, chord, unseen,
                               min(THIN * settings.scallop_height, 0.5 * self.allowance) if settings.finishing else 0.0,
-                              dilated(alone, self.alone_wide / lat.step) | bare)
+                              dilated(alone, self.alone_wide / lat.step) | at_size)
             usual, linker.pace = linker.pace, self._rim_pace(deep)
             for line in nearest_order(rims, linker.at, False):
                 linker.add(turned(line, settings))
