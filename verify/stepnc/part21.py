@@ -27,32 +27,33 @@ DEEPEST = 20  # nested lists
 LONGEST = 128  # letters of a name; the longest of the schemas have about 60
 _CHUNK = 65_536
 _PIECE = 1 << 20
+# Possessive are only single characters: of groups Python up to 3.11.4 takes a repetition that fails half way for matched.
 _FLAGS = re.DOTALL | re.ASCII  # blanks are those of ASCII: numpy reads lists of references and knows no others
-_NUMBER = r"[-+]?[0-9]++\.[0-9]*+(?:E[-+]?[0-9]++)?+"
-_BLANKS = r"(?:\s++|/\*.*?\*/)*+"
+_NUMBER = r"[-+]?[0-9]++\.[0-9]*+(?>(?:E[-+]?[0-9]++)?)"
+_BLANKS = r"(?>(?:\s++|/\*.*?\*/)*)"
 _WORD = rf"[A-Z][A-Z0-9_]{{0,{LONGEST - 1}}}+(?![A-Z0-9_])"
 _SKIP = re.compile(_BLANKS, _FLAGS)
-_BODY = r"(?:[^';/]++|'[^']*+'|/\*.*?\*/|/(?!\*))*+"
+_BODY = r"(?>(?:[^';/]++|'[^']*+'|/\*.*?\*/|/(?!\*))*)"
 _INSTANCE = re.compile(
     rf"{_BLANKS}\#([0-9]{{1,18}}+)\s*+=\s*+(?:CARTESIAN_POINT\s*+\(\s*+'[^'\\]*+'\s*+,\s*+\(\s*+({_NUMBER})\s*+,\s*+"
-    rf"({_NUMBER})\s*+,\s*+({_NUMBER})\s*+\)\s*+\)\s*+;|(([A-Z][A-Z0-9_]*+)?+{_BODY};))", _FLAGS)
+    rf"({_NUMBER})\s*+,\s*+({_NUMBER})\s*+\)\s*+\)\s*+;|((?>([A-Z][A-Z0-9_]*+)?){_BODY};))", _FLAGS)
 _STATEMENT = re.compile(rf"({_BODY});", _FLAGS)
 _ASIDE = re.compile(r"'[^']*+'|/\*.*?\*/", _FLAGS)
 _ENDING = re.compile(rf"ENDSEC\s*+;{_BLANKS}(END-ISO-10303-21\s*+;)?", _FLAGS)
 _TOKEN = re.compile(
     rf"{_BLANKS}(?:(?P<ref>\#[0-9]{{1,18}}+(?![0-9]))|(?P<real>{_NUMBER})|(?P<whole>[-+]?[0-9]{{1,18}}+(?![0-9]))"
-    rf"|'(?P<text>(?:[^']++|'')*+)'|\.(?P<word>{_WORD})\.|(?P<name>!?{_WORD})|(?P<sign>[(),$*])"
+    rf"|'(?P<text>(?>(?:[^']++|'')*))'|\.(?P<word>{_WORD})\.|(?P<name>!?{_WORD})|(?P<sign>[(),$*])"
     r"|\"(?P<bits>[0-9A-F]++)\")", _FLAGS)
 _FLAT = rf"(?:'[^'\\,()\n\r]*+'|\#[0-9]{{1,18}}+|{_NUMBER}|[$*]|\.{_WORD}\.)"
-_FLAT_LIST = rf"\((?:{_FLAT}(?:,{_FLAT})*+)?+\)"
-_SIMPLE = re.compile(rf"({_WORD})\(((?:{_FLAT}|{_FLAT_LIST})(?:,(?:{_FLAT}|{_FLAT_LIST}))*+)\);", _FLAGS)
+_FLAT_LIST = rf"\((?>(?:{_FLAT}(?>(?:,{_FLAT})*))?)\)"
+_SIMPLE = re.compile(rf"({_WORD})\(((?:{_FLAT}|{_FLAT_LIST})(?>(?:,(?:{_FLAT}|{_FLAT_LIST}))*))\);", _FLAGS)
 _PLAIN = re.compile(r"\(([^()]*+)\)|([^,()]++)", _FLAGS)  # a list, or a value outside of one
 _NAME = re.compile(r"[A-Z][A-Z0-9_]*+")
 _BRACKETS = re.compile(rf"'[^']*+'|/\*.*?\*/|(?<![A-Z0-9_])({_NAME.pattern})|([()])", _FLAGS)
 _OPENING = re.compile(rf"{_BLANKS}\(?+{_BLANKS}({_WORD})", _FLAGS)
-_POLYLINE = re.compile(r"POLYLINE\s*+\(\s*+'[^'\\]*+'\s*+,\s*+\(((?:\s*+\#[0-9]{1,18}+\s*+,)++\s*+\#[0-9]{1,18}+\s*+)\)"
+_POLYLINE = re.compile(r"POLYLINE\s*+\(\s*+'[^'\\]*+'\s*+,\s*+\(((?>(?:\s*+\#[0-9]{1,18}+\s*+,)+)\s*+\#[0-9]{1,18}+\s*+)\)"
                        r"\s*+\)\s*+;", _FLAGS)
-_DIRECTIVE = re.compile(r"\\X2\\((?:[0-9A-F]{4})*+)\\X0\\|\\X4\\((?:[0-9A-F]{8})*+)\\X0\\|\\X\\([0-9A-F]{2})"
+_DIRECTIVE = re.compile(r"\\X2\\((?>(?:[0-9A-F]{4})*))\\X0\\|\\X4\\((?>(?:[0-9A-F]{8})*))\\X0\\|\\X\\([0-9A-F]{2})"
                         r"|\\S\\([ -~])|\\P[A-I]\\|(\\\\)", _FLAGS)
 
 
