@@ -27,7 +27,7 @@ DEEPEST = 20  # nested lists
 LONGEST = 128  # letters of a name; the longest of the schemas have about 60
 _CHUNK = 65_536
 _PIECE = 1 << 20
-# Only single characters are repeated possessively: Python up to 3.11.4 keeps what a group took before it failed half way.
+# Only single characters repeat possessively: Python up to 3.11.4 keeps what a group took before it failed half way.
 _FLAGS = re.DOTALL | re.ASCII  # blanks are those of ASCII: numpy reads lists of references and knows no others
 _NUMBER = r"[-+]?[0-9]++\.[0-9]*+(?>(?:E[-+]?[0-9]++)?)"
 _BLANKS = r"(?>(?:\s++|/\*.*?\*/)*)"
@@ -51,8 +51,8 @@ _PLAIN = re.compile(r"\(([^()]*+)\)|([^,()]++)", _FLAGS)  # a list, or a value o
 _NAME = re.compile(r"[A-Z][A-Z0-9_]*+")
 _BRACKETS = re.compile(rf"'[^']*+'|/\*.*?\*/|(?<![A-Z0-9_])({_NAME.pattern})|([()])", _FLAGS)
 _OPENING = re.compile(rf"{_BLANKS}\(?+{_BLANKS}({_WORD})", _FLAGS)
-_POLYLINE = re.compile(r"POLYLINE\s*+\(\s*+'[^'\\]*+'\s*+,\s*+\(((?>(?:\s*+\#[0-9]{1,18}+\s*+,)+)\s*+\#[0-9]{1,18}+\s*+)"
-                       r"\)\s*+\)\s*+;", _FLAGS)
+_POLYLINE = re.compile(r"POLYLINE\s*+\(\s*+'[^'\\]*+'\s*+,\s*+\(((?>(?:\s*+\#[0-9]{1,18}+\s*+,)+)\s*+\#[0-9]{1,18}+"
+                       r"\s*+)\)\s*+\)\s*+;", _FLAGS)
 _DIRECTIVE = re.compile(r"\\X2\\((?>(?:[0-9A-F]{4})*))\\X0\\|\\X4\\((?>(?:[0-9A-F]{8})*))\\X0\\|\\X\\([0-9A-F]{2})"
                         r"|\\S\\([ -~])|\\P[A-I]\\|(\\\\)", _FLAGS)
 
