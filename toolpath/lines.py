@@ -64,7 +64,8 @@ def smoothed(way: F64, length: float) -> F64:
 
     Returns
     -------
-    (m, 2) float64, mm, its frame, half a length apart; closed as the way is, and with its ends where it is open
+    (m, 2) float64, mm, its frame, half a length apart; closed as the way is, and with its ends where it is open. A way
+    that stays in one place is given back as it is: a contour has one where a node lies just on it.
 
     Notes
     -----
@@ -72,6 +73,8 @@ def smoothed(way: F64, length: float) -> F64:
     0.8 length sin(t / 2), at most: the mean of a bell's half is sqrt(2 / pi) lengths from its middle.
     """
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
+    if s[-1] == 0.0:
+        return way
     length = min(length, s[-1] / 20.0)
     count = int(np.ceil(2.0 * s[-1] / length))
     u = np.linspace(0.0, s[-1], count + 1)

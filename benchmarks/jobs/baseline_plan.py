@@ -92,7 +92,7 @@ def _levels(zones: Sequence[ZoneArea], field: TipField, cut: CutData, stock: Sto
                 wide = 0.5 * tool.radius if disc is None else field.disc_radius(disc, 0.0)
                 if here.any() and (disc is None or low + disc.height < z + step):
                     area |= dilated(here, max(wide / lat.step, 1.5))
-        for lines in depth_layers.layer(field, stock, z, area, allowance, 0.8 * tool.radius):
+        for lines in depth_layers.layer(field, stock, z, depth_layers.LayerArea(area), allowance, 0.8 * tool.radius):
             for line in nearest_order(lines, linker.at, False):
                 linker.add(turned(line, settings), 0.1 * lat.step)
         unseen = np.zeros((lat.ny, lat.nx), np.bool_)

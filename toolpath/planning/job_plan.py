@@ -44,6 +44,7 @@ from toolpath.stock.cut_history import Depths, Walked
 from toolpath.stock.engagement import SKIN_SHARE, UNBOUNDED
 from toolpath.stock.stock_map import SURE_RIM, StockMap
 from toolpath.strategies import depth_layers
+from toolpath.strategies.depth_layers import LayerArea
 from toolpath.tool_deflection import left_by_layers
 from toolpath.workingsteps import Workingstep
 from zones.machinable_area import AreaForm
@@ -294,7 +295,7 @@ class _Layers:
         bottom, step = float(tips[:, 2].min()) + low, cut.step_down
         self.top = top = stock.highest if snapshot is None else snapshot.top
         self.swept, self.above = (top, top) if snapshot is None else (snapshot.swept, snapshot.above)
-        self.left: list[tuple[float, NDArray[np.bool_]]] = []
+        self.left: list[tuple[float, LayerArea]] = []
         if top <= bottom or snapshot is not None and not snapshot.left:
             return
         heights = depth_layers.layer_heights(top, bottom, step)
@@ -325,11 +326,11 @@ class _Layers:
         between: list[float] = []
         while self.left and self.left[0][0] >= lowest - 1e-9:
             settle()
-            z, below = self.left.pop(0)
+            z, place = self.left.pop(0)
             self.stock.settle()
             between.extend(depth_layers.between(self.above, z, cut.step_down))
             self.above = z
-            self._walk(linker, z, below, 0.0 if settings.semi_finishing else ISLAND * cut.step_down)
+            self._walk(linker, z, place, 0.0 if settings.semi_finishing else ISLAND * cut.step_down)
             finished = lat.mask(self.walls[np.abs(self.walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
             unseen = z <= self.swept - self.rim_depth
             if settings.finishing and not unseen and self.left and self.left[0][0] >= lowest - 1e-9:
@@ -338,7 +339,7 @@ class _Layers:
             deep = self.rim_depth + cut.step_down if unseen or settings.finishing else cut.step_down
             at_size = sized.along(lat, z + tool.corner_radius, z + deep)
             alone = lat.mask(self.alone[np.abs(self.alone[:, 2] - z) <= 2.0 * cut.step_down, :2])
-            rims = depth_layers.rim(field, self.stock, z, below, finished, self.allowance, chord, unseen,
+            rims = depth_layers.rim(field, self.stock, z, place.area, finished, self.allowance, chord, unseen,
                               min(THIN * settings.scallop_height, 0.5 * self.allowance) if settings.finishing else 0.0,
                               dilated(alone, self.alone_wide / lat.step) | at_size)
             usual, linker.pace = linker.pace, self._rim_pace(deep)
@@ -352,7 +353,7 @@ class _Layers:
             return made
         linker = self._linker()
         for z in between:
-            self._walk(linker, z, _own(field, self.tips, z))
+            self._walk(linker, z, LayerArea(_own(field, self.tips, z)))
         return made + self._step(number + len(made), "semi_finishing", linker)
 
     def _rim_pace(self, deepest: float) -> Pace:
@@ -386,13 +387,13 @@ class _Layers:
         return Linker(self.field, self.stock, motions_of(cut, self.settings), self.depths, self.settings.found, pace,
                       cut.engaged)
 
-    def _walk(self, linker: Linker, z: float, area: NDArray[np.bool_], island: float = 0.0) -> None:
+    def _walk(self, linker: Linker, z: float, place: LayerArea, island: float = 0.0) -> None:
         """Cut the stock above a height, mm, in an area, down to it; ``island`` mm of it may stay between rings."""
         settings, side, fine = self.settings, depth_layers.ring_spacing(self.field.tool), 0.1 * self.field.lattice.step
         if self.bounded:
-            Clearing(linker, z, area, self.allowance, side, settings.cut_direction,
+            Clearing(linker, z, place.area, self.allowance, side, settings.cut_direction,
                      depth_layers.STOCK_WORTH, fine).walk()
-        for lines in depth_layers.layer(self.field, self.stock, z, area, self.allowance, side, island):
+        for lines in depth_layers.layer(self.field, self.stock, z, place, self.allowance, side, island):
             for line in nearest_order(lines, linker.at, False):
                 linker.add(turned(line, settings), fine)
 
@@ -429,8 +430,8 @@ def _own(field: TipField, tips: F64, z: float) -> NDArray[np.bool_]:
     return dilated(mask, max(0.5 * field.tool.radius / lat.step, 1.5)) if mask.any() else mask
 
 
-def _areas(field: TipField, tips: F64, heights: Sequence[float], step: float) -> list[NDArray[np.bool_]]:
-    """(ny, nx) bool a layer: where stock is removed down to it.
+def _areas(field: TipField, tips: F64, heights: Sequence[float], step: float) -> list[LayerArea]:
+    """For each layer, where stock is removed down to it.
 
     That is where this tool has something to finish below, and where shank and holder come once the tool is down in
     any deeper layer, since stock there would meet them.
@@ -438,15 +439,15 @@ def _areas(field: TipField, tips: F64, heights: Sequence[float], step: float) ->
     tips    : (n, 3) float64, mm, of the samples to finish; heights : mm, of the layers, descending
     """
     lat = field.lattice
-    out: list[NDArray[np.bool_]] = []
+    out: list[LayerArea] = []
     rising = list(heights[::-1])
     for z in rising:
-        area = _own(field, tips, z)
+        own, met = _own(field, tips, z), lat.mask(np.zeros((0, 2)))
         for disc in field.discs:
             low = z + step - disc.height
             deeper = [k for k in range(len(out)) if rising[k] <= low]
-            reach = _own(field, tips, low) | out[deeper[-1]] if deeper else _own(field, tips, low)
+            reach = _own(field, tips, low) | out[deeper[-1]].area if deeper else _own(field, tips, low)
             if reach.any():
-                area = area | dilated(reach, field.disc_radius(disc, 0.0) / lat.step)
-        out.append(area)
+                met = met | dilated(reach, field.disc_radius(disc, 0.0) / lat.step)
+        out.append(LayerArea(own | met, dilated(met, field.tool.radius / lat.step)))
     return out[::-1]

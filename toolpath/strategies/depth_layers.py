@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.lines import Line, pieces_where
 from toolpath.passes.contours import contours, dilated, from_walls, rings
 from toolpath.stock.stock_map import SURE_RIM, StockMap
+from zones.lattice import Lattice
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 ROUND_CORNERS = 3.5  # lattice steps, beyond three allowances: ways round the ends of finished walls have no rim
@@ -56,17 +60,29 @@ def between(upper: float, lower: float, step: float) -> list[float]:
     return [upper - k * (upper - lower) / count for k in range(1, count)]
 
 
-def layer(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], allowance: float,
+class LayerArea(NamedTuple):
+    """Where a layer removes stock.
+
+    area : (ny, nx) bool on the lattice, where this tool has something to finish below, or shank or holder come
+    bare : (ny, nx) bool on the lattice, places of the tip within a radius of where shank or holder come in a deeper
+           layer: an island that stayed there would stop them; None: nowhere
+    """
+
+    area: NDArray[np.bool_]
+    bare: NDArray[np.bool_] | None = None
+
+
+def layer(field: TipField, stock: StockMap, z: float, place: LayerArea, allowance: float,
           side_step: float, island: float = 0.0) -> Iterator[list[Line]]:
     """Lines of one layer, ring by ring from the outside of the stock to ``allowance`` from the walls.
 
     field     : TipField
     stock     : StockMap as it stands; lines appear only where the cutter would meet stock
     z         : mm, tip height of the layer
-    area      : (ny, nx) bool on the lattice, where this tool has something to finish below
+    place     : LayerArea
     allowance : mm left beside walls
     side_step : mm between rings
-    island    : mm, stock between the rings up to which it is left to the next layer
+    island    : mm, stock between the rings up to which it is left to the next layer, where ``place`` is not bare
 
     Yields
     ------
@@ -75,19 +91,35 @@ def layer(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], a
     """
     lat, tool = field.lattice, field.tool
     standing = dilated(stock.above(z + STOCK_WORTH, lat), 2.0 * tool.radius / lat.step)
-    active = dilated(area, tool.radius / lat.step) & standing
+    active = dilated(place.area, tool.radius / lat.step) & standing
     beyond = min((SURE_RIM + 0.8) * stock.lattice.step + lat.step, 0.6 * tool.radius)
     walled = field.nearest_blocked(z) is not None
     lists = list(rings(field, z, active, (allowance,), side_step))
-    yield from filter(None, _outwards(stock, tool, lists, beyond, island) if walled else
+    worth = _Worth(lat, place.bare, max(STOCK_WORTH, island))
+    yield from filter(None, _outwards(stock, tool, lists, beyond, worth) if walled else
                       (_in_stock(stock, tool, lines, STOCK_WORTH, beyond) for lines in lists))
     # Where rings turn sharply, islands stay between them; rings half a step off take these.
     for lines in rings(field, z, active, (allowance + 0.5 * side_step,), side_step):
-        yield from filter(None, [_in_stock(stock, tool, lines, max(STOCK_WORTH, island), beyond)])
+        yield from filter(None, [_in_stock(stock, tool, lines, worth, beyond)])
+
+
+@dataclass(frozen=True)
+class _Worth:
+    """Stock above the cutter that makes a place worth a pass, mm: ``STOCK_WORTH`` on a mask, else ``island``."""
+
+    lattice: Lattice
+    bare: NDArray[np.bool_] | None
+    island: float
+
+    def at(self, points: F64) -> F64 | float:
+        """(n,) float64, mm, at tips (n, 3), mm, access frame."""
+        if self.bare is None:
+            return self.island
+        return np.where(self.bare[self.lattice.cells(points[:, :2])], STOCK_WORTH, self.island)
 
 
 def _outwards(stock: StockMap, tool: ToolBody, lists: Sequence[Sequence[Line]], beyond: float,
-              island: float) -> list[list[Line]]:
+              worth: _Worth) -> list[list[Line]]:
     """The parts of rings that are needed, in the same order, the farthest from the walls first.
 
     They are chosen from the walls outwards: a ring is needed where those nearer to the walls, which come anyway, leave
@@ -100,18 +132,21 @@ def _outwards(stock: StockMap, tool: ToolBody, lists: Sequence[Sequence[Line]], 
     kept: list[list[Line]] = []
     with stock.undone(np.array([places.min(axis=0) - tool.radius, places.max(axis=0) + tool.radius])):
         for lines in reversed(lists):
-            worth = max(STOCK_WORTH, island) if kept else STOCK_WORTH
-            kept.append(_in_stock(stock, tool, lines, worth, beyond))
+            kept.append(_in_stock(stock, tool, lines, worth if kept else STOCK_WORTH, beyond))
             for part in kept[-1]:
                 stock.cut(part.points, tool)
     return kept[::-1]
 
 
-def _in_stock(stock: StockMap, tool: ToolBody, lines: Sequence[Line], worth: float, beyond: float) -> list[Line]:
+def _in_stock(stock: StockMap, tool: ToolBody, lines: Sequence[Line], worth: _Worth | float,
+              beyond: float) -> list[Line]:
     """The parts of lines with more than ``worth`` mm of stock over the cutter, ``beyond`` mm more at both ends."""
-    return [part for line in lines
-            for part in pieces_where(line, stock.overlap(line.points, tool, lower_bound=0.0) > worth, beyond,
-                                     3.0 * tool.radius)]
+    out: list[Line] = []
+    for line in lines:
+        least = worth.at(line.points) if isinstance(worth, _Worth) else worth
+        over = stock.overlap(line.points, tool, lower_bound=0.0) > least
+        out.extend(pieces_where(line, over, beyond, 3.0 * tool.radius))
+    return out
 
 
 def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], finished: NDArray[np.bool_],

@@ -34,3 +34,7 @@ def test_smoothing_takes_the_steps_of_a_lattice_out_of_a_line():
     way = np.diff(out[10:-10], axis=0)
     slope = way[:, 1] / way[:, 0]
     assert np.abs(np.diff(slope)).max() < 0.05 < np.abs(np.diff(np.diff(stairs[:, 1]) / 0.1)).max()
+
+
+def test_a_way_that_stays_in_one_place_is_given_back():
+    assert (smoothed(np.full((4, 2), 1.5), 0.3) == 1.5).all()

@@ -363,7 +363,7 @@ def rough(shape, body, z, allowance, near_net, above=0.8):
     (x0, y0), (x1, y1) = mesh.bounds[:, :2]
     lo, hi = lat.cells(np.array([[x0, y0], [x1, y1]]))
     area[lo[0]:lo[1] + 1, hi[0]:hi[1] + 1] = True
-    groups = list(depth_layers.layer(field, stock, z, area, allowance, 0.8 * body.radius))
+    groups = list(depth_layers.layer(field, stock, z, depth_layers.LayerArea(area), allowance, 0.8 * body.radius))
     for lines in groups:
         for line in lines:
             stock.cut(line.points, body)
@@ -394,8 +394,8 @@ def test_a_layer_comes_from_the_side_away_from_the_walls():
     assert len(first_sweep) > 2 and (np.diff(first_sweep) < 0).all()
     # a second time over cut stock there is nothing to do
     _, stock, area, _ = rough(walls, body, z, 0.3, False)
-    again = [line for lines in depth_layers.layer(field, stock, z, area, 0.3, 1.2) for line in lines]
-    assert sum(line.length for line in again) < 0.02 * sum(line.length for lines in groups for line in lines)
+    again = list(depth_layers.layer(field, stock, z, depth_layers.LayerArea(area), 0.3, 1.2))
+    assert sum(q.length for lines in again for q in lines) < 0.02 * sum(q.length for lines in groups for q in lines)
 
 
 def test_a_ring_is_left_out_where_the_next_one_to_the_wall_takes_its_stock():
@@ -409,13 +409,32 @@ def test_a_ring_is_left_out_where_the_next_one_to_the_wall_takes_its_stock():
     off = from_walls(np.column_stack([x.ravel(), y.ravel()])).reshape(x.shape)
     stock.top[:] = np.where((off > 0.0) & (off < 1.3), z + 0.8, z)
     before, area = stock.top.copy(), np.ones((field.lattice.ny, field.lattice.nx), bool)
-    groups = depth_layers.layer(field, stock, z, area, allowance, 0.8 * body.radius)
+    groups = depth_layers.layer(field, stock, z, depth_layers.LayerArea(area), allowance, 0.8 * body.radius)
     first = next(groups)
     assert (stock.top == before).all()  # rings are tried on the stock
     assert all(np.abs(from_walls(dense(r.points, 0.1)[:, :2]) - body.radius - allowance).max() < 0.1 for r in first)
     for line in first:
         stock.cut(line.points, body)
     assert list(groups) == []
+
+
+def test_islands_stay_only_where_neither_shank_nor_holder_comes():
+    body, z, allowance = tool(1.0, 0.0), 4.0, 0.3
+    mesh = walls()
+    field = field_of(mesh, body)
+    stock = StockMap.box(field.tree, mesh.bounds[0] - 1.0, mesh.bounds[1] + 1.0, 0.1)
+    stock.top[:] = np.minimum(stock.top, z + 0.8)
+    lat = field.lattice
+    area = np.ones((lat.ny, lat.nx), bool)
+    bare = np.tile(lat.x0 + lat.step * np.arange(lat.nx) > 0.0, (lat.ny, 1))
+    place = depth_layers.LayerArea(area, bare)
+    for lines in depth_layers.layer(field, stock, z, place, allowance, 0.8 * body.radius, 1.0):
+        for line in lines:
+            stock.cut(line.points, body)
+    must, x, y = clear(field, z, allowance + 1.5 * lat.step)
+    left = stock.top[stock.lattice.cells(np.column_stack([x[must], y[must]]))] > z + depth_layers.STOCK_WORTH
+    assert left[x[must] > 0.0].mean() <= 0.002
+    assert left[x[must] < -body.radius].mean() > 0.05  # no place there has more than the island over the cutter
 
 
 @pytest.mark.parametrize("body", [tool(3.0, 0.0), ball(3.0)], ids=kind)
