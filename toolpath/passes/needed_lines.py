@@ -17,8 +17,11 @@ from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.lines import Line, dense, pieces_where
+from toolpath.lines import Line, dense, pieces_where, thinned
 from toolpath.stock.residual_map import UNTOUCHED, ResidualMap
+
+STRAIGHT = 1e-4  # mm: points between which a line is straight to this make one move; it has to take a flat place whole
+CUT = 0.0  # mm: a sample with no more left is not measured
 
 
 @dataclass(frozen=True)
@@ -83,15 +86,13 @@ def needed(groups: Sequence[Sequence[Line]], residual: ResidualMap, tool: ToolBo
 def _served(lines: Sequence[Line], residual: ResidualMap, tool: ToolBody, failing: NDArray[np.int64], tips: F64,
             reach: Reach) -> list[tuple[NDArray[np.int64], F64]]:
     """The failing samples that each line comes near, index, and what it leaves there, mm."""
-    trial, asked = residual.copied(), np.zeros(len(residual.residual), np.bool_)
-    asked[failing] = True
-    trial.residual[:] = UNTOUCHED
-    out = []
+    trial, out = residual.copied(), []
+    trial.residual[:] = CUT
+    trial.residual[failing] = UNTOUCHED
     for line in lines:
-        trial.cut(line.points, tool)
-        at = np.flatnonzero(trial.residual < UNTOUCHED)
-        mine = at[asked[at]]
-        mine = mine[~_away([line], tips[mine], reach)] if len(mine) else mine
+        trial.cut(thinned(line.points, STRAIGHT), tool)
+        at = failing[trial.residual[failing] < UNTOUCHED]
+        mine = at[~_away([line], tips[at], reach)] if len(at) else at
         out.append((mine, trial.residual[mine].copy()))
         trial.residual[at] = UNTOUCHED
     return out

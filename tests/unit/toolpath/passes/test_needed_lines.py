@@ -76,3 +76,13 @@ def test_a_line_answers_for_no_sample_farther_up_a_wall_than_its_reach():
     assert len(kept(levels, residual, body, tips)) == 4
     high = Reach(beside=5.0, spacing=0.2, overrun=0.3, join=0.5)
     assert len(kept(levels, residual, body, tips, reach=high)) == 1
+
+
+def test_a_line_of_many_points_serves_flat_places_as_the_straight_line_does():
+    # the squares round the samples end just where the cutter does: no disc takes one, the whole strip takes all
+    x = np.arange(0.05, 10.0, 0.1)
+    points = np.column_stack([x, np.full(len(x), 0.05), np.zeros(len(x))])
+    residual = ResidualMap(points, np.tile([0.0, 0.0, 1.0], (len(points), 1)), margin=0.1,
+                           covers=np.full(len(points), 0.05 - 1e-9))
+    many = Line(np.column_stack([np.arange(0.0, 10.0, 0.03), np.full(334, 0.5), np.zeros(334)]), False)
+    assert kept([many], residual, tool(1.0, 0.0), points) == [many]
