@@ -37,8 +37,8 @@ MAX_PROCESSES = 8
 
 SECONDS_OF_SILENCE = 2.0
 
-SCALARS = {str(t): t for t in (types.boolean, types.uint8, types.int32, types.uint32, types.int64, types.uint64,
-                               types.float32, types.float64, types.none)}
+SCALARS = {str(t): t for t in (types.boolean, types.int8, types.uint8, types.int32, types.uint32, types.int64,
+                               types.uint64, types.float32, types.float64, types.none)}
 
 STALE = (ImportError, AttributeError, TypeError, ValueError, KeyError, NumbaError)
 """What an entry raises that does not fit the sources."""

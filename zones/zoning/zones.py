@@ -36,9 +36,9 @@ from zones.zoning.cutting_planes import PLANE_MARGIN, RegionPlane, neck_planes, 
 # known to a fifth. Where samples stand wider, 25 of them count. A tool to buy must gain the same.
 LEAST_ZONE_MM2 = 1.0
 CERTAIN = 25
-# Least area for one more zone of a tool in use, which costs a link but no tool change; five samples.
+# Least area for one more zone of a tool in use, which costs a link but no tool change: five planning samples, and one
+# where samples stand so wide that it is more. What the tool touches and nobody cuts would be stock left.
 LEAST_PART_MM2 = 0.2
-THERE = 5
 SMALL_REGION_MM2 = 30.0  # a smaller region gets one tool, not a tool change for every corner
 ONE_TOOL_SHARE = 0.97
 
@@ -229,7 +229,7 @@ def _parts(sight: Sight, rows: NDArray[np.bool_], own: Container[tuple[str, Area
     out = []
     for base, form, members in sight.groups(rows):
         area = sight.samples.area[members]
-        least = 0.0 if (base, form) in own else least_area(area, LEAST_PART_MM2, THERE)
+        least = 0.0 if (base, form) in own else LEAST_PART_MM2
         if float(area.sum()) > 0.0 and float(area.sum()) >= least:
             out.append((base, form, members))
     return out

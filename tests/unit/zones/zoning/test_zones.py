@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,7 @@ from zones.model import Connection, Decomposition
 from zones.plan_view.regions import Labels, Region, face_bases
 from zones.reach.access_reach import able, preference
 from zones.reach.tip_field import touchable
-from zones.zoning.zones import LEAST_PART_MM2, LEAST_ZONE_MM2, build_zones, is_open
+from zones.zoning.zones import LEAST_PART_MM2, LEAST_ZONE_MM2, _parts, build_zones, is_open
 
 NOTHING = Decomposition((), (), ())
 
@@ -200,6 +202,14 @@ def test_what_is_too_little_in_each_region_is_pooled():
     assert held(np.flatnonzero(quarter == 0)) == {}
     got = held(np.arange(len(samples)))
     assert set(got) == {"W0", "W1", "W2", "W3"} and sum(got.values()) == pytest.approx(4 * apiece, rel=0.1)
+
+
+@pytest.mark.parametrize(("apiece", "count", "worth"), [(0.04, 4, False), (0.04, 5, True), (0.25, 1, True)])
+def test_a_part_for_a_tool_in_use_is_worth_a_zone_by_its_area(apiece, count, worth):
+    rows = np.arange(count)
+    sight = SimpleNamespace(samples=SimpleNamespace(area=np.full(count, apiece)),
+                            groups=lambda _: [("floor", AreaForm.LEVEL, rows)])
+    assert bool(_parts(sight, rows, set())) == worth
 
 
 def test_no_tool_that_is_used_leaves_what_is_worth_a_zone():
