@@ -61,7 +61,7 @@ def fitted(plan: Workplan, tolerance: float) -> Workplan:
     """The plan with arcs and longer lines where these stay within the tolerance of the planned cuts.
 
     plan      : cuts within its chordal tolerances
-    tolerance : float, mm, >= 0, added to the chordal tolerance of each step
+    tolerance : float, mm, >= 0, added to the chordal tolerance of each step; ``Trajectory.loose`` comes on top
 
     Returns the plan. Cutting passes, lead-in and lead-out moves with a fixed tool axis change; links do not. Arcs occur
     only in steps whose tool axis is Z of the written frame. All trajectories keep their ends.
@@ -77,7 +77,8 @@ def fitted(plan: Workplan, tolerance: float) -> Workplan:
     trajectories = [plan.steps[s].trajectories[t] for s, t in places]
     round_ = np.array([_axis_is_z(plan, plan.steps[s]) for s, _ in places])
     new = dict(zip(places, _refitted_trajectories(trajectories, round_, tolerance), strict=True))
-    steps = tuple(replace(step, chordal_tolerance=step.chordal_tolerance + tolerance,
+    steps = tuple(replace(step, chordal_tolerance=step.chordal_tolerance + tolerance + max(
+                              (t.loose for t in step.trajectories), default=0.0),
                           trajectories=tuple(new.get((s, t), path) for t, path in enumerate(step.trajectories)))
                   for s, step in enumerate(plan.steps))
     return replace(plan, steps=steps)
@@ -100,7 +101,7 @@ def _refitted_trajectories(trajectories: Sequence[Trajectory], round_: BOOL, tol
     points = np.concatenate([w.points for w in trajectories])
     count = np.array([len(w.points) for w in trajectories])
     begin = np.cumsum([0, *count])
-    fit = stretches(points, count, round_, tolerance)
+    fit = stretches(points, count, round_, tolerance + np.array([w.loose for w in trajectories]))
     rows, starts, per = _along(points, fit)
     out = []
     part = np.searchsorted(fit.first, begin)  # a stretch never goes from one pass to the next
@@ -123,13 +124,13 @@ def _left(points: F64, fit: FittedStretches, mine: slice) -> BOOL:
     return np.asarray(_cross(a, b) > 0.0)
 
 
-def stretches(points: F64, count: I64, round_: BOOL, tolerance: float) -> FittedStretches:
+def stretches(points: F64, count: I64, round_: BOOL, tolerance: F64 | float) -> FittedStretches:
     """The lines and arcs that replace paths.
 
     points : (n, 3) float64, mm, frame of the step; the points of all paths, one path after the other
     count  : (m,) int64, count of the points of each path, >= 2
     round_ : (m,) bool, whether the path may have arcs
-    tolerance : float, mm, largest distance between a stretch and its path, in both directions
+    tolerance : (m,) float64 or float, mm, largest distance between a stretch and its path, in both directions
 
     Notes
     -----
@@ -142,20 +143,21 @@ def stretches(points: F64, count: I64, round_: BOOL, tolerance: float) -> Fitted
     stop = np.concatenate([b[1:] for b in blocks])
     may = np.repeat(round_, [len(b) - 1 for b in blocks])
     place = np.rint(points * PER_MM)
+    within = np.repeat(np.broadcast_to(tolerance, len(count)), count)  # mm, by row
     found: list[tuple[I64, I64, BOOL, F64]] = []
     while len(at):
-        line = _farthest(at, stop, 1, lambda i, j: _line_fits(points, i, j, tolerance))
+        line = _farthest(at, stop, 1, lambda i, j: _line_fits(points, i, j, within[i]))
         last, is_arc, centre = line.copy(), np.zeros(len(at), np.bool_), np.zeros((len(at), 2))
         # an arc is kept only where it is longer than the line
         room = np.flatnonzero(may & (stop - at >= MIN_ARC_MOVES) & (line < stop))
         if len(room):
             seek = _farthest(at[room], stop[room], MIN_ARC_MOVES,
-                             lambda i, j: _arc_fits(points, place, i, j, tolerance)[0])
+                             lambda i, j: _arc_fits(points, place, i, j, within[i])[0])
             better = seek > np.maximum(line[room], at[room] + MIN_ARC_MOVES - 1)
             room, seek = room[better], seek[better]
             last[room], is_arc[room] = seek, True
             if len(room):
-                centre[room] = _arc_fits(points, place, at[room], seek, tolerance)[1]
+                centre[room] = _arc_fits(points, place, at[room], seek, within[at[room]])[1]
         found.append((at, last, is_arc, centre))
         on = last < stop
         at, stop, may = last[on], stop[on], may[on]
@@ -207,7 +209,7 @@ def _cross(a: F64, b: F64) -> F64:
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
-def _line_fits(points: F64, first: I64, last: I64, tolerance: float) -> BOOL:
+def _line_fits(points: F64, first: I64, last: I64, tolerance: F64) -> BOOL:
     """Whether the points of a stretch lie within the tolerance of its line and advance along it without going back."""
     rows, which, begins = _ragged(first, last)
     a = points[first]
@@ -219,10 +221,10 @@ def _line_fits(points: F64, first: I64, last: I64, tolerance: float) -> BOOL:
     aside = np.linalg.norm(off - along[:, None] * unit[which], axis=1)
     back = np.zeros(len(rows), np.bool_)
     back[1:] = (np.diff(along) <= 0.0) & (which[1:] == which[:-1])
-    return np.asarray(~np.logical_or.reduceat((aside > tolerance) | back, begins) & (length > GRID))
+    return np.asarray(~np.logical_or.reduceat((aside > tolerance[which]) | back, begins) & (length > GRID))
 
 
-def _arc_fits(points: F64, place: F64, first: I64, last: I64, tolerance: float) -> tuple[BOOL, F64]:
+def _arc_fits(points: F64, place: F64, first: I64, last: I64, tolerance: F64) -> tuple[BOOL, F64]:
     """Whether one arc or helix replaces the moves between two rows, and its centre (k, 2), mm.
 
     place : (n, 3) float64, grid steps, the points on the grid
@@ -283,7 +285,7 @@ def _arc_fits(points: F64, place: F64, first: I64, last: I64, tolerance: float) 
     rise = zb - za
     even = za[which] + rise[which] * gone / np.maximum(sweep, 1e-9)[which]
     dz = np.abs(z[moves + 1] - z[moves])
-    uneven = dz * (0.02 * angle * angle + 0.5 * tolerance / np.maximum(r, GRID)[mine])
+    uneven = dz * (0.02 * angle * angle + 0.5 * (tolerance / np.maximum(r, GRID))[mine])
     high = np.maximum.reduceat(np.abs(z - even), begins) + np.maximum.reduceat(uneven, starts)
     ok &= np.hypot(off, high) <= tolerance
     level = rise == 0.0
@@ -292,7 +294,7 @@ def _arc_fits(points: F64, place: F64, first: I64, last: I64, tolerance: float) 
 
 
 def _bisector(p: F64, moves: I64, which: I64, begins: I64, middle: F64, unit: F64, half: F64,
-              tolerance: float) -> tuple[F64, BOOL]:
+              tolerance: F64) -> tuple[F64, BOOL]:
     """Signed distance h of the centre from the middle of the ends, mm, positive to the left; and whether one exists.
 
     p : (n, 2) float64, mm, points of k stretches;  moves : rows of p at which moves begin;  which : (n,) stretch

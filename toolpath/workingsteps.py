@@ -74,6 +74,7 @@ class Trajectory:
     axes   : (n, 3) float64, unit, tip to spindle; None: along Z of the frame of the points
     arcs   : stretches that G2 or G3 can follow, in order, separate but for their ends; the points between those of an
              arc lie on it
+    loose  : mm that the written way may leave the points by, more than those of a finish: a later pass takes what stays
     """
 
     motion: TrajectoryKind
@@ -81,6 +82,7 @@ class Trajectory:
     feed: float
     axes: F64 | None = None
     arcs: tuple[ArcSpan, ...] = ()
+    loose: float = 0.0
 
     @property
     def length(self) -> float:

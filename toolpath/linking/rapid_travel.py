@@ -95,6 +95,7 @@ class Travel:
     found: Counterexamples = NONE
     trajectories: list[Trajectory] = fresh(default_factory=list)
     at: F64 | None = None
+    loose: float = 0.0
 
     def here(self) -> F64:
         """Tip of the tool, (3,) float64, mm, access frame, after its first move."""
@@ -107,7 +108,8 @@ class Travel:
         points : (n, 3) float64, mm, access frame
         feed   : mm/min
         """
-        self.trajectories.append(Trajectory(motion, np.ascontiguousarray(points), feed))
+        loose = self.loose if motion is TrajectoryKind.CUT else 0.0
+        self.trajectories.append(Trajectory(motion, np.ascontiguousarray(points), feed, loose=loose))
         self.stock.cut(points, self.field.tool)
         self.at = points[-1]
 

@@ -54,6 +54,8 @@ from zones.zoning.zones import ZoneArea
 WALL = 0.9  # part of a unit normal along the access: faces with more are no walls
 AGAIN_SHARE = 0.95  # of the progress, before zones are finished again
 ISLAND = 0.8  # of a layer: stock between rings that is left to the next one, unless even stock is asked for
+LOOSE = 2.0  # of the tolerance of leaving out points: an arc through them finds room (docs/theory/arcs.md)
+LOOSE_SHARE = 0.25  # of the allowance, at most, that arcs of the layers leave them by
 THIN = 2.0  # scallops: thickness on a wall that a finish leaves
 
 Progress = Callable[[float], None]
@@ -390,12 +392,14 @@ class _Layers:
     def _walk(self, linker: Linker, z: float, place: LayerArea, island: float = 0.0) -> None:
         """Cut the stock above a height, mm, in an area, down to it; ``island`` mm of it may stay between rings."""
         settings, side, fine = self.settings, depth_layers.ring_spacing(self.field.tool), 0.1 * self.field.lattice.step
+        linker.go.loose = min(LOOSE * fine, LOOSE_SHARE * self.allowance)
         if self.bounded:
             Clearing(linker, z, place.area, self.allowance, side, settings.cut_direction,
                      depth_layers.STOCK_WORTH, fine).walk()
         for lines in depth_layers.layer(self.field, self.stock, z, place, self.allowance, side, island):
             for line in nearest_order(lines, linker.at, False):
                 linker.add(turned(line, settings), fine)
+        linker.go.loose = 0.0
 
     def _step(self, number: int, operation: str, linker: Linker) -> list[Workingstep]:
         """The passes of a linker as a workingstep; none without passes."""

@@ -141,6 +141,22 @@ def test_the_budget_is_told():
     assert fitted(work, 0.0) is work
 
 
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_loose_pass_has_more_room_and_the_one_beside_it_has_not(name):
+    work = cutting(SHAPES[name])
+    ways = work.steps[0].trajectories
+    k = next(k for k, t in enumerate(ways) if t.motion is TrajectoryKind.CUT)
+    more = replace(work.steps[0], trajectories=(*ways[:k], replace(ways[k], loose=0.02), *ways[k:]))
+    alone = cut_of(fitted(work, HALF))
+    step = fitted(replace(work, steps=(more,)), HALF).steps[0]
+    loose, exact = step.trajectories[k:k + 2]
+    np.testing.assert_allclose(exact.points, alone.points, atol=1e-9)
+    assert [(a.first, a.last, a.left) for a in exact.arcs] == [(a.first, a.last, a.left) for a in alone.arcs]
+    assert off(np.vstack([drawn(p) for p in written(loose)])[::3], SHAPES[name]) <= HALF + 0.02 + GRAIN
+    assert len(written(loose)) <= len(written(exact))
+    assert step.chordal_tolerance == pytest.approx(work.steps[0].chordal_tolerance + HALF + 0.02)
+
+
 def test_blocks_end_where_many_passes_are_gone_along_at_once():
     """The same whatever lies beside a pass; a long one is cut where its blocks end, no more."""
     long = np.vstack([turn(5.0, 0.1 * k, 0.1 * k + 0.1, centre=(0.0, 0.0, 1.0))[:-1] for k in range(900)])

@@ -14,12 +14,13 @@ from tests.plan_checks import SlowStock, brute_residual, dense, worst_meeting
 from toolpath.lines import Line
 from toolpath.passes.pass_family import FinishTarget
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
-from toolpath.planning.job_plan import AGAIN_SHARE, ISLAND, plan_job
+from toolpath.planning.job_plan import AGAIN_SHARE, ISLAND, LOOSE_SHARE, plan_job
 from toolpath.planning.zone_finishing import Finish
 from toolpath.planning.zone_layout import ZoneLayout
 from toolpath.stock.cut_history import OVERLAP, Depths, Walked
 from toolpath.stock.stock_map import StockMap
 from toolpath.strategies.depth_layers import EVEN
+from toolpath.tool_deflection import left_by_layers
 from toolpath.workingsteps import CutDirection, TrajectoryKind
 from zones.machinable_area import AreaForm
 
@@ -306,6 +307,19 @@ def test_zones_no_sample_of_which_is_judged_get_no_passes(pattern):
     again = replanned(c, checks=none, pattern=pattern, roughing=False)
     assert again.plan.steps == ()
     assert all(p.step is None and p.passes == 0 and not len(p.left) for p in again.plan.zones)
+
+
+@pytest.mark.parametrize("name", ["walls", "corner"])
+def test_rings_are_loose_and_rims_finishes_and_links_are_not(name):
+    c = case(name)
+    for s in c.plan.steps:
+        for t in s.trajectories:
+            assert t.loose == 0.0 or s.operation == "roughing" and t.motion is TrajectoryKind.CUT
+            assert 0.0 <= t.loose <= LOOSE_SHARE * left_by_layers(STEP_DOWN * s.tool.diameter,
+                                                                   c.fields[s.tool.id].lattice.step)
+    ways = [t.loose for s in c.plan.steps for t in s.trajectories
+            if s.operation == "roughing" and t.motion is TrajectoryKind.CUT]
+    assert max(ways) > 0.0 == min(ways)
 
 
 # -- what is left -------------------------------------------------------------------------------------------------
