@@ -99,10 +99,10 @@ def test_a_zone_that_is_gone_over_again_is_proved_and_written_as_two_workingstep
     def box(x, y, z, at):
         return cq.Workplane().box(x, y, z, centered=False).translate(at)
 
-    part = write_step(box(14, 8.5, 2, (0, 0, 0)).union(box(1.5, 5.5, 4, (3, 1.5, 2)))
-                      .union(box(1.5, 5.5, 2.5, (9.5, 1.5, 2))), tmp_path / "walls.step")
+    part = write_step(box(14, 8.5, 2, (0, 0, 0)).union(box(1.5, 5.5, 5, (3, 1.5, 2)))
+                      .union(box(1.5, 5.5, 1.5, (6.5, 1.5, 2))), tmp_path / "walls.step")
     tool = {"id": "T1", "kind": "ball", "diameter_mm": 3, "flute_length_mm": 3, "neck_diameter_mm": 2.85,
-            "neck_length_mm": 3, "shank_diameter_mm": 4, "stickout_mm": 5,
+            "neck_length_mm": 3, "shank_diameter_mm": 4, "stickout_mm": 4,
             "holder": [{"diameter_mm": 12, "diameter_top_mm": 20, "length_mm": 8}]}
     setup = {"tools": [tool], "quality": {"scallop_height_mm": 0.03}, "stock": {"margin_mm": 1, "uncertainty_mm": 0}}
     got = run("plan", part, tmp_path, setup, "--out", str(tmp_path / "out"))

@@ -19,6 +19,7 @@ from scipy.spatial import cKDTree
 from geometry.cutting_mechanics import effective_diameter
 from geometry.mesh import F64
 from toolpath.feeds.feed_scheduling import Pace
+from toolpath.five_axis.oriented_motion import THICK
 from toolpath.linking.linker import FLUTE_SHARE, Linker
 from toolpath.passes.contours import dilated
 from toolpath.passes.pass_family import FinishTarget
@@ -43,7 +44,7 @@ from toolpath.roughing.sized_walls import SizedWalls
 from toolpath.stock.cut_history import Depths, Walked
 from toolpath.stock.engagement import SKIN_SHARE, UNBOUNDED
 from toolpath.stock.stock_map import SURE_RIM, StockMap
-from toolpath.strategies import depth_layers
+from toolpath.strategies import curvature_matched, depth_layers
 from toolpath.strategies.depth_layers import LayerArea
 from toolpath.tool_deflection import left_by_layers
 from toolpath.workingsteps import Workingstep
@@ -56,6 +57,7 @@ AGAIN_SHARE = 0.95  # of the progress, before zones are finished again
 ISLAND = 0.8  # of a layer: stock between rings that is left to the next one, unless even stock is asked for
 LOOSE = 2.0  # of the tolerance of leaving out points: an arc through them finds room (docs/theory/arcs.md)
 LOOSE_SHARE = 0.25  # of the allowance, at most, that arcs of the layers leave them by
+TILTED_LAYERS = 2.0  # goes in which a tilted end takes the stairs of the layers: more take longer than a layer more
 THIN = 2.0  # scallops: thickness on a wall that a finish leaves
 
 Progress = Callable[[float], None]
@@ -301,6 +303,10 @@ class _Layers:
         if top <= bottom or snapshot is not None and not snapshot.left:
             return
         heights = depth_layers.layer_heights(top, bottom, step)
+        if settings.turning is not None and settings.finishing and curvature_matched.suits(tool):
+            spans = [(float(z.tips[:, 2].min()), float(z.tips[:, 2].max())) for z in zones
+                     if z.form is AreaForm.SHALLOW]
+            heights = depth_layers.divided(heights, top, spans, TILTED_LAYERS * THICK * tool.diameter)
         also = [f.bottom + low for f in zones if f.form is AreaForm.LEVEL] if self.bounded else []
         also += [plane - under for plane in settings.planes]
         if also:

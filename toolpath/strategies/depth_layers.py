@@ -45,6 +45,22 @@ def layer_heights(top: float, bottom: float, step: float) -> list[float]:
     return [top - k * (top - bottom) / count for k in range(1, count)] + [bottom]
 
 
+def divided(heights: Sequence[float], top: float, spans: Sequence[tuple[float, float]], step: float) -> list[float]:
+    """Levels with more of them, evenly, where a layer is deeper than ``step`` and goes through a span; descending.
+
+    heights : mm, of the layers, descending; top : mm, of the stock
+    spans   : lowest and highest tip, mm, of areas on which layers leave no higher stairs than ``step``
+
+    >>> divided([2.0, 0.0], 4.0, [(2.5, 3.0)], 1.5)
+    [3.0, 2.0, 0.0]
+    """
+    out: list[float] = []
+    for upper, lower in zip([top, *heights], heights, strict=False):
+        met = any(low < upper and lower < high for low, high in spans)
+        out += layer_heights(upper, lower, step) if met else [lower]
+    return out
+
+
 def between(upper: float, lower: float, step: float) -> list[float]:
     """Heights between two layers, mm, descending, no farther apart than ``EVEN`` of the deepest layer ``step``.
 
