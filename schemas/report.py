@@ -156,7 +156,7 @@ class Assumption(ReportModel):
     """Something that the proof takes for granted because neither setup nor program states it. It is no finding."""
 
     what: Annotated[str, Field(
-        description="dialect, travel, max_rpm, rotary_sense, tip_control, length_axis, radius_register, "
+        description="dialect, travel, max_rpm, rotary_sense, tip_control, length_axis, radius_register, tap_diameter, "
                     "gauge_length, holder, above_holder, table, other_solids, rapid_path, path_mode, change_position, "
                     "coolant, cutting_force or between_samples.",
         examples=["travel"])]

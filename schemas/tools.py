@@ -82,7 +82,8 @@ class Tool(WireModel):
     core_diameter_mm: Annotated[Number | None, Field(
         gt=0, le=2000, description="With center_cutting false: diameter at the end of the tool within which it does "
                                    "not cut, mm. null: 0.3 of diameter_mm. Such a tool goes straight down into no "
-                                   "stock, and on no helix that is narrower than its core.")] = None
+                                   "stock, and on no helix that is narrower than its core. Of a tap: the hole that "
+                                   "must be there before it, mm; null: as diameter and pitch tell.")] = None
     ramp_angle_deg: Annotated[Number | None, Field(
         gt=0, le=90, description="Steepest angle at which the tool may go down into stock, deg. Plans use at most 3. "
                                  "null: 3; in a verified program 10 for a tool that cuts to its centre, in a material "
@@ -237,9 +238,13 @@ class Tool(WireModel):
         if _given(self.neck_diameter_mm) > self.diameter_mm + LENGTH_EPSILON:
             raise ValueError(f"tool {self.id}: neck_diameter_mm {self.neck_diameter_mm:g} is larger than diameter_mm "
                              f"{self.diameter_mm:g}; a neck is relieved")
-        if self.core_diameter_mm is not None and (self.center_cutting or self.core_diameter_mm >= self.diameter_mm):
-            raise ValueError(f"tool {self.id}: core_diameter_mm belongs to a tool with center_cutting false, and is "
-                             f"less than diameter_mm {self.diameter_mm:g}")
+        if self.core_diameter_mm is not None and self.kind == "tap":
+            if self.core_diameter_mm > self.diameter_mm:
+                raise ValueError(f"tool {self.id}: core_diameter_mm {self.core_diameter_mm:g} of a tap is at most its "
+                                 f"diameter_mm {self.diameter_mm:g}")
+        elif self.core_diameter_mm is not None and (self.center_cutting or self.core_diameter_mm >= self.diameter_mm):
+            raise ValueError(f"tool {self.id}: core_diameter_mm belongs to a tap, or to a tool with center_cutting "
+                             f"false, and is less than diameter_mm {self.diameter_mm:g}")
         if _given(self.flute_length_mm) < self.corner_radius_mm - LENGTH_EPSILON:
             raise ValueError(f"tool {self.id}: flute_length_mm {self.flute_length_mm:g} is shorter than the corner "
                              f"radius {self.corner_radius_mm:g}, so the rounded end would not cut")

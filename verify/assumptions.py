@@ -18,6 +18,7 @@ class AssumedKind(StrEnum):
     TIP_CONTROL = "tip_control"
     LENGTH_AXIS = "length_axis"
     RADIUS_REGISTER = "radius_register"
+    TAP_DIAMETER = "tap_diameter"
     GAUGE_LENGTH = "gauge_length"
     HOLDER = "holder"
     ABOVE_HOLDER = "above_holder"

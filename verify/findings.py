@@ -75,12 +75,13 @@ def worst_of(groups: NDArray[np.int64], depth: F64) -> list[NDArray[np.int64]]:
     return [rows for rows in np.split(order, cuts) if len(rows)]
 
 
-def contact_findings(events: F64, moves: Moves, source: Source, skins: F64,
-                     tools: Sequence[ToolBody]) -> list[Finding]:
+def contact_findings(events: F64, moves: Moves, source: Source, skins: F64, tools: Sequence[ToolBody],
+                     holes: Mapping[int, float] | None = None) -> list[Finding]:
     """Findings of the events that a pass over the stock collected.
 
     events : (e, 7) float64, rows of ``verify.material.stock_pass.StockPass``, mm, setup frame
     skins  : (m,) float64, mm, depth that each move may plunge
+    holes  : mm by T number, diameters of the holes that taps need
 
     The line of a finding is the first of those that are within a micrometre of the deepest.
 
@@ -101,6 +102,8 @@ def contact_findings(events: F64, moves: Moves, source: Source, skins: F64,
         m = move[r]
         depth, clearance = float(events[r, 2]), float(events[r, 3])
         kind, text, limit = _contact(int(code[r]), bool(feed[m]), depth, clearance, float(skins[m]))
+        if kind is FindingKind.PLUNGE and (wide := (holes or {}).get(int(source.tool[m]))) is not None:
+            text += f"; before this tap the hole must be {wide:.2f} mm wide"
         beside = _runs_beside(int(code[r]), tools[moves.tool[m]])
         if kind is FindingKind.COLLISION and beside and depth - clearance <= skins[m]:
             kind = FindingKind.RUBBING

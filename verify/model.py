@@ -75,6 +75,7 @@ class ProofSetup:
     ramp_angle    : rad, steepest descent into stock
     ramp_angles   : rad by T number, for tools that have another one
     cores         : mm by T number, diameter at the end of a tool within which it does not cut; absent: it cuts there
+    tap_holes     : mm by T number, diameter of the hole that must stand before a tap; absent: as the pitch tells
     plunge_skin   : share of the tool diameter that a steeper descent may take off (``verify.material.stock_lines``)
     rapid_feed    : mm/min
     acceleration  : mm/s², and jerk, mm/s³, for times
@@ -122,6 +123,7 @@ class ProofSetup:
     ramp_angle: float = 0.0523598775598
     ramp_angles: Mapping[int, float] = field(default_factory=dict)
     cores: Mapping[int, float] = field(default_factory=dict)
+    tap_holes: Mapping[int, float] = field(default_factory=dict)
     plunge_skin: float = 0.1
     rapid_feed: float = 5000.0
     acceleration: float = RATES.acceleration

@@ -35,6 +35,7 @@ from verify.checks.program_sequence import (
 from verify.checks.repeated_passes import repeats
 from verify.checks.sideways_cuts import sideways_findings, tapped_out, torn_threads
 from verify.checks.table_clearance import table_findings
+from verify.checks.tap_holes import tap_holes
 from verify.checks.thread_teeth import drawn_thread_mills, taps_in_holes
 from verify.findings import (
     Source,
@@ -124,6 +125,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     stated = setup.dogleg is not None
     framed, setup = rapids_decided(framed, setup)
     tools = with_nose(tools, framed, setup)
+    holes, threads_taken = tap_holes(framed, tools, setup.cutting, setup.tap_holes)
+    setup = replace(setup, tap_holes=holes)
     moves, source = moves_of(framed, tools)
     moves = replace(moves, stray=strays_of(framed, tools, setup))
     if asked is not None:
@@ -153,7 +156,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     dug = fine_plunges(moves, tools, fine, part.mesh.bounds, setup, threads,
                        unseen_cores(used, setup, met.spacing, met.upright))
     dug = dug[~np.isin(dug[:, 0], run.events[run.events[:, 1] == PLUNGE, 0])]
-    met_by = contact_findings(np.concatenate([run.events, dug]), moves, source, skins, tools)
+    met_by = contact_findings(np.concatenate([run.events, dug]), moves, source, skins, tools, setup.tap_holes)
     findings = [*as_collisions(met_by, [p.program for p in framed]),
                 *cuts.gouges, *cuts.excluded, *loaded, *_program_findings(framed),
                 *(f for p in framed for f in p.findings(tools)), *_unlisted(run.lost, framed),
@@ -179,7 +182,9 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     notes = [*cuts.notes, *springs, *(note for p in framed for note in p.notes())]
     dips = [Assumed(AssumedKind.BETWEEN_SAMPLES, round(met.dip, 3), "the fixtures are so large that a ball may enter "
                     f"one by {met.dip:.3f} mm unseen", "give smaller boxes where tools go")] * (met.dip > DIP + 1e-9)
+    tapping = {tools[k].number for k in np.unique(moves.tool[run.cut])}
     taken = [*setup.assumed, *program_assumptions(framed, tools, setup, stated), *cuts.assumed, *dips,
+             *(a for number, a in threads_taken.items() if number in tapping),
              *body_assumptions(framed, part, moves, source, tools, setup, threads)]
     stages.tell(1.0)
     proof = _proof(findings, cuts, run, framed, known, took, moves, source, setup, scored, zone_ids,

@@ -132,7 +132,7 @@ def proof_setup(job: JobPart, view: View | ProofFrame, *, foreign: bool = False)
         clearance_approach=c.approach,
         scallop_height=q.scallop_height_mm, gouge_tolerance=q.gouge_tolerance_mm,
         stock_allowance=q.stock_allowance_mm, ramp_angle=RAMP_ANGLE, ramp_angles=inputs.ramp_angles(foreign=foreign),
-        cores=inputs.cores, cutting=inputs.cutting,
+        cores=inputs.cores, tap_holes=inputs.tap_holes, cutting=inputs.cutting,
         rapid_feed=inputs.rates.rapid, acceleration=inputs.rates.acceleration, jerk=inputs.rates.jerk,
         work_offset=access_of(job, view).work_offset,
         travel=None if machine.travel_mm is None else np.array(machine.travel_mm, dtype=np.float64),

@@ -184,6 +184,12 @@ class JobInputs:
                 if not t.center_cutting and not body.named}
 
     @property
+    def tap_holes(self) -> dict[int, float]:
+        """Mm by T number: the hole that must stand before a tap, where the setup states it."""
+        return {body.number: t.core_diameter_mm for t, body in zip(self.tools, self.bodies, strict=True)
+                if t.kind == "tap" and t.core_diameter_mm is not None}
+
+    @property
     def tool_lives(self) -> dict[str, float]:
         """Minutes in cut by tool id, of the tools whose life is limited."""
         return {t.id: t.life_min for t in self.tools if t.life_min is not None}

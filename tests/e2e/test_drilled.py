@@ -35,7 +35,8 @@ def program(*, deep=-5.0 - POINT, through=-9.2, chamfer=-1.6, tapped=True, tappe
     lines += ["T4 M6", "S3000 M3", "G0 X4 Y0", "G43 H4 Z20", "G81 X4 Y0 Z-9.5 R2 F150", "G80"] if first else []
     if tapped:
         at, low = tapped_at
-        lines += ["T3 M6", "S500 M3", f"G0 X{at} Y0", "G43 H3 Z20", "G0 Z2", f"G1 Z{low} F350", "Z2", "G0 Z20"]
+        lines += ["T3 M6", "S500 M3", f"G0 X{at} Y0", "G43 H3 Z20", "G0 Z2",
+                  f"G84 X{at} Y0 Z{low} R2 F350", "G80", "G0 Z20"]
     lines += ["T2 M6", "S8000 M3", "G0 X9.5 Y-12", "G43 H2 Z20", f"G0 Z{chamfer}", "G1 Y12 F400", "G0 Z20"]
     return "\n".join([*lines, "M5", "M30", "%"]) + "\n"
 
@@ -133,7 +134,7 @@ def test_a_drill_goes_neither_sideways_nor_at_rapid_into_stock(verify):
 
 @pytest.mark.slow
 def test_a_tap_that_leaves_its_thread_at_rapid_is_found(verify):
-    report = verify(program().replace("G1 Z-9.0 F350\nZ2\n", "G81 X4 Y0 Z-9 R2 F350\nG80\n"))
+    report = verify(program().replace("G84", "G81"))
     assert kinds(report) == {"program": 1}
     assert "T3 is a tap and leaves its thread at rapid" in report["findings"][0]["message"]
 

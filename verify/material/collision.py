@@ -111,7 +111,7 @@ def run_clashes(points: F64, fixed: NDArray[np.bool_], moves: Moves, tools: Sequ
         return np.zeros((0, 7)), 0
     tree, axes = PointTree.build(points), moves.axes or ToolAxes.upright(len(moves))
     cloud = PointArrays(np.ascontiguousarray(points[tree.order]), np.ascontiguousarray(fixed[tree.order]), tree.balls)
-    sizes = Bodies.of(tools, setup).arrays(cutter_table(tools), end_radii(tools))
+    sizes = Bodies.of(tools, setup).arrays(cutter_table(tools), end_radii(tools, setup.tap_holes))
     known = rapid_arrays(moves, setup) if rapids is None else rapids
     steps, turns, limits = moves.arrays, axes.arrays(bow), contact_limits(setup)
 

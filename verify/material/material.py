@@ -117,7 +117,8 @@ def stock_spacing(setup: ProofSetup, moves: Moves, tools: Sequence[ToolBody]) ->
     counts as half its radius. A line stands in every core that does not cut.
     """
     used = [tools[k] for k in np.unique(moves.tool[moves.feed])]
-    wide = np.maximum(end_radii(used), [0.5 * t.radius if t.cone_height > 0.0 else 0.0 for t in used])
+    wide = np.maximum(end_radii(used, setup.tap_holes),
+                      [0.5 * t.radius if t.cone_height > 0.0 else 0.0 for t in used])
     if moves.axes is not None:
         return min(setup.line_spacing, NODES_APART * float(wide.min(initial=np.inf)))
     core = np.array([setup.cores[t.number] for t in used if setup.cores.get(t.number, 0.0) > 0.0])

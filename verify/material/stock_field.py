@@ -186,7 +186,7 @@ def run_field(field: DistanceField, moves: Moves, tools: Sequence[ToolBody], set
     moves. Sideways travel reduces them at the slope of a ramp. A depth that the region no longer covers is another
     hole.
     """
-    cutters, ends = cutter_table(tools), end_radii(tools)
+    cutters, ends = cutter_table(tools), end_radii(tools, setup.tap_holes)
     bodies = Bodies.none(tools) if bare else Bodies.of(tools, setup)
     axes = moves.axes or ToolAxes.upright(len(moves))
     sizes, (steep, _) = bodies.arrays(cutters, ends), descents(moves, tools, setup)

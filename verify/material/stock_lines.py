@@ -170,7 +170,7 @@ def _run(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     """
     cutters = cutter_table(tools)
     bodies = Bodies.of(tools, setup) if chosen is None else Bodies.none(tools)
-    sizes = bodies.arrays(cutters, end_radii(tools))
+    sizes = bodies.arrays(cutters, end_radii(tools, setup.tap_holes))
     allowed = DescentArrays(*descents(moves, tools, setup, ways), ways_before(moves),
                             setup.plunge_skin * 2.0 * cutters[:, 0], hollow_ends(tools, setup))
     cut, under = np.zeros(len(moves), np.uint8), np.zeros(len(moves), np.uint8)

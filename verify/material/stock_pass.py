@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import queue
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +24,7 @@ from verify.moves import Moves
 
 EVENTS = 4096
 ANOTHER_TOOL = 1e6  # mm
-TAP_CORE = 0.75  # radii: what is nearer to the axis of a tap, the hole must have taken; less than any ISO 68 core
+TAP_CORE = 0.75  # radii: what is nearer to the axis of a tap of unknown pitch, the hole must have taken
 PRESSED = 0.01  # diameters: a hollow end takes a stub that high, straight down too
 SAME = 1e-6  # mm, and rad: closer ends of moves and axes are the same
 BESIDE = 5e-3  # mm: chords of two passes over one wall, and the decimals of their programs, differ by no more
@@ -194,11 +194,15 @@ class StockPass:
     under: NDArray[np.bool_] | None = None
 
 
-def end_radii(tools: Sequence[ToolBody]) -> F64:
-    """(k,) float64, mm: radius of the end-cutting region of each tool (see ``verify.material.stock_lines``)."""
+def end_radii(tools: Sequence[ToolBody], holes: Mapping[int, float] | None = None) -> F64:
+    """(k,) float64, mm: radius of the end-cutting region of each tool (see ``verify.material.stock_lines``).
+
+    holes : mm by T number, diameters of the holes that taps need, as ``ProofSetup.tap_holes``
+    """
+    known = holes or {}
     share = {"flat": lambda t: t.radius, "ball": lambda t: 0.5 * t.radius,
              "bull": lambda t: t.radius - 0.5 * t.corner_radius, "drill": lambda t: t.radius,
-             "thread_mill": lambda t: t.radius, "tap": lambda t: TAP_CORE * t.radius,
+             "thread_mill": lambda t: t.radius, "tap": lambda t: 0.5 * known.get(t.number, 2.0 * TAP_CORE * t.radius),
              "chamfer": lambda t: 0.5 * t.tip_diameter if t.tip_diameter > 0.0 else t.radius}
     return np.array([share[t.kind](t) for t in tools])
 
