@@ -97,6 +97,7 @@ class Tool(WireModel):
     stickout_mm: Annotated[Length | None, Field(
         description="Tip to holder nose, mm. Required with a holder. Default without one: the greater of "
                     "neck_length_mm and 10 x diameter_mm.")] = None
+    _flutes_given: bool = PrivateAttr(default=False)
     _gauge_given: bool = PrivateAttr(default=False)
     gauge_length_mm: Annotated[Length | None, Field(
         description="Tip to spindle face, mm. Used for the length offset, the travel in Z and the kinematics only. "
@@ -191,6 +192,7 @@ class Tool(WireModel):
         return wide / math.tan(math.radians(0.5 * self.point_angle_deg))
 
     def _derive(self) -> None:
+        self._flutes_given = self.flute_length_mm is not None
         if self.flute_length_mm is None:
             bounds = [v for v in (self.neck_length_mm, self.stickout_mm) if v is not None]
             usual = self.cone_height if self.kind == "chamfer" else max(3 * self.diameter_mm, self.cone_height)
@@ -216,12 +218,22 @@ class Tool(WireModel):
         """The gauge length as it was stated; None where it was computed, so that a setup reads back as it was given."""
         return value if self._gauge_given else None
 
+    @field_serializer("flute_length_mm")
+    def _stated_flutes(self, value: float | None) -> float | None:
+        """The length of the flutes; None for a drill that does not state it, as a proof tells the two apart."""
+        return value if self._flutes_given or self.kind != "drill" else None
+
     @property
     def core_mm(self) -> float:
         """Diameter at the end within which the tool does not cut, mm; 0 where it cuts to its centre."""
         if self.center_cutting:
             return 0.0
         return CORE_SHARE * self.diameter_mm if self.core_diameter_mm is None else self.core_diameter_mm
+
+    @property
+    def flutes_given(self) -> bool:
+        """Whether the setup gives the length of the flutes; otherwise it is the default."""
+        return self._flutes_given
 
     @property
     def gauge_given(self) -> bool:

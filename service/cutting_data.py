@@ -174,7 +174,8 @@ def cutting_words(material: Material, tool: Tool) -> CuttingWords:
                         STEP_DOWN[tool.kind] * tool.diameter_mm**2, LAYER_LIMIT,
                         material.specific_cutting_force_n_mm2, material.chip_thickness_exponent, tool.spindle_rpm,
                         tool.feed_mm_min, tool.plunge_feed_mm_min, tool.life_min,
-                        None if tool.coolant is None else tool.coolant == "flood", tool.pitch_mm)
+                        None if tool.coolant is None else tool.coolant == "flood", tool.pitch_mm,
+                        tool.flutes_given)
 
 
 def bending(setup: Setup, tool: Tool, body: ToolBody, data: CuttingData, depth: float | None) -> DeflectionModel | None:

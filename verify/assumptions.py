@@ -20,6 +20,7 @@ class AssumedKind(StrEnum):
     RADIUS_REGISTER = "radius_register"
     TAP_DIAMETER = "tap_diameter"
     GAUGE_LENGTH = "gauge_length"
+    FLUTE_LENGTH = "flute_length"
     HOLDER = "holder"
     ABOVE_HOLDER = "above_holder"
     TABLE = "table"

@@ -18,6 +18,7 @@ class CuttingWords:
     rpm, feed, plunge_feed, life : 1/min, mm/min, mm/min and minutes in the cut, as the tool states them
     coolant     : whether the tool is to be cooled
     pitch       : mm, of a tap or thread mill, as the tool states it
+    flutes_given : whether the setup states how long the flutes are
     """
 
     flutes: int
@@ -33,6 +34,7 @@ class CuttingWords:
     life: float | None = None
     coolant: bool | None = None
     pitch: float | None = None
+    flutes_given: bool = True
 
 
 @dataclass(frozen=True)

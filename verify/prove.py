@@ -47,6 +47,7 @@ from verify.kernels.stock import PLUNGE
 from verify.material.collision import DIP
 from verify.material.cutting_loads import cut_sequence, loads
 from verify.material.dogleg_rapids import box_findings
+from verify.material.drill_loads import drill_loads
 from verify.material.engagement import engaged_angles, engagement_findings, engagements, in_parts
 from verify.material.fine_plunges import fine_plunges
 from verify.material.material import contacts, dogleg_limits, unseen, unseen_cores
@@ -151,6 +152,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     slack = setup.scallop_height + setup.gouge_tolerance + setup.stock_allowance
     tapped = taps_in_holes(moves, tools, tree, slack)
     loaded, cautions = loads(in_cut, tools, setup.cutting, run.cut | tapped.any(axis=1))
+    drills = drill_loads(in_cut, tools, setup.cutting, setup, tree, threads)
     angle = engaged_angles(run.engaged, stretches, tools)
     again, springs = repeats(moves, run.cut, source, _finishes(cuts, setup, len(moves)))
     dug = fine_plunges(moves, tools, fine, part.mesh.bounds, setup, threads,
@@ -158,7 +160,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     dug = dug[~np.isin(dug[:, 0], run.events[run.events[:, 1] == PLUNGE, 0])]
     met_by = contact_findings(np.concatenate([run.events, dug]), moves, source, skins, tools, setup.tap_holes)
     findings = [*as_collisions(met_by, [p.program for p in framed]),
-                *cuts.gouges, *cuts.excluded, *loaded, *_program_findings(framed),
+                *cuts.gouges, *cuts.excluded, *loaded, *drills.findings, *_program_findings(framed),
                 *(f for p in framed for f in p.findings(tools)), *_unlisted(run.lost, framed),
                 *(f for p in framed for f in table_findings([p.program], tools, p.setup)),
                 *_idle_findings(framed, run, moves, source, [t for t in fine if t.cone_height <= 0.0], asked),
@@ -183,7 +185,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     dips = [Assumed(AssumedKind.BETWEEN_SAMPLES, round(met.dip, 3), "the fixtures are so large that a ball may enter "
                     f"one by {met.dip:.3f} mm unseen", "give smaller boxes where tools go")] * (met.dip > DIP + 1e-9)
     tapping = {tools[k].number for k in np.unique(moves.tool[run.cut])}
-    taken = [*setup.assumed, *program_assumptions(framed, tools, setup, stated), *cuts.assumed, *dips,
+    taken = [*setup.assumed, *program_assumptions(framed, tools, setup, stated), *cuts.assumed, *dips, *drills.assumed,
              *(a for number, a in threads_taken.items() if number in tapping),
              *body_assumptions(framed, part, moves, source, tools, setup, threads)]
     stages.tell(1.0)

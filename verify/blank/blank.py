@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.errors import VerificationError
 from geometry.mesh import F64, TriangleMesh
@@ -16,6 +17,7 @@ from verify.blank.mesh_blank_exit import way_out_of_mesh
 from verify.model import ProofSetup, StockKind
 
 UPRIGHT = 1e-9  # of a unit axis: smaller components count as 0
+WITHIN = 1e-3  # mm along a direction that a place in the blank has before it
 
 
 def stock_bounds(bounds: F64, setup: ProofSetup) -> F64:
@@ -158,6 +160,27 @@ def blank_mesh(setup: ProofSetup) -> TriangleMesh:
         raise VerificationError("a blank of kind step has no mesh", code="no_stock_mesh", subjects=("stock_mesh",),
                                 remedy="give the surface of the blank as a closed mesh")
     return setup.stock_mesh
+
+
+def blank_holds(points: F64, up: F64, part: TriangleTree, setup: ProofSetup) -> NDArray[np.bool_]:
+    """Whether places are in the blank, and for ``WITHIN`` along directions too.
+
+    points, up : (n, 3) float64, mm and unit, setup frame
+    part       : TriangleTree, of the part
+
+    Returns (n,) bool.
+    """
+    if setup.stock_kind in (StockKind.PART_OFFSET, StockKind.STEP):
+        own = setup.stock_kind == StockKind.STEP
+        tree, beyond = (TriangleTree(blank_mesh(setup)), setup.uncertainty) if own else \
+            (part, setup.margin + setup.uncertainty)
+        return np.asarray(way_out_of_mesh(tree, points, up, beyond, WITHIN) >= WITHIN)
+    ends = points, points + WITHIN * up
+    if setup.stock_kind == StockKind.CYLINDER:
+        blank = blank_cylinder(part.mesh.bounds, setup)
+        return np.asarray(np.all([blank.depth(*p.T) >= 0.0 for p in ends], axis=0))
+    low, high = stock_bounds(part.mesh.bounds, setup)
+    return np.asarray(np.all([((p >= low) & (p <= high)).all(axis=1) for p in ends], axis=0))
 
 
 def stock_on_normals(points: F64, normals: F64, bounds: F64, setup: ProofSetup, reach: float) -> F64:
