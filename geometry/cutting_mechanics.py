@@ -136,14 +136,49 @@ def cutting_forces(kc: float, mc: float, per_tooth: F64, depth: F64, width: F64,
 
     Returns (n,) float64, N.
     """
+    edge, phi, chip = _chips(per_tooth, depth, width, tool)
+    return np.asarray(np.maximum(1.0, flutes * phi / (2.0 * math.pi)) * edge * chip**(1.0 - mc) * kc)
+
+
+def cutting_powers(kc: float, mc: float, per_tooth: F64, depth: F64, width: F64, feed: F64, tool: ToolBody) -> F64:
+    """Power of n cuts: volume a minute times the specific cutting force of the mean chip [Kienzle1952].
+
+    kc, mc                  : N/mm2 and its exponent
+    per_tooth, depth, width : (n,) float64, mm, as ``cutting_forces``; feed : (n,) float64, mm/min
+
+    Returns (n,) float64, kW, which is 1e6 N mm/s.
+
+    >>> mill = ToolBody("T1", 1, 50.0, 0.0, 45.0, 50.0, 45.0, 50.0, 60.0)
+    >>> one = np.ones(1)
+    >>> round(float(cutting_powers(2640.0, 0.24, one, 30.0 * one, 40.0 * one, 4000.0 * one, mill)[0]))
+    231
+    """
+    chip = _chips(per_tooth, depth, width, tool)[2]
+    return np.asarray(depth * width * feed * kc * chip**(-mc) / 6e7)
+
+
+def drill_loads(kc: float, mc: float, a_turn: float, drill: ToolBody, flutes: int) -> tuple[float, float]:
+    """Torque and thrust of a drill in full stock, Nm and N [Kienzle1952].
+
+    kc, mc : N/mm2 and its exponent; a_turn : mm, feed in a turn
+
+    kc h^(-mc) f D^2 / 8, and half of kc h^(-mc) f D / 2 sin(kappa), with h = f / z sin(kappa) and kappa half of the
+    point angle.
+    """
+    sine = math.sin(math.atan2(drill.radius, drill.cone_height))
+    special = kc * (a_turn / flutes * sine)**(-mc)
+    return special * a_turn * drill.diameter**2 / 8e3, 0.5 * special * a_turn * drill.radius * sine
+
+
+def _chips(per_tooth: F64, depth: F64, width: F64, tool: ToolBody) -> tuple[F64, F64, F64]:
+    """Length of the edge in the cut, mm, engaged angle, rad, and mean thickness of the chip, mm, of n cuts."""
     r = tool.corner_radius
     low = np.minimum(depth, r)
     edge = np.hypot(low, np.sqrt(low * (2.0 * r - low))) + depth - low
     wide = np.where(depth >= r, tool.diameter, tool.diameter - 2.0 * r + 2.0 * np.sqrt(low * (2.0 * r - low)))
     phi = np.arccos(np.clip(1.0 - 2.0 * width / wide, -1.0, 1.0))
-    chip = per_tooth * depth / edge * (1.0 - np.cos(phi)) / phi
-    return np.asarray(np.maximum(1.0, flutes * phi / (2.0 * math.pi)) * edge * chip**(1.0 - mc) * kc)
+    return edge, phi, per_tooth * depth / edge * (1.0 - np.cos(phi)) / phi
 
 
-__all__ = ["CARBIDE", "CORE", "bending_stress", "compliance", "cutting_force", "cutting_forces", "effective_diameter",
-           "engaged_angle", "strength"]
+__all__ = ["CARBIDE", "CORE", "bending_stress", "compliance", "cutting_force", "cutting_forces", "cutting_powers",
+           "drill_loads", "effective_diameter", "engaged_angle", "strength"]

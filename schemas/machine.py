@@ -126,6 +126,9 @@ class Machine(WireModel):
     max_rpm: Annotated[Number | None, Field(
         ge=1, le=1e6, description="Highest spindle speed, 1/min. null: at most 18000 in plans; in verified programs "
                                   "only the limits of the tools apply.")] = None
+    max_power_kw: Annotated[Number | None, Field(
+        gt=0, le=1e4, description="Power of the spindle, kW. A proof estimates the power of each cut: more is a "
+                                  "warning, twice as much a finding. null: more than any spindle has is one.")] = None
     max_feed_mm_min: Annotated[Number | None, Field(
         ge=0.1, le=1e6, description="Highest feed, mm/min. null: at most 5000 in plans, no limit in verified "
                                     "programs.")] = None

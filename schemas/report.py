@@ -188,8 +188,8 @@ class Caution(ReportModel):
                     "Then measured is the length cut upright, mm. Of a verification: tool_data: the program exceeds "
                     "spindle speed, feed, plunge feed or life of the tool. chip_load, cutting_speed, plunge_feed: it "
                     "exceeds what the material recommends. depth_of_cut: depth times width of a cut, mm2. deflection: "
-                    "mm that the tip would bend. dwell: turns that a tool stands in its cut. coolant: a tool that is "
-                    "to be cooled cuts dry.")]
+                    "mm that the tip would bend. power: kW that a cut needs. dwell: turns that a tool stands in "
+                    "its cut. coolant: a tool that is to be cooled cuts dry.")]
     subjects: Annotated[list[str], Field(description="Ids of tools, workingsteps, zones or walls.")]
     message: str
     measured: Annotated[float | None, Field(description="Measured value, in the unit named in message. limit has the "

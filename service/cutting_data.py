@@ -164,8 +164,10 @@ def lightly_finished(setup: Setup, tool: Tool, body: ToolBody) -> bool:
     return setup.operations.roughing and left <= LIGHT * tool.diameter_mm
 
 
-def cutting_words(material: Material, tool: Tool) -> CuttingWords:
+def cutting_words(material: Material, tool: Tool, power: float | None = None) -> CuttingWords:
     """What tool and material say about cutting, for the proof; what the setup states goes into the fields of the tool.
+
+    power : kW of the spindle, as the machine states it; None: it does not
 
     A layer as deep as ``STEP_DOWN`` allows, in a slot, is the recommended depth times width.
     """
@@ -175,7 +177,7 @@ def cutting_words(material: Material, tool: Tool) -> CuttingWords:
                         material.specific_cutting_force_n_mm2, material.chip_thickness_exponent, tool.spindle_rpm,
                         tool.feed_mm_min, tool.plunge_feed_mm_min, tool.life_min,
                         None if tool.coolant is None else tool.coolant == "flood", tool.pitch_mm,
-                        tool.flutes_given)
+                        power, tool.flutes_given)
 
 
 def bending(setup: Setup, tool: Tool, body: ToolBody, data: CuttingData, depth: float | None) -> DeflectionModel | None:

@@ -18,6 +18,7 @@ class CuttingWords:
     rpm, feed, plunge_feed, life : 1/min, mm/min, mm/min and minutes in the cut, as the tool states them
     coolant     : whether the tool is to be cooled
     pitch       : mm, of a tap or thread mill, as the tool states it
+    power       : kW of the spindle, as the machine states it
     flutes_given : whether the setup states how long the flutes are
     """
 
@@ -34,6 +35,7 @@ class CuttingWords:
     life: float | None = None
     coolant: bool | None = None
     pitch: float | None = None
+    power: float | None = None
     flutes_given: bool = True
 
 
@@ -41,7 +43,8 @@ class CuttingWords:
 class ProgramCaution:
     """A program exceeds what tool or material recommend. It is no finding.
 
-    kind : 'tool_data', 'chip_load', 'cutting_speed', 'depth_of_cut', 'deflection', 'plunge_feed', 'dwell' or 'coolant'
+    kind : 'tool_data', 'chip_load', 'cutting_speed', 'depth_of_cut', 'deflection', 'power', 'plunge_feed', 'dwell' or
+           'coolant'
     tool : T number; program, line : where it is worst
     measured, limit : in the unit of the message
     """

@@ -172,7 +172,8 @@ class JobInputs:
     @property
     def cutting(self) -> dict[int, CuttingWords]:
         """What tools and material say about cutting, by T number."""
-        return {body.number: cutting_words(self.material, t) for t, body in zip(self.tools, self.bodies, strict=True)}
+        return {body.number: cutting_words(self.material, t, self.machine.max_power_kw)
+                for t, body in zip(self.tools, self.bodies, strict=True)}
 
     @property
     def cores(self) -> dict[int, float]:

@@ -13,7 +13,14 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.cutting_mechanics import bending_stress, compliance, cutting_forces, effective_diameter
+from geometry.cutting_mechanics import (
+    bending_stress,
+    compliance,
+    cutting_forces,
+    cutting_powers,
+    drill_loads,
+    effective_diameter,
+)
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from verify.checks.program_sequence import FramedProgram
@@ -39,6 +46,11 @@ FINEST, COARSEST = 0.01, 0.5
 fine threads of 1 mm go up to 100 mm."""
 PITCH_ERROR = 0.02
 """Share by which feed over speed of a tap may differ from its pitch: what a floating holder takes up."""
+MOST_POWER, MOST_TORQUE, MOST_THRUST = 150.0, 3000.0, 50e3
+"""kW, Nm and N that no machining centre has. Large ones for titanium have 60 kW [ModernMachineShop2026] and 2700 Nm
+[CuttingTool2026]; the thrust is a guess of several times what feed drives give."""
+POWER_TIMES = 2.0
+"""Power of a cut over that of the machine that is a finding: spindles bear some overload, and the estimate errs."""
 MIN_TAKEN = 0.25  # of the volume of a window, taken at a feed or faster, so that the feed counts for all of it
 WINDOW, SPACINGS = 0.5, 4.0  # radii of way, and spacings of the stock, over which a cut is measured; the greater counts
 DWELL_TURNS = 10.0  # turns of the spindle that a tool may stand in its cut: a spot face takes three
@@ -199,14 +211,21 @@ class _Judge:
     rows: NDArray[np.int64]
 
     def chips(self) -> Judged:
-        """Feed per tooth."""
+        """Feed per tooth; a chamfer mill that goes straight down drills."""
         rows = self.rows[self.cuts.speed[self.rows] > 0.0]
+        drills = np.full(len(rows), self.tool.named == "drill")
+        if self.tool.named == "chamfer":
+            drills = self._rise(rows) < -math.sqrt(0.5)
+        down = self._chips(rows[drills], DRILL_SHARE * self.tool.diameter / self.said.flutes,
+                           "a tenth of the diameter in a turn, is more than any drill bears")
+        aside = self._chips(rows[~drills], CHIP_SHARE * self.tool.diameter,
+                            "a fifth of the diameter, is more than any cutter bears")
+        return [*down[0], *aside[0]], [*down[1], *aside[1]]
+
+    def _chips(self, rows: NDArray[np.int64], bound: float, share: str) -> Judged:
+        """Feed per tooth of moves against a bound in mm and its words."""
         per_tooth = self.cuts.feed[rows] / (self.cuts.speed[rows] * self.said.flutes)
-        bound, wanted = CHIP_SHARE * self.tool.diameter, RECOMMENDED_TIMES * self.said.per_tooth
-        share = "a fifth of the diameter, is more than any cutter bears"
-        if self.tool.named == "drill":
-            bound, share = DRILL_SHARE * self.tool.diameter / self.said.flutes, \
-                "a tenth of the diameter in a turn, is more than any drill bears"
+        wanted = RECOMMENDED_TIMES * self.said.per_tooth
 
         def text(value: float, i: int) -> str:
             return (f"T{self.tool.number}: the feed per tooth is {value:.3f} mm at F{self.cuts.feed[rows[i]]:.6g} "
@@ -267,7 +286,7 @@ class _Judge:
         """Depth and width of cut, deflection of the tip and stress in the tool; k : its place among the tools."""
         cuts, tool, said = self.cuts, self.tool, self.said
         if tool.along_axis_only:
-            return [], []
+            return self._drilling()
         last, aside, depth, section = self._sections(k)
         _, cautions = self._over(last, section, math.inf, said.section, "depth_of_cut", lambda value, i:
                                  f"T{tool.number}: depth times width of its cut are {value:.1f} mm²", "",
@@ -305,7 +324,41 @@ class _Judge:
                             "", advice)
         _, bent = self._over(last, bend, math.inf, said.bend, "deflection", text, "", f"limit {said.bend:.3f} mm",
                              advice)
-        return [*findings, *([] if findings else far)], [*cautions, *bent]
+        turning = force * 0.5e-3 * np.array([effective_diameter(tool.diameter, tool.corner_radius, a)
+                                             for a in depth.tolist()])
+        power = cutting_powers(said.kc, said.mc, per_tooth[turns], depth, sure, cuts.middle[last] * aside[turns], tool)
+        heavy, weak = self._machine(last, turning, power, np.zeros(len(last)), cut)
+        over = findings or far
+        return [*(over or heavy)], [*cautions, *bent, *weak]
+
+    def _drilling(self) -> Judged:
+        """Torque, power and thrust of a drill."""
+        cuts, said = self.cuts, self.said
+        rows = self.rows[cuts.speed[self.rows] > 0.0]
+        if said.kc is None or said.mc is None or not len(rows):
+            return [], []
+        torque, thrust = np.array([drill_loads(said.kc, said.mc, a_turn, self.tool, said.flutes)
+                                   for a_turn in (cuts.feed[rows] / cuts.speed[rows]).tolist()]).T
+        return self._machine(rows, torque, torque * cuts.speed[rows] * math.pi / 30e3, thrust, lambda i: (
+            f"T{self.tool.number}: the drill at F{cuts.feed[rows[i]]:.6g} S{cuts.speed[rows[i]]:g}"))
+
+    def _machine(self, rows: NDArray[np.int64], torque: F64, power: F64, thrust: F64,
+                 cut: Callable[[int], str]) -> Judged:
+        """What cuts ask of a machine: torque in Nm, power in kW and thrust in N of each row."""
+        findings: list[Finding] = []
+        stated, cautions = self.said.power, list[ProgramCaution]()
+        bound = MOST_POWER if stated is None else min(POWER_TIMES * stated, MOST_POWER)
+        why = "more than any machine has" if stated is None else f"max_power_kw of the machine is {stated:g}"
+        for value, most, wanted, unit, text in (
+                (power, bound, math.inf if stated is None else stated, "kW", why),
+                (torque, MOST_TORQUE, math.inf, "Nm", "more than any spindle has"),
+                (thrust, MOST_THRUST, math.inf, "N", "more than any machine bears")):
+            found, told = self._over(rows, value, most, wanted, "power",
+                                     partial(lambda unit, value, i: f"{cut(i)} needs {value:.0f} {unit}", unit), text,
+                                     why, "cut in layers, narrower or slower")
+            findings.extend(found[:not findings])
+            cautions.extend(told)
+        return findings, cautions
 
     def _sections(self, k: int) -> tuple[NDArray[np.int64], F64, F64, F64]:
         """Cuts by windows of way: fastest move, its share square to the axis, depth in mm, depth times width in mm²."""

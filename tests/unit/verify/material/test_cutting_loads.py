@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.cutting_mechanics import bending_stress, compliance, cutting_force, cutting_forces
+from geometry.cutting_mechanics import bending_stress, compliance, cutting_force, cutting_forces, cutting_powers
 from geometry.tool_body import ToolBody
 from schemas.tools import Tool
 from service.cutting_data import MATERIALS, cutting_words
@@ -78,6 +78,44 @@ def test_a_drill_bears_a_tenth_of_its_diameter_in_a_turn(feed, harm):
     found, _ = judged(["S250 M3", "G0 X0 Y0", "Z2", f"G1 Z-3 F{feed}", "G0 Z2"], words, drill)
     assert [(f.line, f.limit) for f in found] == [(9, pytest.approx(0.2))] * harm
     assert not harm or "any drill bears" in found[0].message
+
+
+@pytest.mark.parametrize(("feed", "harm"), [(95, False), (105, True)])
+def test_a_chamfer_mill_that_goes_straight_down_is_judged_as_a_drill(feed, harm):
+    words = cutting_words(MATERIALS["C45"], Tool(id="T1", kind="chamfer", diameter_mm=4.0))
+    mill = replace(MILL, named="chamfer", tip_diameter=0.0, cone_height=2.0)
+    found, _ = judged(["S250 M3", "G0 X0 Y0", "Z2", f"G1 Z-1.5 F{feed}", "G0 Z2"], words, mill)
+    assert [(f.line, f.limit) for f in found] == [(9, pytest.approx(0.2))] * harm
+    assert judged(["S250 M3", "G0 X-26 Y12", "Z0", "G1 X26 F200"], words, mill)[0] == []
+
+
+LARGE = ToolBody("T1", 1, 16.0, 0.0, 30.0, 16.0, 30.0, 16.0, 32.0)
+TALL = replace(SETUP, margin=20.0, line_spacing=0.5)  # the blank goes up to Z20, X and Y 20 beyond the part
+
+
+@pytest.mark.parametrize(("power", "feed", "harm", "told"), [
+    (None, 1500, None, False), (20.0, 1500, None, False), (8.0, 1500, None, True), (5.0, 1500, 10.0, False)])
+def test_a_cut_that_needs_more_power_than_the_machine_has(power, feed, harm, told):
+    words = cutting_words(MATERIALS["C45"], Tool(id="T1", kind="flat", diameter_mm=16.0, flutes=4), power)
+    found, cautions = judged(["S3000 M3", "G0 Z60", "X-52 Y2", "Z12", f"G1 X52 F{feed}"], words, LARGE, TALL)
+    need = float(cutting_powers(WORDS.kc, WORDS.mc, np.array([feed / 12000.0]), np.array([8.0]), np.array([16.0]),
+                                np.array([float(feed)]), LARGE)[0])
+    assert 10.0 < need < 16.0 and ("power" in cautions) == told
+    assert [(f.limit, f.depth) for f in found] == ([] if harm is None else [(harm, pytest.approx(need, rel=0.1))])
+
+
+def test_no_machining_centre_has_the_power_torque_or_thrust():
+    """A mill as wide as long bends little, so that the machine gives way first."""
+    wide = replace(LARGE, diameter=40.0, neck_diameter=40.0, shank_diameter=40.0)
+    words = cutting_words(MATERIALS["C45"], Tool(id="T1", kind="flat", diameter_mm=40.0, flutes=6))
+    for speed, feed, unit in ((2000, 9000, "kW"), (100, 1600, "Nm"), (600, 300, "")):
+        found, _ = judged([f"S{speed} M3", "G0 Z60", "X-70 Y0", "Z5", f"G1 X70 F{feed}"], words, wide, TALL)
+        assert [f"{unit}; more than any" in f.message for f in found] == [True] * (unit != "")
+    drill = replace(wide, named="drill", cone_height=12.0)
+    words = cutting_words(MATERIALS["C45"], Tool(id="T1", kind="drill", diameter_mm=40.0, flutes=2))
+    for feed, harm in ((1150, True), (100, False)):
+        found, _ = judged(["S300 M3", "G0 Z60", "X0 Y0", "Z25", f"G1 Z5 F{feed}", "G0 Z25"], words, drill, TALL)
+        assert [" N; more than any machine bears" in f.message for f in found] == [True] * harm
 
 
 def test_the_speed_of_a_tap_is_bounded_as_that_of_a_mill():
