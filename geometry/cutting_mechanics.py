@@ -151,7 +151,7 @@ def cutting_powers(kc: float, mc: float, per_tooth: F64, depth: F64, width: F64,
     >>> mill = ToolBody("T1", 1, 50.0, 0.0, 45.0, 50.0, 45.0, 50.0, 60.0)
     >>> one = np.ones(1)
     >>> round(float(cutting_powers(2640.0, 0.24, one, 30.0 * one, 40.0 * one, 4000.0 * one, mill)[0]))
-    231
+    228
     """
     chip = _chips(per_tooth, depth, width, tool)[2]
     return np.asarray(depth * width * feed * kc * chip**(-mc) / 6e7)

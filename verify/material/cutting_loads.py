@@ -37,6 +37,9 @@ DRILL_SHARE = 0.1
 """Feed of a drill in a turn over its diameter that it does not bear. Tables have up to 0.04 [ProtoCutter2026]."""
 SPEED_TIMES = 30.0
 """Cutting speed over the recommended one that no cutter bears. High-speed cutting reaches 28 [Schulz1992]."""
+TAP_SPEEDS = 0.4, 1.0
+"""Cutting speed of a tap over that recommended for milling: a caution, and what no tap bears. Tables of taps have up to
+0.2 [Lavallee2026]; the fastest in aluminium found went at 180 m/min, 0.72 [Agapiou1994]."""
 RECOMMENDED_TIMES = 2.0
 """Chip and speed over the recommended ones that give a caution: the recommendations are deliberately low."""
 BEND_TIMES = 10.0
@@ -247,12 +250,16 @@ class _Judge:
                          for a in np.minimum(depth[rows], self.tool.corner_radius + 1.0).tolist()])
         speed = math.pi * wide * self.cuts.speed[rows] / 1000.0
         bound, wanted = SPEED_TIMES * self.said.speed, RECOMMENDED_TIMES * self.said.speed
+        kind, advised = "cutter", f"recommended are {self.said.speed:g} m/min"
+        if self.tool.named == "tap":
+            wanted, bound = (times * self.said.speed for times in TAP_SPEEDS)
+            kind, advised = "tap", f"taps go at {0.5 * wanted:.3g} m/min at most by usual tables"
 
         def text(value: float, i: int) -> str:
             return f"T{self.tool.number}: cuts at {value:.0f} m/min with S{self.cuts.speed[rows[i]]:g}"
         return self._over(rows, speed, bound, wanted, "cutting_speed", text,
-                          f"{bound:.0f} m/min is more than any cutter bears in this material",
-                          f"recommended are {self.said.speed:g} m/min", "turn slower", self.said.speed)
+                          f"{bound:.0f} m/min is more than any {kind} bears in this material", advised, "turn slower",
+                          0.5 * wanted)
 
     def threads(self) -> Iterator[Finding]:
         """Feed over speed of a tap: its pitch."""
