@@ -15,6 +15,8 @@ class AssumedKind(StrEnum):
     TRAVEL = "travel"
     MAX_RPM = "max_rpm"
     ROTARY_SENSE = "rotary_sense"
+    ROTARY_START = "rotary_start"
+    ROTARY_WAY = "rotary_way"
     TIP_CONTROL = "tip_control"
     LENGTH_AXIS = "length_axis"
     RADIUS_REGISTER = "radius_register"

@@ -5,7 +5,6 @@ Arrays are float64, lengths mm, points in the setup frame.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -16,13 +15,11 @@ from geometry.tool_body import ToolBody
 from verify.checks.clear_height import UP, Z_AXIS, _top_along, top_of_all
 from verify.checks.dogleg_turns import bounded
 from verify.checks.table_clearance import UPRIGHT, lowest_places
-from verify.gcode.dialects import LINUXCNC
 from verify.model import Finding, FindingKind, ProofSetup
 from verify.program.move_kinds import FEED
 from verify.program.program import Program
 
 MIN_BELOW = 0.01  # mm: tips less far below the part are not noted
-HALF_A_TURN = 180.0 + 1e-6  # deg, rounding included
 MIN_ANGLE = 1e-6  # deg: less beyond a limit is rounding
 RATE_ROUNDING = 1e-6  # share of a rate that is rounding: angles and minutes come from decimals
 
@@ -266,26 +263,9 @@ def notes_on(p: Program, bottom: float, setup: ProofSetup) -> Iterator[str]:
         m = int(np.argmin(p.end[:, 2]))
         yield (f"{p.name}, line {p.line[m]} goes to Z{p.end[m, 2]:.3f}, {bottom - p.end[m, 2]:.3f} mm below the "
                "part; the proof knows only fixtures of the setup there")
-    yield from _long_turns(p, setup)
     if joints_of(p, setup) is None:
         yield (f"{p.name} turns rotary axes and machine.pivots_mm is not given: travel and rates of the linear axes "
                "were not checked")
-
-
-def _long_turns(p: Program, setup: ProofSetup) -> Iterator[str]:
-    """Blocks that turn an axis by over half a turn, on controls that may count rotary axes from 0 to 360 deg."""
-    if p.poses is None or setup.kinematics is None or p.dialect == LINUXCNC or not len(p):
-        return
-    first = np.flatnonzero(np.r_[True, p.line[1:] != p.line[:-1]])
-    last = np.r_[first[1:], len(p)] - 1
-    turned = np.degrees(p.poses.end_turn[last] - p.poses.start_turn[first])
-    rows, axes = np.nonzero(np.abs(turned) > HALF_A_TURN)
-    if len(rows):
-        way = float(turned[rows[0], axes[0]])
-        more = f" (and {len(rows) - 1} more such blocks)" if len(rows) > 1 else ""
-        yield (f"{p.name}, line {p.line[first[rows[0]]]} turns {setup.kinematics.letters[axes[0]]} by {way:g} deg in "
-               f"this proof. A machine that counts the axis from 0 to 360 deg may turn it by "
-               f"{math.remainder(way, 360.0):g}, or by the sign of its word{more}")
 
 
 def _place(point: F64) -> str:

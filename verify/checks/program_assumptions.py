@@ -5,6 +5,7 @@ Arrays are float64, mm, frame of the program.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -17,10 +18,12 @@ from verify.assumptions import Assumed, AssumedKind
 from verify.checks.clear_height import top_of_all
 from verify.checks.machine_limits import joints_of, low_places
 from verify.checks.program_sequence import FramedProgram
-from verify.gcode.dialects import OWN_SPEED_RAPIDS
+from verify.gcode.dialects import LINUXCNC, OWN_SPEED_RAPIDS
 from verify.model import ProofSetup
 from verify.program.move_kinds import FEED
+from verify.program.program import Program
 
+HALF_A_TURN = 180.0 + 1e-6  # deg, rounding included
 STILL = 1e-9  # mm or rad: less is rounding
 FREE_PATH = Assumed(AssumedKind.PATH_MODE, "the written path",
                     "parameters of the control decide how far it rounds corners; the error bound leaves that out",
@@ -58,8 +61,29 @@ def program_assumptions(read: Sequence[FramedProgram], tools: Sequence[ToolBody]
                           "several axes takes another path", "state machine.rapid_motion")
     for r in read:
         yield from r.program.open
+        yield from long_turns(r.program, r.setup)
     if any(r.program.unbounded for r in read):
         yield FREE_PATH
+
+
+def long_turns(p: Program, setup: ProofSetup) -> Iterator[Assumed]:
+    """Absolute words that turn an axis by over half a turn, on controls that may count it from 0 to 360 deg.
+
+    Words that state the way themselves (increments, DC, ACP, ACN) leave nothing open.
+    """
+    if p.poses is None or setup.kinematics is None or p.dialect == LINUXCNC or not len(p):
+        return
+    first = np.flatnonzero(np.r_[True, p.line[1:] != p.line[:-1]])
+    last = np.r_[first[1:], len(p)] - 1
+    turned = np.degrees(p.poses.end_turn[last] - p.poses.start_turn[first])
+    rows, axes = np.nonzero((np.abs(turned) > HALF_A_TURN) & ~np.isin(p.line[first], sorted(p.ways_told))[:, None])
+    if len(rows):
+        way, letter = float(turned[rows[0], axes[0]]), setup.kinematics.letters[axes[0]]
+        more = f" (and {len(rows) - 1} more such blocks)" if len(rows) > 1 else ""
+        yield Assumed(AssumedKind.ROTARY_WAY, f"{p.name}, line {p.line[first[rows[0]]]} turns {letter} by {way:g} "
+                      f"deg{more}", f"a machine that counts the axis from 0 to 360 deg may turn it by "
+                      f"{math.remainder(way, 360.0):g}, or by the sign of its word, through part or fixture",
+                      "turn by 180 deg at most in a block, or state the way (DC, ACP, ACN, increments)")
 
 
 def _several_axes(r: FramedProgram, tools: Sequence[ToolBody]) -> NDArray[np.bool_]:
@@ -73,4 +97,4 @@ def _several_axes(r: FramedProgram, tools: Sequence[ToolBody]) -> NDArray[np.boo
     return np.asarray((p.kind != FEED) & (several > 1) & (low_places(p, tools, r.setup) < clear))
 
 
-__all__ = ["FREE_PATH", "program_assumptions", "rapids_decided"]
+__all__ = ["FREE_PATH", "long_turns", "program_assumptions", "rapids_decided"]

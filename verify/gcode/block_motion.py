@@ -136,7 +136,7 @@ class BlockMotion(FrameWords):
         """G28 and G30: pass a programmed point, then the axes named (all if none is) go home; rotary home is 0."""
         self._settled("G28 or G30")
         named = [a is not None for a in axes]
-        self.stated_axes.update(letter for letter in self.rotary if letter in values or not (any(named) or turn))
+        self._told(letter for letter in self.rotary if letter in values or not (any(named) or turn))
         if not any(named) and turn is None:
             return self._away([True] * 3, [0.0, 0.0] if self.rotary else None)
         self._line_to(self._target(axes), RAPID, NAN, turn)

@@ -9,10 +9,11 @@ pieces (``verify.program.turn_subdivision``).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from verify.assumptions import Assumed, AssumedKind
 from verify.kinematics import Kinematics
 from verify.program.move_kinds import FEED, RAPID
 from verify.program.move_log import Log
@@ -29,7 +30,7 @@ class Rotary:
 
     machine : rotary axes of the machine, or None
     gauge   : mm by T number, spindle face to tip
-    stated_axes : letters of the rotary axes whose angle the program has stated
+    stated_axes : by letter of the rotary axes whose angle the program has stated, the number of moves before
     tip_told : whether a word says if the tip is controlled; by_axes : first line that moves turned axes before one does
     """
 
@@ -37,7 +38,7 @@ class Rotary:
         self.log, self.machine, self.gauge = log, machine, gauge
         self.rotary = machine.letters if machine else ""
         self.s = State()
-        self.stated_axes: set[str] = set()
+        self.stated_axes: dict[str, int] = {}
         self.tip_told = False
         self.by_axes = 0
 
@@ -47,10 +48,35 @@ class Rotary:
         if not any(named):
             return None
         relative = self.s.relative and not absolute
-        if not relative:
-            self.stated_axes.update(letter for letter in self.rotary if letter in values)
+        if relative:
+            self.log.ways_told.add(self.log.line)
+        else:
+            self._told(letter for letter in self.rotary if letter in values)
         return [t if not n else values[letter] + (t if relative else 0.0)
                 for letter, n, t in zip(self.rotary, named, self.s.turn, strict=True)]
+
+    def _told(self, letters: Iterable[str]) -> None:
+        """The program states where these axes stand."""
+        for letter in letters:
+            self.stated_axes.setdefault(letter, self.log.count)
+
+    def _untold(self, first: int) -> tuple[Assumed, ...]:
+        """What the program takes for granted of axes that it does not state before its ``first`` feed move, a row.
+
+        An axis that it then leaves elsewhere stands there when it runs again: a remark.
+        """
+        untold = [(letter, math.remainder(turn, 360.0)) for letter, turn in zip(self.rotary, self.s.turn, strict=False)
+                  if self.stated_axes.get(letter, first + 1) > first]
+        left = [f"{letter}{turn:g}" for letter, turn in untold if abs(turn) > _STILL]
+        if left:
+            letters = ", ".join(letter for letter, _ in untold)
+            self.log.remark("rotary_left", f"the program does not state {letters} before its first cut and ends at "
+                            f"{', '.join(left)}: the next run begins there; turn the axes before the first cut")
+        if not untold:
+            return ()
+        return (Assumed(AssumedKind.ROTARY_START, ", ".join(f"{letter}0" for letter, _ in untold),
+                        "where an axis stands elsewhere, the program cuts a part that is turned",
+                        "turn the rotary axes before the first cut"),)
 
     def _stand(self, turn: list[float]) -> None:
         """Put the axes at ``turn`` without simulating the turn."""
@@ -159,7 +185,7 @@ class Rotary:
         s = self.s
         start, s.position = s.position, [p if w is None else float(w) for p, w in zip(s.position, place, strict=True)]
         turn = [t if w is None else float(w) for t, w in zip(s.turn, turns, strict=True)]
-        self.stated_axes.update(letter for letter, w in zip(self.rotary, turns, strict=True) if w is not None)
+        self._told(letter for letter, w in zip(self.rotary, turns, strict=True) if w is not None)
         if s.motion == 0:
             self._write(start, s.position, RAPID, NAN, 0, turn, NAN)
         else:

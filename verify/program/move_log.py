@@ -30,7 +30,7 @@ class Log:
     path_stated : number of moves before the first word of a path mode (G61, G64), None without one
     functions : first line of each M word that counts as a function of the machine
     speeds, unknown, stops, blend, leaves, changes, unbounded, pauses, places, dwells, swaps, unplaced,
-    by_joints, lifts, kept_on : as in ``Program``
+    by_joints, lifts, kept_on, ways_told : as in ``Program``
     taps : move that begins a tapping cycle, and whether the spindle turns back on the way out
     rows : latest moves as (start x, y, z, end x, y, z, kind, feed, tool, line), mm and mm/min; call ``flush`` at 65 536
     """
@@ -46,6 +46,7 @@ class Log:
         self.functions: dict[int, int] = {}
         self._remarks: dict[tuple[str, object], Remark] = {}
         self._count: dict[str, int] = {}
+        self.ways_told: set[int] = set()
         self._chunks: list[F64] = []
         self._moves = 0
         self._feeds = False

@@ -155,6 +155,7 @@ class Program:
     lifts   : rows of no length that stand for a way home in Z from a known place: row, and whether it goes along the
               tool, not along Z of the machine
     kept_on : lines that turn tool centre point control on by G43.4 while it is on
+    ways_told : lines whose rotary words state the way, not only the angle
     taps    : lines of tapping cycles and moves, and whether the spindle turns the other way on the way out
     unbounded : whether, somewhere, no word bounds the deviation from the path: ``leaves`` does not hold there
     pauses  : in order
@@ -198,6 +199,7 @@ class Program:
     lifts: tuple[tuple[int, bool], ...] = ()
     kept_on: tuple[int, ...] = ()
     taps: Mapping[int, bool] = field(default_factory=dict)
+    ways_told: frozenset[int] = frozenset()
 
     def __len__(self) -> int:
         return len(self.start)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from verify.checks.machine_limits import limit_findings, notes_on
+from verify.checks.program_assumptions import long_turns
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
 from verify.model import FindingKind, ProofSetup
@@ -59,18 +60,31 @@ def test_without_pivots_it_is_said_that_joints_were_not_checked():
     assert not [n for n in found("G0 Z100\nA90\n")[1] if "pivots" in n]
 
 
-def test_of_more_than_half_a_turn_it_is_said_that_the_way_is_the_machines():
-    """From C350 to C10 the proof turns back by 340 deg; a table that rolls over goes 20 on."""
-    def notes(dialect, *lines):
-        body = "\n".join(["G0 A0. C0.", "G0 X0. Y0.", "G0 G43.4 Z50. H1", "G1 X5. C175. F100.", "C350.", *lines])
-        head = "%\nO1\nG21\nG17 G90 G94 G40 G80\nG54\nT1 M6\nS1000 M3\n"
-        text = head.replace("O1\n", "" if dialect == "linuxcnc" else "O1\n") + body + "\nG91 G28 Z0.\nM30\n%\n"
-        p = read_program(text, kinematics=MACHINE, dialect=dialect, gauge_length={1: 80.0})
-        setup = ProofSetup(kinematics=MACHINE, gauge_length={1: 80.0})
-        return [n for n in notes_on(p, -100.0, setup) if "turns C" in n]
+def turned(dialect, *lines):
+    """Which turns of a program from C350 on are taken for granted."""
+    head = {"siemens": "G710 G17 G90 G94\nT1 D1\nM6\nS1000 M3\nTRAORI\nG54\n",
+            "linuxcnc": "%\nG21\nG17 G90 G94 G40 G80\nG54\nT1 M6\nS1000 M3\n"}.get(
+                dialect, "%\nO1\nG21\nG17 G90 G94 G40 G80\nG54\nT1 M6\nS1000 M3\n")
+    body = ["G0 A0. C0.", "G0 X0. Y0.", "G0 Z50." if dialect == "siemens" else "G0 G43.4 Z50. H1",
+            "G1 X5. C175. F100.", "C350.", *lines]
+    p = read_program(head + "\n".join(body) + ("\nM30\n" if dialect == "siemens" else "\nG91 G28 Z0.\nM30\n%\n"),
+                     kinematics=MACHINE, dialect=dialect, gauge_length={1: 80.0})
+    taken = list(long_turns(p, ProofSetup(kinematics=MACHINE, gauge_length={1: 80.0})))
+    assert all(a.what == "rotary_way" for a in taken)
+    return [(a.value, a.effect) for a in taken]
 
-    (note,) = notes("fanuc", "X10. C10.")
-    assert "line 13 turns C by -340 deg" in note and "may turn it by 20," in note
-    (note,) = notes("haas", "X10. C10.", "G0 C200.", "C-5.")
-    assert "(and 2 more such blocks)" in note
-    assert notes("fanuc", "X10. C365.", "C545.") == [] == notes("linuxcnc", "X10. C10.")
+
+def test_the_way_of_more_than_half_a_turn_is_taken_for_granted():
+    """From C350 to C10 the proof turns back by 340 deg; a table that rolls over goes 20 on."""
+    ((value, effect),) = turned("fanuc", "X10. C10.")
+    assert "line 13 turns C by -340 deg" in value and "may turn it by 20," in effect
+    ((value, _),) = turned("haas", "X10. C10.", "G0 C200.", "C-5.")
+    assert "(and 2 more such blocks)" in value
+    assert turned("fanuc", "X10. C365.", "C545.") == [] == turned("linuxcnc", "X10. C10.")
+
+
+@pytest.mark.parametrize(("word", "told"), [("C=DC(10)", False), ("C=ACN(10)", False), ("C=IC(-340)", False),
+                                            ("C10", True), ("C=AC(10)", True)])
+def test_words_that_state_the_way_leave_nothing_open(word, told):
+    assert len(turned("siemens", f"X10 {word}")) == told
+    assert turned("fanuc", "G91 C-340.", "G90") == []

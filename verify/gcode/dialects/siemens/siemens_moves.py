@@ -208,6 +208,8 @@ class SiemensMoves(SiemensCorners):
                 raise BlockError(f"{letter}={kind}( ) is for rotary axes")
             return number
         now = self.machine.s.turn[self.machine.rotary.index(letter)]
+        if kind != "AC":
+            self.machine.log.ways_told.add(self.machine.log.line)
         if kind == "AC":
             found = number
         elif kind == "IC":
