@@ -312,6 +312,11 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
         raise VerificationError(f"no reader knows the dialect '{dialect}'", code="unknown_dialect", measured=dialect,
                                 limit=sorted(DIALECTS), remedy=f"name one of {', '.join(sorted(DIALECTS))}")
     text = cleaned(text)
+    if "\r" in text:
+        lone = text.count("\n", 0, text.index("\r")) + 1
+        raise ProgramError(f"{name}, line {lone} holds a carriage return (CR) without a line feed (LF): controls "
+                           "differ in whether a line ends there", subjects=(f"line {lone}",),
+                           remedy="end every line by LF, or by CR and LF")
     if _BINARY.search(text):
         raise ProgramError(f"{name} is not a text file", remedy="send the NC program as text")
     if spindle_tool and tools is not None and spindle_tool not in tools:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.errors import CamError
+from geometry.errors import CamError, ProgramError
 from geometry.sampling import sample_surface
 from tests.pocket_case import SETUP, TOOL, ZONES, block, program
 from tests.pocket_case import text as joined
@@ -256,6 +256,15 @@ def test_any_words_give_a_program_or_an_error_with_a_line():
 
 def test_file_without_percent_and_windows_lines():
     assert len(read_program("G21 G90\r\nT1 M6\r\nG43 H1\r\nM3 S9\r\nG0 X0 Y0 Z5\r\nG1 X1 F9\r\nX2\r\nM2\r\n")) == 3
+
+
+def test_a_carriage_return_within_a_line_is_refused():
+    """LinuxCNC takes all up to the line feed for the comment: G0 Z15 does not run."""
+    text = "G21 G90\nT1 M6\nG43 H1\nM3 S9\nG0 X0 Y0 Z5\n; up\rG0 Z15\nG1 X1 F9\nM2\n"
+    with pytest.raises(ProgramError, match="line 6 holds a carriage return"):
+        read_program(text)
+    assert len(read_program(text.replace("; up\r", "").replace("\n", "\r"))) == 3
+    assert len(read_program(text.replace("; up\r", "").replace("\n", "\r\r\n") + "\r")) == 3
 
 
 def test_speed_of_plain_lines():
