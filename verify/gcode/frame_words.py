@@ -107,8 +107,16 @@ class FrameWords(ContourMotion):
             if not named:
                 raise BlockError("G51.1 needs X, Y or Z")
             self.mirrors.update(named)
+        elif self.mirrors and not named:
+            raise BlockError("G50.1 without axes: manuals end a mirror by its axes only", "name the axes: G50.1 X0 Y0")
         else:
-            self.mirrors = {k: at for k, at in self.mirrors.items() if named and k not in named}
+            self.mirrors = {k: at for k, at in self.mirrors.items() if k not in named}
+
+    def _select_zero(self, name: str) -> None:
+        if self.s.frame is not None and self._foreign:
+            raise BlockError(f"{name} while the coordinates are rotated, scaled or mirrored, which Fanuc forbids",
+                             "end the rotation, scale or mirror before it")
+        super()._select_zero(name)
 
     def _centre(self, axes: Axes, word: str) -> list[float]:
         """(3,) mm, programmed coordinates: those named, those of the tool elsewhere."""

@@ -106,6 +106,13 @@ def test_an_empty_spindle_has_a_nose():
     assert not [f for f in slim.findings if f.kind == "collision"]
 
 
+def test_a_program_that_feeds_without_a_tool_has_no_nose():
+    """It has a finding for it, and the moves that would sweep a spindle through the part are not followed."""
+    found = proved("G53 G0 Z0", "T0 M6", "S1000 M3", "G0 X60 Y0", "G0 Z-5", "G1 X45 F100", "G53 G0 Z0", "T1 M6")
+    assert any("without a tool in the spindle" in f.message for f in found.findings)
+    assert not [f for f in found.findings if "spindle nose" in f.message]
+
+
 def test_a_stated_nose_stands_above_the_holder():
     setup = ProofSetup(nose_diameter=SMALLEST_NOSE, gauge_length={1: 80.0})
     z0, z1, r0, r1, clearance, _ = Bodies.of([SHORT_TOOL], setup).rows[-1]

@@ -32,10 +32,11 @@ def ends(body, dialect="fanuc", feeds=True, **options):
     ("G51 X10. Y0. Z0. P2.\nG1 X15. Y5. Z1. F100.\nG50\nX0.\n", [[20, 10, 2], [0, 10, 2]]),
     ("G51 X0. Y0. Z0. I2. J3. K1.\nG1 X1. Y1. F100.\nG50\n", [[2, 3, 10]]),
     ("G51.1 X10.\nG1 X3. Y4. F100.\nG50.1 X0.\nX3.\n", [[17, 4, 10], [3, 4, 10]]),
-    ("G51.1 X0. Y0.\nG1 X3. Y4. F100.\nG50.1 X0.\nX3. Y4.\nG50.1\nX1. Y1.\n", [[-3, -4, 10], [3, -4, 10], [1, 1, 10]]),
+    ("G51.1 X0. Y0.\nG1 X3. Y4. F100.\nG50.1 X0.\nX3. Y4.\nG50.1 X0. Y0.\nX1. Y1.\n",
+     [[-3, -4, 10], [3, -4, 10], [1, 1, 10]]),
     # scale before rotation: (1, 2) -> (2, 4) -> (-4, 2); mirror before scale: (1, 2) -> (-1, 2) -> (-2, 4)
     ("G51 X0. Y0. Z0. P2.\nG68 X0. Y0. R90.\nG1 X1. Y2. Z5. F100.\nG69\nG50\n", [[-4, 2, 10]]),
-    ("G51.1 X0.\nG51 X0. Y0. Z0. P2.\nG1 X1. Y2. Z5. F100.\nG50\nG50.1\n", [[-2, 4, 10]]),
+    ("G51.1 X0.\nG51 X0. Y0. Z0. P2.\nG1 X1. Y2. Z5. F100.\nG50\nG50.1 X0.\n", [[-2, 4, 10]]),
     ("G52 X100. Y0.\nG68 X10. Y10. R90.\nG1 X20. Y10. F100.\nG69\nG52 X0. Y0.\n", [[110, 20, 10]]),
     ("G16\nG1 X10. Y90. F100.\nX10. Y0.\nG15\nX3. Y3.\n", [[0, 10, 10], [10, 0, 10], [3, 3, 10]])])
 def test_coordinates_turned_scaled_and_mirrored(body, expected):
@@ -44,9 +45,11 @@ def test_coordinates_turned_scaled_and_mirrored(body, expected):
 
 @pytest.mark.parametrize("words", [
     "G51.1 X0.\nG68 X0. Y0. R30.\n", "G68 X0. Y0. R30.\nG51.1 X0.\n", "G51 X0. Y0. Z0. P2.\nG51.1 X0.\n",
-    "G51.1 X0.\nG68 X0. Y0. R30.\nG50.1\n", "G51 X0. Y0. Z0. I2. J2. K1.\nG68 X10. Y0. R90.\n"])
+    "G51.1 X0.\nG68 X0. Y0. R30.\nG50.1\n", "G51.1 X0.\nG1 X3. Y4. F100.\nG50.1\nX3.\n",
+    "G51.1 X0.\nG1 X3. Y4. F100.\nG54\nX3.\n", "G68 X0. Y0. R30.\nG55\nG1 X3. Y4. F100.\n",
+    "G51 X0. Y0. Z0. I2. J2. K1.\nG68 X10. Y0. R90.\n"])
 def test_orders_of_turns_scales_and_mirrors_that_controls_read_differently_are_refused(words):
-    with pytest.raises(ProgramError, match="while a rotation|in a mirror|in a scale"):
+    with pytest.raises(ProgramError, match="while a rotation|in a mirror|in a scale|without axes|while the coord"):
         read(f"G1 X1. Y1. F100.\n{words}G1 X1. Y2.\n")
 
 
@@ -56,7 +59,7 @@ def test_mirrors_of_haas():
 
 def test_arcs_turn_the_other_way_in_a_mirror():
     """A quarter counterclockwise about the zero from (5, 0) is, mirrored at X0, clockwise from (-5, 0)."""
-    p = read("G51.1 X0.\nG1 X5. Y0. F100.\nG3 X0. Y5. I-5.\nG50.1\n")
+    p = read("G51.1 X0.\nG1 X5. Y0. F100.\nG3 X0. Y5. I-5.\nG50.1 X0.\n")
     arc = p.end[p.line == 10]
     np.testing.assert_allclose(np.hypot(arc[:, 0], arc[:, 1]), 5, atol=1e-9)
     np.testing.assert_allclose(arc[-1], [0, 5, 10], atol=1e-9)
@@ -64,7 +67,7 @@ def test_arcs_turn_the_other_way_in_a_mirror():
 
 
 def test_compensation_changes_its_side_in_a_mirror():
-    body = "G51.1 X0.\nG41 D1 G1 X5. Y0. F100.\nX20.\nG40 X30. Y10.\nG50.1\n"
+    body = "G51.1 X0.\nG41 D1 G1 X5. Y0. F100.\nX20.\nG40 X30. Y10.\nG50.1 X0.\n"
     np.testing.assert_allclose(ends(body, radii={1: 2.0}), [[-5, 2, 10], [-20, 2, 10], [-30, 10, 10]], atol=1e-9)
     turned = "G68 X0. Y0. R90.\nG41 D1 G1 X5. Y0. F100.\nX20.\nG40 X30. Y10.\nG69\n"
     np.testing.assert_allclose(ends(turned, radii={1: 2.0}), [[-2, 5, 10], [-2, 20, 10], [-10, 30, 10]], atol=1e-9)
