@@ -21,7 +21,7 @@ from verify.assumptions import Assumed, AssumedKind, in_order
 from verify.checks.body_assumptions import body_assumptions
 from verify.checks.changed_tools import as_collisions
 from verify.checks.empty_spindle import with_nose
-from verify.checks.program_assumptions import program_assumptions, rapids_decided
+from verify.checks.program_assumptions import program_assumptions, rapids_decided, untold_axes
 from verify.checks.program_sequence import (
     FramedProgram,
     Given,
@@ -159,8 +159,9 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                        unseen_cores(used, setup, met.spacing, met.upright))
     dug = dug[~np.isin(dug[:, 0], run.events[run.events[:, 1] == PLUNGE, 0])]
     met_by = contact_findings(np.concatenate([run.events, dug]), moves, source, skins, tools, setup.tap_holes)
+    turned, starts = untold_axes(framed, known, run.cut)
     findings = [*as_collisions(met_by, [p.program for p in framed]),
-                *cuts.gouges, *cuts.excluded, *loaded, *drills.findings, *_program_findings(framed),
+                *cuts.gouges, *cuts.excluded, *loaded, *drills.findings, *turned, *_program_findings(framed),
                 *(f for p in framed for f in p.findings(tools)), *_unlisted(run.lost, framed),
                 *(f for p in framed for f in table_findings([p.program], tools, p.setup)),
                 *_idle_findings(framed, run, moves, source, [t for t in fine if t.cone_height <= 0.0], asked),
@@ -186,7 +187,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                     f"one by {met.dip:.3f} mm unseen", "give smaller boxes where tools go")] * (met.dip > DIP + 1e-9)
     tapping = {tools[k].number for k in np.unique(moves.tool[run.cut])}
     taken = [*setup.assumed, *program_assumptions(framed, tools, setup, stated), *cuts.assumed, *dips, *drills.assumed,
-             *(a for number, a in threads_taken.items() if number in tapping),
+             *starts, *(a for number, a in threads_taken.items() if number in tapping),
              *body_assumptions(framed, part, moves, source, tools, setup, threads)]
     stages.tell(1.0)
     proof = _proof(findings, cuts, run, framed, known, took, moves, source, setup, scored, zone_ids,

@@ -19,7 +19,7 @@ from verify.checks.clear_height import top_of_all
 from verify.checks.machine_limits import joints_of, low_places
 from verify.checks.program_sequence import FramedProgram
 from verify.gcode.dialects import LINUXCNC, OWN_SPEED_RAPIDS
-from verify.model import ProofSetup
+from verify.model import Finding, FindingKind, ProofSetup
 from verify.program.move_kinds import FEED
 from verify.program.program import Program
 
@@ -66,6 +66,35 @@ def program_assumptions(read: Sequence[FramedProgram], tools: Sequence[ToolBody]
         yield FREE_PATH
 
 
+def untold_axes(read: Sequence[FramedProgram], known: NDArray[np.bool_],
+                cut: NDArray[np.bool_]) -> tuple[list[Finding], list[Assumed]]:
+    """Rotary axes whose angle a program does not state before its first cut.
+
+    known : (n,) bool, which moves of the programs the proof counts; cut : (m,) bool, which of these remove stock
+
+    Where the program leaves such an axis off 0, the next run begins there: a finding. Else 0 is taken for granted.
+    """
+    found, taken, cuts = [], [], np.zeros(len(known), np.bool_)
+    cuts[np.flatnonzero(known)[cut]] = True
+    begun = 0
+    for p in (r.program for r in read):
+        own = cuts[begun:begun + len(p)]
+        begun += len(p)
+        untold = [s for s in p.starts if own.any() and s.moves > int(np.argmax(own))]
+        if not untold:
+            continue
+        letters = ", ".join(s.letter for s in untold)
+        left = [f"{s.letter}{s.end:g}" for s in untold if abs(math.remainder(s.end, 360.0)) > STILL]
+        if left:
+            found.append(Finding(FindingKind.PROGRAM, p.name, int(p.line[-1]), None, None, None, 0.0, 0.0, (
+                f"the program does not state {letters} before its first cut and ends at {', '.join(left)}: the next "
+                "run begins there; turn the axes before the first cut")))
+        taken.append(Assumed(AssumedKind.ROTARY_START, ", ".join(f"{s.letter}0" for s in untold),
+                             "where an axis stands elsewhere, the program cuts a part that is turned",
+                             "turn the rotary axes before the first cut"))
+    return found, taken
+
+
 def long_turns(p: Program, setup: ProofSetup) -> Iterator[Assumed]:
     """Absolute words that turn an axis by over half a turn, on controls that may count it from 0 to 360 deg.
 
@@ -97,4 +126,4 @@ def _several_axes(r: FramedProgram, tools: Sequence[ToolBody]) -> NDArray[np.boo
     return np.asarray((p.kind != FEED) & (several > 1) & (low_places(p, tools, r.setup) < clear))
 
 
-__all__ = ["FREE_PATH", "long_turns", "program_assumptions", "rapids_decided"]
+__all__ = ["FREE_PATH", "long_turns", "program_assumptions", "rapids_decided", "untold_axes"]

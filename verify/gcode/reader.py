@@ -80,8 +80,6 @@ class Reader(BlockMotion):
             log.notes.append(functions_note(log.functions))
         table = log.table()
         self._path_mode(table)
-        feeds = np.flatnonzero(table[:, 6] == FEED)
-        untold = self._untold(int(feeds[0])) if len(feeds) else ()
         speed, coolant = log.states()
         start, end, feed = (np.ascontiguousarray(table[:, k]) for k in (slice(0, 3), slice(3, 6), 7))
         return Program(log.name, start, end, table[:, 6].astype(np.int8), feed, table[:, 8].astype(np.int32),
@@ -90,7 +88,7 @@ class Reader(BlockMotion):
                        log.turned.minutes(np.linalg.norm(end - start, axis=1), feed),
                        log.turned.poses(len(table), self.machine), tuple(log.notes), speed, coolant, log.changes,
                        dialect, log.unbounded, tuple(log.pauses), log.leaves, tuple(log.places), cut_off,
-                       open=(*untold, *self._left_open()), cools=log.cools, dwells=tuple(log.dwells),
+                       open=self._left_open(), starts=self._starts(), cools=log.cools, dwells=tuple(log.dwells),
                        swaps=tuple(log.swaps), unplaced=tuple(log.unplaced), by_joints=frozenset(log.by_joints),
                        lifts=tuple(log.lifts), kept_on=tuple(log.kept_on), ways_told=frozenset(log.ways_told),
                        taps={int(table[row, 9]): out for row, out in log.taps if row < len(table)},

@@ -13,11 +13,10 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from verify.assumptions import Assumed, AssumedKind
 from verify.kinematics import Kinematics
 from verify.program.move_kinds import FEED, RAPID
 from verify.program.move_log import Log
-from verify.program.program import NAN, State
+from verify.program.program import NAN, RotaryStart, State
 from verify.program.turn_subdivision import axis_pieces, tip_pieces
 
 TURNED = 8
@@ -60,23 +59,10 @@ class Rotary:
         for letter in letters:
             self.stated_axes.setdefault(letter, self.log.count)
 
-    def _untold(self, first: int) -> tuple[Assumed, ...]:
-        """What the program takes for granted of axes that it does not state before its ``first`` feed move, a row.
-
-        An axis that it then leaves elsewhere stands there when it runs again: a remark.
-        """
-        untold = [(letter, math.remainder(turn, 360.0)) for letter, turn in zip(self.rotary, self.s.turn, strict=False)
-                  if self.stated_axes.get(letter, first + 1) > first]
-        left = [f"{letter}{turn:g}" for letter, turn in untold if abs(turn) > _STILL]
-        if left:
-            letters = ", ".join(letter for letter, _ in untold)
-            self.log.remark("rotary_left", f"the program does not state {letters} before its first cut and ends at "
-                            f"{', '.join(left)}: the next run begins there; turn the axes before the first cut")
-        if not untold:
-            return ()
-        return (Assumed(AssumedKind.ROTARY_START, ", ".join(f"{letter}0" for letter, _ in untold),
-                        "where an axis stands elsewhere, the program cuts a part that is turned",
-                        "turn the rotary axes before the first cut"),)
+    def _starts(self) -> tuple[RotaryStart, ...]:
+        """From which move on the angle of each rotary axis is stated, and where it ends."""
+        return tuple(RotaryStart(letter, self.stated_axes.get(letter, self.log.count), turn)
+                     for letter, turn in zip(self.rotary, self.s.turn, strict=False))
 
     def _stand(self, turn: list[float]) -> None:
         """Put the axes at ``turn`` without simulating the turn."""

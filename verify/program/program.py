@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,6 +116,17 @@ class Poses:
     end_turn: F64
 
 
+class RotaryStart(NamedTuple):
+    """A rotary axis: the number of moves before the program states its angle, and the angle at its end, deg.
+
+    An axis that is never stated has the number of all moves.
+    """
+
+    letter: str
+    moves: int
+    end: float
+
+
 @dataclass(frozen=True, eq=False)
 class Program:
     """A program as straight moves of the tool tip in the setup frame.
@@ -155,6 +166,7 @@ class Program:
     lifts   : rows of no length that stand for a way home in Z from a known place: row, and whether it goes along the
               tool, not along Z of the machine
     kept_on : lines that turn tool centre point control on by G43.4 while it is on
+    starts  : of the rotary axes
     ways_told : lines whose rotary words state the way, not only the angle
     taps    : lines of tapping cycles and moves, and whether the spindle turns the other way on the way out
     unbounded : whether, somewhere, no word bounds the deviation from the path: ``leaves`` does not hold there
@@ -200,6 +212,7 @@ class Program:
     kept_on: tuple[int, ...] = ()
     taps: Mapping[int, bool] = field(default_factory=dict)
     ways_told: frozenset[int] = frozenset()
+    starts: tuple[RotaryStart, ...] = ()
 
     def __len__(self) -> int:
         return len(self.start)

@@ -7,7 +7,7 @@ import pytest
 
 from tests.pocket_case import SETUP, TOOL
 from verify.assumptions import AssumedKind
-from verify.checks.program_assumptions import program_assumptions, rapids_decided
+from verify.checks.program_assumptions import program_assumptions, rapids_decided, untold_axes
 from verify.checks.program_sequence import FramedProgram
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
@@ -61,3 +61,18 @@ def test_a_path_mode_that_parameters_decide_is_told():
 def test_words_that_a_control_may_drop_are_told():
     told = taken(framed(HEAD.replace("S900 M3", "S900 M3 M8") + CUT, "fanuc"))[1]
     assert told[AssumedKind.COOLANT] == "M3 and M8 in one block both count"
+
+
+@pytest.mark.parametrize(("first", "last", "left", "taken"), [
+    ("G0 A0 C0", "G0 A30", False, []), ("G0 C0", "G0 A30", True, ["A0"]), ("G0 X1", "G0 A30 C90", True, ["A0, C0"]),
+    ("G0 X1", "G0 A30 C90\nA0 C0", False, ["A0, C0"]), ("G0 X1", "G0 C360", False, ["A0, C0"]),
+    ("G28", "G0 A30", False, []), ("G1 X1 F900\nG0 A0 C0", "G0 A30", False, [])])
+def test_axes_that_are_not_stated_before_the_first_cut(first, last, left, taken):
+    """The next run begins where this one leaves them. A feed move in air is no cut."""
+    text = f"T1 M6\nS1000 M3\nG43 H1\nG61\nM428\n{first}\nG0 X0 Y0 Z50\nG1 X5 F100\n{last}\n"
+    read = framed(text, kinematics=Kinematics("table-table-AC"))
+    p = read[0].program
+    found, told = untold_axes(read, np.ones(len(p), bool), p.feed == 100.0)
+    assert [f.message[:27] for f in found] == ["the program does not state "] * left
+    assert [a.value for a in told] == taken
+    assert untold_axes(read, np.ones(len(p), bool), np.zeros(len(p), bool)) == ([], [])

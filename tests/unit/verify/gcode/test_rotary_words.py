@@ -211,18 +211,6 @@ def test_what_is_taken_for_granted():
         read_program(text, spindle_tool=9, tools={1})
 
 
-@pytest.mark.parametrize(("first", "last", "left", "taken"), [
-    ("G0 A0 C0", "G0 A30", False, []), ("G0 C0", "G0 A30", True, ["A0"]), ("G0 X1", "G0 A30 C90", True, ["A0, C0"]),
-    ("G0 X1", "G0 A30 C90\nA0 C0", False, ["A0, C0"]), ("G0 X1", "G0 C360", False, ["A0, C0"]),
-    ("G28", "G0 A30", False, [])])
-def test_axes_that_are_not_stated_before_the_first_cut(first, last, left, taken):
-    """The next run begins where this one leaves them."""
-    body = f"M428\n{first}\nG0 X0 Y0 Z50\nG1 X5 F100\n{last}\n"
-    p = read_program(f"T1 M6\nS1000 M3\nG43 H1\nG61\n{body}M30\n", kinematics=Kinematics("table-table-AC"))
-    assert [r.message[:27] for r in p.remarks if "next run" in r.message] == ["the program does not state "] * left
-    assert [a.value for a in p.open if a.what == "rotary_start"] == taken
-
-
 def test_plain_lines_under_centre_point_control_keep_their_pose():
     p = read("M428\nG0 A20 C5\nG1 F100\n" + "".join(f"X{k}\n" for k in range(1, 9)))
     rows = np.flatnonzero(p.line > 11)
