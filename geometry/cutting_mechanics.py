@@ -45,6 +45,17 @@ def compliance(tool: ToolBody, modulus: float = CARBIDE) -> float:
     return total
 
 
+def buckling(tool: ToolBody) -> float:
+    """Thrust at which a tool held at the nose of its holder buckles while its tip is guided, N [Timoshenko1955].
+
+    20.19 E I / L^2 of a bar fixed at one end and hinged at the other; E I / L^2 is L over three times the compliance.
+
+    >>> round(buckling(ToolBody("T1", 1, 1.0, 0.0, 60.0, 1.0, 60.0, 1.0, 60.0)), 1)
+    67.6
+    """
+    return 20.19 * tool.stickout / (3.0 * compliance(tool))
+
+
 def strength(diameter: float) -> float:
     """Bending stress at which a round bar of cemented carbide breaks, N/mm2: larger bars have larger flaws.
 
@@ -180,5 +191,5 @@ def _chips(per_tooth: F64, depth: F64, width: F64, tool: ToolBody) -> tuple[F64,
     return edge, phi, per_tooth * depth / edge * (1.0 - np.cos(phi)) / phi
 
 
-__all__ = ["CARBIDE", "CORE", "bending_stress", "compliance", "cutting_force", "cutting_forces", "cutting_powers",
-           "drill_loads", "effective_diameter", "engaged_angle", "strength"]
+__all__ = ["CARBIDE", "CORE", "bending_stress", "buckling", "compliance", "cutting_force", "cutting_forces",
+           "cutting_powers", "drill_loads", "effective_diameter", "engaged_angle", "strength"]

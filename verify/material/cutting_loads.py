@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from geometry.cutting_mechanics import (
     bending_stress,
+    buckling,
     compliance,
     cutting_forces,
     cutting_powers,
@@ -339,15 +340,20 @@ class _Judge:
         return [*(over or heavy)], [*cautions, *bent, *weak]
 
     def _drilling(self) -> Judged:
-        """Torque, power and thrust of a drill."""
+        """Torque, power and thrust of a drill, and the thrust at which it buckles."""
         cuts, said = self.cuts, self.said
         rows = self.rows[cuts.speed[self.rows] > 0.0]
         if said.kc is None or said.mc is None or not len(rows):
             return [], []
         torque, thrust = np.array([drill_loads(said.kc, said.mc, a_turn, self.tool, said.flutes)
                                    for a_turn in (cuts.feed[rows] / cuts.speed[rows]).tolist()]).T
-        return self._machine(rows, torque, torque * cuts.speed[rows] * math.pi / 30e3, thrust, lambda i: (
-            f"T{self.tool.number}: the drill at F{cuts.feed[rows[i]]:.6g} S{cuts.speed[rows[i]]:g}"))
+        def drill(i: int) -> str:
+            return f"T{self.tool.number}: the drill at F{cuts.feed[rows[i]]:.6g} S{cuts.speed[rows[i]]:g}"
+        findings, cautions = self._machine(rows, torque, torque * cuts.speed[rows] * math.pi / 30e3, thrust, drill)
+        bound = buckling(self.tool)
+        slim, _ = self._over(rows, thrust, bound, math.inf, "load", lambda value, i: f"{drill(i)} needs {value:.0f} N",
+                             f"it buckles at {bound:.0f} N, its tip guided", "", "feed slower, or use a shorter drill")
+        return findings or slim, cautions
 
     def _machine(self, rows: NDArray[np.int64], torque: F64, power: F64, thrust: F64,
                  cut: Callable[[int], str]) -> Judged:

@@ -118,6 +118,16 @@ def test_no_machining_centre_has_the_power_torque_or_thrust():
         assert [" N; more than any machine bears" in f.message for f in found] == [True] * harm
 
 
+@pytest.mark.parametrize(("feed", "harm"), [(1.9, True), (0.4, False)])
+def test_a_slender_drill_buckles(feed, harm):
+    """1 mm, 60 mm long: it bears 68 N; 0.095 mm in a turn needs about 80."""
+    words = cutting_words(MATERIALS["C45"], Tool(id="T1", kind="drill", diameter_mm=1.0))
+    slim = ToolBody("T1", 1, 1.0, 0.0, 50.0, 1.0, 50.0, 1.0, 60.0, named="drill", cone_height=0.3)
+    found, _ = judged(["S20 M3", "G0 X12 Y12", "Z2", f"G1 Z-3 F{feed}", "G0 Z2"], words, slim)
+    assert [f.line for f in found] == [9] * harm
+    assert not harm or "it buckles at" in found[0].message
+
+
 def test_the_speed_of_a_tap_is_bounded_by_that_of_mills():
     """130 m/min in C45 are 10345 1/min at 4 mm."""
     words = cutting_words(MATERIALS["C45"], Tool(id="T1", kind="tap", diameter_mm=4.0))
