@@ -119,7 +119,7 @@ class _Drill:
             pecks, fresh = (bool(in_hole[m]), False) if fresh and cut else (pecks, fresh)
             total += float(long[m])
             limit = (IN_A_PECK if pecks else IN_ONE_GO) * tool.diameter
-            if total > worst * limit:
+            if long[m] > 0.0 and total > worst * limit:
                 worst, found = total / limit, (m, total, limit)
             total, fresh = (total, fresh) if inside else (0.0, True)
         if found[0] < 0:
