@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +59,7 @@ ISLAND = 0.8  # of a layer: stock between rings that is left to the next one, un
 LOOSE = 2.0  # of the tolerance of leaving out points: an arc through them finds room (docs/theory/arcs.md)
 LOOSE_SHARE = 0.25  # of the allowance, at most, that arcs of the layers leave them by
 TILTED_LAYERS = 2.0  # goes in which a tilted end takes the stairs of the layers: more take longer than a layer more
+FLOORS_APART = 0.25  # of a layer: floors nearer to one above have no layer of their own
 THIN = 2.0  # scallops: thickness on a wall that a finish leaves
 
 Progress = Callable[[float], None]
@@ -302,13 +304,19 @@ class _Layers:
         self.left: list[tuple[float, LayerArea]] = []
         if top <= bottom or snapshot is not None and not snapshot.left:
             return
-        heights = depth_layers.layer_heights(top, bottom, step)
+        # what layers left on a floor would be cut at the feed of its finish, in a slot as wide as the tool
+        level = np.concatenate([z.tips[:, 2] for z in zones if z.form is AreaForm.LEVEL] or [np.zeros(0)])
+        ends = [top]
+        for z in np.unique(np.round(level + low, 3))[::-1].tolist():
+            if bottom + 1e-3 < z < ends[-1] - FLOORS_APART * step:
+                ends.append(z)
+        ends.append(bottom)
+        heights = [z for a, b in pairwise(ends) for z in depth_layers.layer_heights(a, b, step)]
         if settings.turning is not None and settings.finishing and curvature_matched.suits(tool):
             spans = [(float(z.tips[:, 2].min()), float(z.tips[:, 2].max())) for z in zones
                      if z.form is AreaForm.SHALLOW]
             heights = depth_layers.divided(heights, top, spans, TILTED_LAYERS * THICK * tool.diameter)
-        also = [f.bottom + low for f in zones if f.form is AreaForm.LEVEL] if self.bounded else []
-        also += [plane - under for plane in settings.planes]
+        also = [plane - under for plane in settings.planes]
         if also:
             heights = sorted({*heights, *(z for z in also if bottom < z < top)}, reverse=True)
         self.left = list(zip(heights, _areas(field, tips, heights, step), strict=True))
@@ -338,6 +346,8 @@ class _Layers:
             self.stock.settle()
             between.extend(depth_layers.between(self.above, z, cut.step_down))
             self.above = z
+            for line in depth_layers.slots(field, self.stock, z, place.area, self.tips, self.allowance, chord):
+                linker.add(turned(line, settings))
             self._walk(linker, z, place, 0.0 if settings.semi_finishing else ISLAND * cut.step_down)
             finished = lat.mask(self.walls[np.abs(self.walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
             unseen = z <= self.swept - self.rim_depth

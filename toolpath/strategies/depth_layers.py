@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.lines import Line, pieces_where
-from toolpath.passes.contours import contours, dilated, from_walls, rings
+from toolpath.passes.contours import contour_pieces, contours, dilated, from_walls, rings
 from toolpath.stock.stock_map import SURE_RIM, StockMap
 from zones.lattice import Lattice
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 ROUND_CORNERS = 3.5  # lattice steps, beyond three allowances: ways round the ends of finished walls have no rim
 FLAT_SPACING, ROUND_SPACING = 1.3, 0.8  # of the radius of the flat bottom, and of that of the corner, between rings
+APART = 2.0  # lattice steps that nodes of one strip are apart, at most half
 STOCK_WORTH = 0.05  # mm of stock above the cutter that makes a place worth a pass
 EVEN = 0.25  # of the deepest layer, how uneven stock may stay along the axis where it is evened out
 
@@ -196,9 +197,38 @@ def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], fin
     return out
 
 
+def slots(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], tips: F64, allowance: float,
+          tolerance: float) -> Iterator[Line]:
+    """Lines of a layer along strips too narrow for a ring, where more stands than rims are made for.
+
+    tips : (n, 3) float64, mm, of samples to finish, access frame: those below show strips that nodes do not meet
+
+    Other parameters as in ``rim``. Stock is left to the rims, and to the second wall of a strip, where it is no thicker
+    than twice the allowance.
+
+    Yields
+    ------
+    Line
+        Where stock stands when it is asked for.
+    """
+    lat, tool = field.lattice, field.tool
+    # a ring less than a step from the middle of its strip falls to pieces, and so do the nodes of a narrow strip
+    wide = _wide(field, z, allowance + lat.step)
+    free = (field.height <= z + LEVEL_TOLERANCE) & dilated(area, tool.radius / lat.step)
+    narrow = (free | lat.mask(tips[tips[:, 2] <= z, :2])) & ~wide
+    mine, beyond = dilated(narrow, APART), 0.5 * tool.radius
+    for line in contour_pieces(field, z, mine, mine, beyond, 2.0 * tool.radius, tolerance):
+        seen = stock.overlap(line.points, tool, -2.0 * allowance / stock.lattice.step - SURE_RIM, lower_bound=0.0)
+        yield from pieces_where(line, seen > STOCK_WORTH, beyond, 2.0 * tool.radius)
+
+
 def _slots(field: TipField, z: float, allowance: float) -> NDArray[np.bool_]:
     """(ny, nx) bool: free places in strips too narrow for a ring; their walls are all there is to follow."""
-    free = field.height <= z + LEVEL_TOLERANCE
+    return np.asarray((field.height <= z + LEVEL_TOLERANCE) & ~_wide(field, z, allowance))
+
+
+def _wide(field: TipField, z: float, allowance: float) -> NDArray[np.bool_]:
+    """(ny, nx) bool: places round which a ring goes ``allowance`` mm from the walls, or that are beside one."""
     away = from_walls(field, z, allowance)
-    wide = free if away is None else away
-    return np.asarray(free & ~dilated(np.asarray(wide), allowance / field.lattice.step + 1.0))
+    wide = field.height <= z + LEVEL_TOLERANCE if away is None else away
+    return dilated(np.asarray(wide), allowance / field.lattice.step + 1.0)
