@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from geometry.mesh import F64
-from verify.gcode.block_words import CYCLES, SHIFTS, TURNS, Block, whole
+from verify.gcode.block_words import CYCLES, SHIFTS, TURNS, Block, BlockError, whole
 from verify.gcode.drilling_cycles import Hole, HoleExit, hole_moves
 from verify.gcode.frame_words import FrameWords
 from verify.gcode.rotary_words import between
@@ -283,10 +283,12 @@ class BlockMotion(FrameWords):
         k, here = PLANE_AXES[s.plane][2], self._here()
         if s.cycle.setdefault("plane", s.plane) != s.plane:
             return error("a drilling cycle continues in another plane: end it with G80 first")
+        self._pecks(values)
         s.cycle.update({c: values[c] for c in "RQP" if c in values})
         if (depth := axes[k]) is not None:
             s.cycle["XYZ"[k]] = depth
-        missing = [c for c in ("XYZ"[k], "R", *(("Q",) if s.motion in (73, 83) else ())) if c not in s.cycle]
+        step = () if s.motion not in (73, 83) or (self._shrinks() and "I" in s.cycle) else ("Q",)
+        missing = [c for c in ("XYZ"[k], "R", *step) if c not in s.cycle]
         if missing:
             return error(f"a drilling cycle without {', '.join(missing)}")
         if math.isnan(here[k]):
@@ -340,15 +342,38 @@ class BlockMotion(FrameWords):
             self.log.error(f"the drilling depth {'XYZ'[k]} is above R")
             return None
         pecking = s.motion in (73, 83)
-        peck = abs(s.cycle["Q"]) * s.scale if pecking else max(clear - bottom, 1e-9)
+        shrinks = self._shrinks() and "I" in s.cycle
+        word = "I" if shrinks else "Q"
+        peck = abs(s.cycle[word]) * s.scale if pecking else max(clear - bottom, 1e-9)
         if peck <= 0 and clear > bottom:
-            self.log.error("a drilling cycle with Q0 has no end")
+            self.log.error(f"a drilling cycle with {word}0 has no end")
             return None
+        step, least = (abs(s.cycle.get(c, 0.0)) * s.scale if shrinks else 0.0 for c in "JK")
+        flush = 0.0 if shrinks or not self._shrinks() else abs(s.cycle.get("K", 0.0)) * s.scale
         out = _EXITS.get(int(s.motion or 0), HoleExit.RAPID)
         if s.motion in (74, 84) and self.control is None:  # LinuxCNC feeds a tap all the way up
             out = HoleExit.FEED
         back = clear if s.retract_to_r else top if self.control is not None else max(top, clear)
-        return Hole(clear, bottom, back, peck, s.motion == 83, out)
+        hole = Hole(clear, bottom, back, peck, s.motion == 83, out, step, least, flush or math.inf)
+        if shrinks and math.isinf(hole.pecks):
+            self.log.error(f"pecks that J{s.cycle['J']:g} shortens to nothing above the bottom: give K, the shortest")
+            return None
+        return hole
+
+    def _pecks(self, values: dict[str, float]) -> None:
+        """Keep the words I, J and K of pecks. Q ends those of a block before, and I ends its Q."""
+        if not self._shrinks():
+            return
+        if "Q" in values and not values.keys().isdisjoint("IJ"):
+            raise BlockError("Q with I or J in a peck cycle, which are two kinds of pecks: leave one of them out")
+        cycle = self.s.cycle
+        for letter in "IJK" if "Q" in values else "Q" if "I" in values else "":
+            cycle.pop(letter, None)
+        cycle.update({c: values[c] for c in "IJK" if c in values})
+
+    def _shrinks(self) -> bool:
+        """Whether I, J and K of the cycle in force are its first peck, what each is shorter by, and the shortest."""
+        return self.control is not None and self.control.shrinking_pecks and self.s.motion in (73, 83)
 
 
 def _length(start: F64, end: F64, centre: F64, sweep: float, axes: tuple[int, int, int]) -> float:

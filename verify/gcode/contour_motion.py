@@ -77,6 +77,9 @@ class ContourMotion(Origins):
         self._composed: tuple[tuple[object, ...], Frame | None] | None = None
         self._stated: tuple[Frame, list[float]] | None = None  # coordinates of a place that is not known whole
 
+    def _zero_name(self, name: str) -> str:
+        return name if self.control is None else self.control.zero_names.get(name, name)
+
     @property
     def _foreign(self) -> bool:
         return self.control is not None

@@ -12,6 +12,9 @@ from verify.program.move_kinds import FEED, RAPID
 PECK_LIFT = 0.254
 MOVES_A_PECK = 3
 MOVES_A_HOLE = 5
+SAME_DEPTH = 1e-9
+MAX_SHRINKS = 1e6
+"""Pecks that shrink so often are too many for any block."""
 
 
 class HoleExit(Enum):
@@ -29,9 +32,11 @@ class Hole:
     clear  : mm, the R plane
     bottom : mm, height of the tip at the bottom
     back   : mm, height after the retract
-    peck   : mm, depth of a peck, > 0; the whole depth for G81 and G82
+    peck   : mm, depth of the first peck, > 0; the whole depth for G81 and G82
     lift   : True: each peck retracts to ``clear`` (G83); False: it lifts 0.254 mm to break the chip
     out    : how the tool leaves the bottom
+    step   : mm by which each peck is shorter than the one before; least : mm, the shortest peck
+    flush  : mm of pecks in a row, after which a peck without ``lift`` retracts to ``clear`` too
     """
 
     clear: float
@@ -40,13 +45,37 @@ class Hole:
     peck: float
     lift: bool
     out: HoleExit = HoleExit.RAPID
+    step: float = 0.0
+    least: float = 0.0
+    flush: float = math.inf
 
     @property
     def pecks(self) -> float:
-        """Number of pecks, whole; inf where the quotient overflows."""
-        depth = self.clear - self.bottom - 1e-9
-        share = depth / self.peck if self.peck > 0 else math.inf
-        return float(max(0, math.ceil(share))) if math.isfinite(share) else (math.inf if depth > 0 else 0.0)
+        """Upper bound of the number of pecks, whole; inf where no number of pecks reaches the bottom."""
+        depth = self.clear - self.bottom - SAME_DEPTH
+        if depth <= 0:
+            return 0.0
+        if self.peck <= 0:
+            return math.inf
+        shortest = min(self.peck, self.least) if self.step > 0 else self.peck
+        if shortest <= 0:
+            falling = math.ceil(min(self.peck / self.step, MAX_SHRINKS))
+            return float(falling) if falling * (self.peck - 0.5 * (falling - 1) * self.step) >= depth else math.inf
+        share = depth / shortest
+        return float(math.ceil(share)) if math.isfinite(share) else math.inf
+
+    def depths(self) -> Iterator[float]:
+        """Depths of the pecks, mm below ``clear``; the last one is that of the bottom. ``pecks`` must be finite."""
+        whole, at, peck = self.clear - self.bottom, 0.0, self.peck
+        if self.step <= 0 and self.least <= self.peck:
+            count = int(self.pecks)
+            yield from (k * peck for k in range(1, count))
+            yield from [whole][:count]
+            return
+        while at < whole - SAME_DEPTH:
+            at = at + peck if at + peck < whole - SAME_DEPTH else whole
+            yield at
+            peck = max(peck - self.step, self.least)
 
     @property
     def moves(self) -> float:
@@ -69,15 +98,18 @@ def hole_moves(hole: Hole, over: list[float], axis: int) -> Iterator[tuple[list[
         return [height if k == axis else p for k, p in enumerate(over)]
     yield at(over[axis]), RAPID
     yield at(hole.clear), RAPID
-    pecks = int(hole.pecks)
-    for k in range(1, pecks + 1):
-        depth = max(hole.clear - k * hole.peck, hole.bottom) if k < pecks else hole.bottom
-        yield at(depth), FEED
-        if k == pecks:
-            break
-        yield at(hole.clear if hole.lift else depth + PECK_LIFT), RAPID
-        if hole.lift:
-            yield at(min(depth + PECK_LIFT, hole.clear)), RAPID
+    before, flushed = 0.0, 0.0
+    for down in hole.depths():
+        if before > 0:
+            up = hole.clear - before
+            out = hole.lift or before - flushed >= hole.flush - SAME_DEPTH
+            yield at(hole.clear if out else up + PECK_LIFT), RAPID
+            if out:
+                flushed = before
+                yield at(min(up + PECK_LIFT, hole.clear)), RAPID
+        depth = hole.clear - down
+        yield at(max(depth, hole.bottom) if down < hole.clear - hole.bottom else hole.bottom), FEED
+        before = down
     if hole.out is HoleExit.FEED_TO_CLEAR:
         yield at(hole.clear), FEED
     yield at(hole.back), FEED if hole.out is HoleExit.FEED else RAPID

@@ -39,6 +39,10 @@ class OffsetTables(Modes):
         self.zeros, self.written = {self.work_offset: [0.0] * 3}, {}
         self.lengths, self.wear, self.registers, self.radius_wear, self.radii = {}, {}, {}, {}, {}
 
+    def _zero_name(self, name: str) -> str:
+        """The word of the program for a work offset."""
+        raise NotImplementedError
+
     @property
     def _foreign(self) -> bool:
         """Whether the control has the words of LinuxCNC translated: its G10 counts tool data in its own way."""
@@ -163,7 +167,8 @@ class OffsetTables(Modes):
         s = self.s
         s.work_offset = name
         if name != self.work_offset and any(map(math.isnan, self.zeros.get(name, [math.nan]))):
-            self.log.remark("work_offset", f"{name} is not the work offset of the setup ({self.work_offset})", name)
+            self.log.remark("work_offset", f"{self._zero_name(name)} is not the work offset of the setup "
+                            f"({self.work_offset})", name)
         self._take_zero()
 
     def _take_zero(self) -> None:

@@ -249,7 +249,8 @@ class Reader(BlockMotion):
         motion = self.s.motion
         moves = {28, 30, 53}.isdisjoint(block.codes) and not block.values.keys().isdisjoint(
             "XYZABCIJK@^" if motion in (2, 3) else "XYZABC@^")
-        used = used_letters(block, motion, moves)
+        shrinks = self.control is not None and self.control.shrinking_pecks
+        used = used_letters(block, motion, moves, "IJK" if shrinks else "")
         idle = [f"{letter}{number:g}" for letter, number in block.values.items() if letter not in used]
         if idle:
             self.log.remark("unused", f"no code of this block uses {', '.join(idle)}", self.log.line)

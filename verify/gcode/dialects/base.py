@@ -63,6 +63,7 @@ class DialectReader:
               come after it
     assumed : what lines leave to the control, each kind once
     names   : T numbers by the names (ids) of the tools of the setup
+    shrinking_pecks : whether I, J, K of G73 and G83 are the first peck, by how much each is shorter, and the shortest
     own_speed : whether a word has made each axis go at its own speed in a rapid
     looks_ahead : most blocks without a move in the plane between two moves of a compensated contour through which the
               control finds the second one
@@ -77,6 +78,7 @@ class DialectReader:
     home_from: int | None = None
     gives_up_length = False
     own_speed = False
+    shrinking_pecks = False
     looks_ahead: float = math.inf
 
     def __init__(self) -> None:
@@ -87,6 +89,7 @@ class DialectReader:
         self.unbounded = False
         self._free = False
         self.frame: Frame | None = None
+        self.zero_names: dict[str, str] = {}
         self.names: Mapping[str, int] = {}
 
     def order(self, lines: Sequence[str], machine: Machine) -> Iterator[tuple[int, str]]:
@@ -120,6 +123,12 @@ class DialectReader:
         """From here on a word bounds the deviation from the path (``known``), or none does."""
         self._free |= not known
         self.unbounded = self._free
+
+    def zero(self, number: int, word: str) -> str:
+        """As ``zero_word``; remarks call the work offset ``word`` from here on."""
+        found = zero_word(number, word)
+        self.zero_names[found] = word
+        return found
 
     def blocks(self, raw: str) -> Sequence[str | tuple[int, str]]:
         """Blocks of one line in the words of ``verify.gcode.block_words``; none for a line without effect.

@@ -12,11 +12,11 @@ is refused by its name.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from verify.assumptions import Assumed, AssumedKind
 from verify.gcode.block_words import FURTHER, bare
-from verify.gcode.dialects.base import NUMBER, BlockError, Machine, zero_word
+from verify.gcode.dialects.base import NUMBER, BlockError, Machine
 from verify.gcode.dialects.fanuc_planes import FanucPlanes
 from verify.gcode.flow.macro_flow import MacroFlow, has_macros
 from verify.gcode.machine_words import FANUC_M
@@ -40,11 +40,19 @@ _PLACES = "XYZABCIJKRUVW"
 ORIENTS = 19
 """The M word that stops the spindle at an angle; Haas gives the angle as P or R."""
 _AFTER_TAPS = frozenset({0.0, 1.0, 2.0, 3.0, 73.0, 76.0, 80.0, 81.0, 82.0, 83.0, 85.0, 86.0, 89.0})
+_AXES = "XYZABCUVW"
+_OWN_DATA: dict[float, Callable[[float], bool]] = {
+    5.1: lambda q: q in (2.0, 3.0), 22.0: lambda q: True, 23.0: lambda q: False, 26.0: lambda q: False}
+"""Words that move nothing, and whether coordinates are their data, by Q: axes to smooth, limits of a stroke check."""
+_TABLES = {20.0: "an offset of G54.1", 50.0: "parameters of the control", 52.0: "parameters of the control"}
+_NO_P: frozenset[float] = frozenset({0, 1, 2, 3, 17, 18, 19, 20, 21, 40, 41, 42, 43, 49, 54, 55, 56, 57, 58, 59, 61, 64,
+                                     80, 90, 91, 93, 94, 95, 98, 99})
+"""G words that take no P: in a block with them it is that of the M word."""
 _KNOWN_M = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, ORIENTS, 30})
-IDLE_G: frozenset[float] = frozenset({9, 13.1, 22, 23, 25, 26, 40.1, 50.2, 62, 63, 67, 69.1, 94.1, 97, 113})
-"""G words without effect on a move: exact stop, modes of tapping and cutting, stroke checks, ends of modes."""
+IDLE_G: frozenset[float] = frozenset({9, 11, 13.1, 22, 23, 25, 26, 40.1, 50.2, 62, 63, 67, 69.1, 94.1, 97, 113})
+"""G words without effect on a move: exact stop, end of G10, modes of taps and cutting, stroke checks, ends of modes."""
 SMOOTHING: frozenset[float] = frozenset({5, 5.1, 5.4, 8, 64, 61.1})
-REFUSED = {
+REFUSED: dict[float, str] = {
     2.2: "an involute", 3.2: "an involute", 2.3: "an exponential", 3.3: "an exponential", 2.4: "an arc in space",
     3.4: "an arc in space", 6.2: "a spline", 7.1: "cylindrical interpolation", 10.6: "a retract",
     12: "a circular pocket", 12.1: "polar interpolation", 13: "a circular pocket",
@@ -63,6 +71,7 @@ class FanucReader(FanucPlanes):
     """Fanuc 0i, 30i and relatives.
 
     further : G word of the work offsets after G59; counts : letters of whole numbers in a drilling cycle
+    refused_g : G words that are refused, and what they are
     rigid   : M word that begins rigid tapping; None: every tapping cycle is rigid
     """
 
@@ -73,6 +82,7 @@ class FanucReader(FanucPlanes):
     bounds_path = False
     further_words = FURTHER
     refused_m = FANUC_M
+    refused_g: Mapping[float, str] = REFUSED
     repeats = "KL"
     rigid: int | None = 29
     looks_ahead = 1.0
@@ -127,9 +137,11 @@ class FanucReader(FanucPlanes):
             raise BlockError(f"{corner[0]} (a chamfer or rounded corner) is not followed")
         if "".join(a + b for a, b in words) != text:
             raise BlockError(f"cannot read '{text[:60]}'")
+        count = len(words)
         words = [(a, b) for a, b in words if not (a == "M" and self._idle_m(b))]
         codes = [float(b) for a, b in words if a == "G"]
         self._follow(codes)
+        words = self._without_data(words, codes, len(words) < count)
         for letter, digits in words:
             self._check(letter, digits)
         if len(ms := [b for a, b in words if a == "M"]) > 1:
@@ -161,6 +173,28 @@ class FanucReader(FanucPlanes):
         if deleted and not _CHANGES.search(block):
             deleted = False
         return [*before, *([f"/{block}" if deleted else block] if block else []), *self._after(codes)]
+
+    def _without_data(self, words: list[tuple[str, str]], codes: list[float], device: bool) -> list[tuple[str, str]]:
+        """The words of a block without those that are data of a word that moves nothing.
+
+        device : whether the block has an M word of the machine, which may take P, and others where nothing else does
+
+        Raises
+        ------
+        BlockError
+            The block moves as well, or its coordinates belong to no word.
+        """
+        letters = {a for a, _ in words}
+        data = ""
+        if (own := next((c for c in codes if c in _OWN_DATA), None)) is not None:
+            level = next((float(b) for a, b in words if a == "Q"), 0.0)
+            if not letters.isdisjoint(_AXES) and (len(codes) > 1 or not _OWN_DATA[own](level)):
+                raise BlockError(f"coordinates in a block with G{own:g}, which moves nothing",
+                                 "give each its own block")
+            data = "R" + _AXES if own == 5.1 else _AXES + "IJKPQR"
+        if device and _NO_P.issuperset(codes) and not self.hole:
+            data += "P" if not letters.isdisjoint(_AXES + "IJK") else "PQRLE"
+        return [(a, b) for a, b in words if a not in data] if data else words
 
     def _spindle_of_taps(self, codes: list[float]) -> list[str]:
         """Words of the spindle before a block of G words ``codes``.
@@ -211,16 +245,12 @@ class FanucReader(FanucPlanes):
         number = float(digits)
         if number in _FOREIGN.get(letter, frozenset()):
             raise BlockError(f"{letter}{digits} is a word of LinuxCNC with another meaning, or none, on {self.title}")
-        if letter == "G" and number in REFUSED and not self._followed(number):
-            raise BlockError(f"unknown word G{number:g} ({REFUSED[number]})")
+        if letter == "G" and number in self.refused_g:
+            raise BlockError(f"unknown word G{number:g} ({self.refused_g[number]})")
         if letter in _PLACES and "." not in digits and number != 0 and not (
                 letter in "IJK" and self.vectors or self.hole and letter in self.counts):
             raise BlockError(f"{letter}{digits} without a decimal point is {digits} or {number / 1000:g}, depending on "
                              "a parameter of the machine", "write the decimal point: X10. is 10 mm everywhere")
-
-    def _followed(self, code: float) -> bool:
-        """Whether the control has another meaning for a refused word, which is followed."""
-        return False
 
     def _idle_m(self, digits: str) -> bool:
         """Whether an M word moves nothing that the proof knows."""
@@ -277,11 +307,12 @@ class FanucReader(FanucPlanes):
 
     def _code(self, code: float, values: dict[str, str]) -> list[str]:
         if code == self.further:
-            return [zero_word(6 + int(float(values.get("P", "0"))), f"G{code:g} P{values.get('P', '')}")]
+            return [self.zero(6 + int(float(values.get("P", "0"))), f"G{code:g} P{values.get('P', '')}")]
         if code == 43.5:
             return ["G43.4"]
-        if code == 5.1 and float(values.get("Q", "-1")) not in (0.0, 1.0):
-            raise BlockError("G05.1 without Q0 or Q1")
+        if code == 5.1 and float(values.get("Q", "-1")) not in (0.0, 1.0, 3.0):
+            raise BlockError("G05.1 without Q0, Q1 or Q3" if values.get("Q") != "2" else
+                             "G05.1 Q2 (a curve through the places) is not followed")
         if code in (61, 62, 63, *SMOOTHING):
             self.exact = code == 61
             self.bound(self.exact or self.limited)
@@ -295,8 +326,8 @@ class FanucReader(FanucPlanes):
             self.notes.append("G76 is read without its shift at the bottom: a parameter decides its direction")
         if code in (15, 16) or code in IDLE_G:
             return []
-        if code == 10 and float(values.get("L", "0")) == 20:
-            raise BlockError("G10 L20 (an offset of G54.1): it is not followed")
+        if code == 10 and (what := _TABLES.get(float(values.get("L", "0")))):
+            raise BlockError(f"G10 L{values['L']} ({what}): it is not followed")
         return [f"G{code:g}"]
 
     def _after(self, codes: list[float]) -> list[str]:

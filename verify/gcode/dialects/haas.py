@@ -2,20 +2,25 @@
 
 G234 is tool centre point control, G154 P a work offset, G187 smoothness (E: its bound), G101 and G100 mirror. A whole P
 of G04 and of cycles counts ms, one with a decimal point s. F without a decimal point is refused like a coordinate. G28
-cancels the length offset. M16 is M6. M0 and M1 stop the spindle and the coolant. I of a peck cycle is its first peck,
-and L the number of holes. G110 to G129 are G154 P1 to P20. J of a tapping cycle is the speed of its retract. G103
-limits how far the control reads ahead.
+cancels the length offset. M16 is M6. M0 and M1 stop the spindle and the coolant. I, J and K of a peck cycle are its
+first peck, by how much each next one is shorter, and the shortest; K with Q of G73 is the depth after which the tool
+returns to R. L is the number of holes. G110 to G129 are G154 P1 to P20. J of a tapping cycle is the speed of its
+retract. G103 limits how far the control reads ahead, and G102 sends places of axes to a port.
 """
 
 from __future__ import annotations
 
-from verify.gcode.dialects.base import BlockError, zero_word
-from verify.gcode.dialects.fanuc import FanucReader
+import re
+
+from verify.gcode.dialects.base import BlockError
+from verify.gcode.dialects.fanuc import REFUSED, FanucReader
 from verify.gcode.machine_words import HAAS_M
 
-WORDS = {35: "probing", 136: "probing", 141: "compensation in space", 143: "a length along the tilted tool",
-         150: "a pocket", 253: "a turn of the tool", 254: "a dynamic work offset", 268: "a tilted plane"}
+WORDS: dict[float, str] = {
+    35: "probing", 47: "engraving", 136: "probing", 141: "compensation in space", 143: "a length along the tilted tool",
+    150: "a pocket", 253: "a turn of the tool", 254: "a dynamic work offset", 268: "a tilted plane"}
 """G words that move or cut and are not followed, and what they are."""
+_OUTPUT = re.compile(r"(?:N[0-9]+)?G102[XYZABC]*")
 _MIRRORS = {101: "G51.1", 100: "G50.1"}
 
 
@@ -28,14 +33,20 @@ class HaasReader(FanucReader):
     repeats = "L"
     counts = "KJ"
     refused_m = HAAS_M
+    refused_g = REFUSED | WORDS
     rigid = None
     looks_ahead = 80.0
+    shrinking_pecks = True
 
     def _check(self, letter: str, digits: str) -> None:
         super()._check(letter, digits)
         if letter == "F" and "." not in digits and float(digits) != 0:
             raise BlockError(f"F{digits} without a decimal point counts thousandths or not, depending on a setting",
                              f"write F{digits}.")
+
+    def _bare(self, raw: str) -> str:
+        text = super()._bare(raw)
+        return "" if _OUTPUT.fullmatch(text) else text
 
     def _several(self, ms: list[str]) -> None:
         raise BlockError(f"{' and '.join(f'M{m}' for m in ms)} in one block: Haas takes one M word in a block",
@@ -50,23 +61,29 @@ class HaasReader(FanucReader):
     def _word(self, letter: str, digits: str, codes: list[float], values: dict[str, str]) -> list[str]:
         if letter == "M" and float(digits) == 16:
             return ["M6"]
-        if self.hole and letter in "IJK" and not {73, 83}.isdisjoint(codes):
-            return [f"Q{digits}"] if letter == "I" and "Q" not in values else []
+        if self.hole and letter in "IJK" and self._pecks(codes):
+            if "." not in digits and float(digits) != 0:
+                raise BlockError(f"{letter}{digits} of a peck cycle without a decimal point counts thousandths or not, "
+                                 "depending on a setting", f"write {letter}{digits}.")
+            return [letter + digits]
         if (self.hole and letter == "J") or (letter == "P" and 103 in codes):
             return []
         return super()._word(letter, digits, codes, values)
+
+    def _pecks(self, codes: list[float]) -> bool:
+        """Whether the cycle in force in a block of these G words pecks."""
+        stated = [c for c in codes if 73 <= c <= 89]
+        return not {73.0, 83.0}.isdisjoint(stated or [self.machine.s.motion or 0.0])
 
     def _code(self, code: float, values: dict[str, str]) -> list[str]:
         if code == 234:
             return ["G43.4"]
         if code in _MIRRORS:
             return [_MIRRORS[int(code)]]
-        if code in WORDS:
-            raise BlockError(f"unknown word G{code:g} ({WORDS[int(code)]})")
         if code == 103:
             return []
         if 110 <= code <= 129:
-            return [zero_word(6 + int(code) - 109, f"G{code:g}")]
+            return [self.zero(6 + int(code) - 109, f"G{code:g}")]
         if code == 187:
             if "E" not in values:
                 self.notes.append("G187 without E: a setting of the machine decides how far the control rounds "

@@ -20,6 +20,7 @@ class DrilledHole:
     clear, bottom, back : where the feed begins, the bottom, and where the tool goes afterwards
     pecks   : depths of the pecks, mm, from ``clear`` or the surface downwards; empty for one stroke
     surface : height from which the pecks count
+    leads   : mm above the last depth where each next peck begins to feed again; empty for ``LEAD``
     lift    : mm that a peck retracts, inf for all the way to ``clear``
     feed    : F word of the way down, '' to keep the one in force; out: of the way up to ``clear``, None for a rapid
     dwell   : s at the bottom
@@ -34,6 +35,7 @@ class DrilledHole:
     feed: str = ""
     out: str | None = None
     dwell: float = 0.0
+    leads: tuple[float, ...] = ()
 
 
 def even_pecks(depth: float, first: float, step: float, least: float, machine: Machine) -> tuple[float, ...]:
@@ -59,6 +61,11 @@ def even_pecks(depth: float, first: float, step: float, least: float, machine: M
         out.append(at)
         peck = max(peck - step, least, 1e-9) if step > 0 else peck
     return tuple(out)
+
+
+def even_leads(count: int, first: float, last: float) -> tuple[float, ...]:
+    """Leads of ``count`` pecks, mm, that change evenly from that of the first peck to that of the last one."""
+    return tuple(first + (last - first) * k / max(count - 1, 1) for k in range(count))
 
 
 def hole_blocks(hole: DrilledHole, here: Sequence[float], axis: int, unit: float, relative: bool) -> list[str]:
@@ -92,14 +99,14 @@ def hole_blocks(hole: DrilledHole, here: Sequence[float], axis: int, unit: float
         at = height
 
     go("G0", hole.clear)
-    for depth in hole.pecks:
+    for n, depth in enumerate(hole.pecks):
         height = max(hole.surface - depth, hole.bottom)
         if height >= hole.clear:
             continue
         go("G1", height, hole.feed)
         go("G0", min(height + hole.lift, hole.clear))
         if math.isinf(hole.lift):
-            go("G0", min(height + LEAD, hole.clear))
+            go("G0", min(height + (hole.leads[n] if hole.leads else LEAD), hole.clear))
     go("G1", hole.bottom, hole.feed)
     if hole.dwell > 0:
         out.append(f"G4 P{digits(hole.dwell)}")
@@ -109,4 +116,4 @@ def hole_blocks(hole: DrilledHole, here: Sequence[float], axis: int, unit: float
     return out
 
 
-__all__ = ["DrilledHole", "even_pecks", "hole_blocks"]
+__all__ = ["DrilledHole", "even_leads", "even_pecks", "hole_blocks"]

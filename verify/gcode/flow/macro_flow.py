@@ -104,13 +104,17 @@ class _Filled:
         return cls(head, tuple(words))
 
     def text(self, scope: MacroVariables) -> str:
-        """The block with numbers in the place of its variables and expressions."""
+        """The block with numbers in the place of its variables and expressions, without words of vacant variables."""
         out = self.head
         for letter, written, value in self.words:
             if value is None:
                 out += letter + written
                 continue
-            number = digits(letter, scope.known(value(scope), f"{letter}{written}"))
+            found = value(scope)
+            if found != found and written.startswith("#") and scope.emptied():
+                scope.ignored.append(f"{letter}{written}")
+                continue
+            number = digits(letter, scope.known(found, f"{letter}{written}"))
             out += letter + (number if "." in number or letter in _COUNTS else number + ".")
         return out
 
@@ -170,6 +174,10 @@ class MacroFlow:
                 at = step(at, section)
                 continue
             rest, call = self._split(step.text(self.scope))
+            if self.scope.ignored:
+                self.machine.log.note(f"line {at + 1}: {' and '.join(self.scope.ignored)} is ignored, as its variable "
+                                      "is vacant")
+                self.scope.ignored.clear()
             if rest:
                 yield at + 1, rest
             if call is None:

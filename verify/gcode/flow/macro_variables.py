@@ -2,8 +2,8 @@
 
 #1 to #33 belong to one level of G65; #100 to #199 and #500 to #999 to the control. #0 and a local variable without a
 value are vacant, which EQ and NE tell from 0. A common variable keeps its value from the program before, so one that
-the program has not set is unknown, and reading it is an error that names it. A vacant number that would reach a word of
-a block is one too.
+the program has not set is unknown, and reading it is an error that names it. A word whose variable is vacant is
+ignored; one that may be vacant, or an expression of it in a word, is an error too.
 """
 
 from __future__ import annotations
@@ -46,10 +46,15 @@ ARGUMENTS = dict(zip("ABCIJKDEFHMQRSTUVWXYZ",
 class MacroVariables(Parameters):
     """All variables at one time; the levels of G65 are its frames.
 
-    vacant : the latest number that was read without a value, for messages
+    vacant  : the latest number that was read without a value
+    ignored : words of the latest block that the control ignores
     """
 
     vacant = 0
+
+    def __init__(self, served: Callable[[int | str], float]) -> None:
+        super().__init__(served)
+        self.ignored: list[str] = []
 
     def numbered(self, number: float) -> float:
         """Value of a variable, nan where it is vacant.
@@ -106,6 +111,14 @@ class MacroVariables(Parameters):
         held = self.frame.numbers if n <= LOCALS else self._numbers
         self.changes += held.get(n) != value
         held[n] = value
+
+    def emptied(self) -> bool:
+        """Whether the variable read last is certainly vacant: #0, one that the program emptied, a local one of a call.
+
+        A local variable of the main program may hold the value of a program before.
+        """
+        n = self.vacant
+        return n == 0 or n > LOCALS or n in self.frame.numbers or len(self.frames) > 1
 
     def known(self, value: float, what: str) -> float:
         """The value itself.

@@ -345,4 +345,5 @@ def _size(size: np.ndarray) -> str:
 
 
 def _point(point: np.ndarray) -> str:
-    return "(" + ", ".join(f"{x:.4g}" for x in point) + ")"
+    """Coordinates in mm, to a micrometre where four digits are finer."""
+    return "(" + ", ".join(f"{round(float(x), 3) + 0.0:.4g}" for x in point) + ")"

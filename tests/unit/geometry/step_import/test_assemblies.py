@@ -151,6 +151,13 @@ def test_a_body_that_only_touches_is_refused_with_both_numbers_and_the_place(tmp
         assert "part.fuse" not in refused(path, fuse=True).remedy
 
 
+def test_places_are_told_to_a_micrometre(tmp_path):
+    plate = cq.Workplane("XY").box(30, 20, 12, centered=(True, True, False)).val()
+    lug = cq.Workplane("XY", origin=(0, 0, 12)).rect(10, 10).extrude(5).faces(">Z").workplane().hole(3.3).val()
+    found = refused(write_step(cq.Compound.makeCompound([plate, lug]), tmp_path / "two.step")).message
+    assert "only touches solid 1 on a face at (" in found and not re.search(r"\de[-+]|-0[,)]", found)
+
+
 def test_one_product_of_overlapping_bodies_is_one_part_and_a_touching_one_is_not(tmp_path):
     hub = box(20, 20, 10)
     blades = [box(4, 2, 30, (8, 3 * k, 5)) for k in range(5)]

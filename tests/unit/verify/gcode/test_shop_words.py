@@ -116,7 +116,7 @@ R, Z0 = 2.0, -5.0
 @pytest.mark.parametrize(("words", "dialect", "down", "up"), [
     ("G81 R2. Z-5.", "fanuc", [-5], []), ("G82 R2. Z-5. P500", "fanuc", [-5], []),
     ("G83 R2. Z-5. Q3000", "fanuc", [-1, -4, -5], []), ("G83 R2. Z-5. Q3.", "haas", [-1, -4, -5], []),
-    ("G83 R2. Z-5. I3. J0.5 K1.", "haas", [-1, -4, -5], []), ("G73 R2. Z-5. Q3.", "fanuc", [-1, -4, -5], []),
+    ("G83 R2. Z-5. I3. J0.5 K1.", "haas", [-1, -3.5, -5], []), ("G73 R2. Z-5. Q3.", "fanuc", [-1, -4, -5], []),
     ("G84 R2. Z-5.", "fanuc", [-5], [2]), ("G74 R2. Z-5.", "fanuc", [-5], [2]), ("G85 R2. Z-5.", "fanuc", [-5], [2]),
     ("G86 R2. Z-5.", "fanuc", [-5], []), ("G76 R2. Z-5. Q0.2 P100", "fanuc", [-5], []),
     ("G89 R2. Z-5. P100", "fanuc", [-5], [10])])
@@ -140,7 +140,9 @@ def test_repeats_and_returns_of_cycles():
     "M88\nM29 S1000\nG1 X1. F100.\nM89\n", "G1 X1. A0. F100.\n", "(A (NESTED) COMMENT)\nG1 X1. F100. (END)\n",
     "G1 X1. F100. ;\n", "/M8\n/2 M8\nN10/M9\nG1 X1. F100.\n", "G97 S1000\nG1 X1. F100.\n", "g1 x1. f100.\n",
     "G1X1.F100.M8\n", "N0100 G01 X+1.000 F100.0\n", "<NAME>\nG1 X1. F100.\n", "G22\nG23\nG94.1\nG1 X1. F100.\n",
-    "G1 X1. F100. ; END MILL 6\n; next\n;;\n"])
+    "G1 X1. F100. ; END MILL 6\n; next\n;;\n", "G05.1 Q1 R5\nG1 X1. F100.\nG05.1 Q0\n", "G11\nG1 X1. F100.\n",
+    "G22 X300. Y200. Z100. I-300. J-200. K-300.\nG1 X1. F100.\n", "M500 P2\nM83 P500 Q3\nG1 X1. F100. M59 P1134\n",
+    "G1 X1. F100.\nG22 X300 Y200 Z100 I0 J0 K0\nG05.1 Q3 X0 Y0 Z0\n"])
 def test_modes_comments_and_devices_move_nothing(body):
     p = read(body)
     assert p.end[p.kind == FEED].tolist() == [[1, 0, 10]] and p.remarks == ()
@@ -213,7 +215,12 @@ def test_a_place_of_the_machine_needs_no_g0_on_these_controls():
     ("fanuc", "G3 X0. Y0. I5. P3 F100.\n", "P3 in a block of an arc"), ("haas", "G3 X0. I5. P2 F9.\n", "P2 in a block"),
     ("fanuc", "G1 X[ROUND[1.2]] F100.\n", "ROUND[1.2] in a word"), ("haas", "#1=POW[2.]\n", "POW takes two values"),
     ("fanuc", "#1=#4014\n", "#4014 is a variable of the control"),
-    ("fanuc", "G1 X1. F100. ; X7.\n", "'X7.' follows a ;")])
+    ("fanuc", "G1 X1. F100. ; X7.\n", "'X7.' follows a ;"), ("fanuc", "G23 X1.\n", "coordinates in a block with G23"),
+    ("fanuc", "G1 F9. G22 X1.\n", "coordinates in a block with G22"), ("fanuc", "G05.1 Q2 X0 Y0\n", "a curve through"),
+    ("fanuc", "G05.1 Q1 X1.\n", "coordinates in a block with G5.1"), ("fanuc", "G10 L50\n", "L50 (parameters"),
+    ("haas", "G47 X1. Y1. P0\n", "G47 (engraving)"), ("fanuc", "G47 X1.\n", "G47 (a tool offset)"),
+    ("haas", "G83 R2. Z-5. I3. Q2. F9.\n", "two kinds of pecks"), ("haas", "G73 R2. Z-5. Q2. K6 F9.\n", "K6 of a peck"),
+    ("haas", "G83 R2. Z-20. I4. J2. F9.\n", "J2 shortens to nothing")])
 def test_what_moves_and_is_not_followed_is_refused_by_name(dialect, body, words):
     with pytest.raises(ProgramError) as caught:
         read(body, dialect)
@@ -489,3 +496,31 @@ def test_lines_of_tapping_cycles_are_known(text, dialect, taps, left):
     p = read(text, dialect)
     assert p.taps == dict.fromkeys(taps, True)
     assert any("left-hand" in r.message for r in p.remarks) == left
+
+
+@pytest.mark.parametrize(("words", "down"), [
+    ("G83 Z-20. R2. I8. J2. K3.", [-6, -12, -16, -19, -20]), ("G73 Z-20. R2. I8. J2. K3.", [-6, -12, -16, -19, -20]),
+    ("G83 Z-4. R2. I4. J2.", [-2, -4]), ("G83 Z-9. R2. I4.", [-2, -6, -9])])
+def test_pecks_of_haas_that_shrink(words, down):
+    """The first peck is I, each next one shorter by J, none shorter than K but the last; a later hole has the same."""
+    p = read(f"G99 {words} X5. Y0. F50.\nX9.\nG80\n", "haas")
+    for x in (5, 9):
+        assert p.end[(p.kind == FEED) & (p.end[:, 0] == x)][:, 2].tolist() == down
+    assert p.remarks == ()
+
+
+def test_pecks_of_haas_that_return_to_r():
+    """G73 with Q and K: 6 mm of pecks, then up to R; the peck after it begins just above its depth."""
+    p = read("G99 G83 X5. Z-20. R2. I8. J2. K3. F50.\nG73 X7. Z-12. R2. Q2. K6.\nG80\n", "haas")
+    z = p.end[(p.end[:, 0] == 7)][2:, 2].round(3).tolist()
+    assert z == [0, 0.254, -2, -1.746, -4, 2, -3.746, -6, -5.746, -8, -7.746, -10, 2, -9.746, -12, 2]
+    assert p.remarks == ()
+
+
+def test_places_that_haas_sends_out_are_no_moves():
+    assert ends("G1 X1. F9.\nG102 X Z\nN5 G102\nX2.\n", "haas") == [[1, 0, 10], [2, 0, 10]]
+
+
+@pytest.mark.parametrize(("dialect", "word"), [("fanuc", "G54.1 P1"), ("haas", "G154 P2"), ("haas", "G111")])
+def test_a_work_offset_is_told_by_the_word_of_the_program(dialect, word):
+    assert [r.message.split(" is not")[0] for r in read(f"{word}\nG1 X1. F9.\n", dialect).remarks] == [word]

@@ -14,7 +14,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 
-from verify.gcode.dialects.base import NUMBER, BlockError, Machine, zero_word
+from verify.gcode.dialects.base import NUMBER, BlockError, Machine
 from verify.gcode.dialects.heidenhain.heidenhain_cycles import (
     AT_ONCE,
     NOT_FOLLOWED,
@@ -35,7 +35,7 @@ from verify.gcode.dialects.stated_places import digits
 _NUM = r"[+-]?(?:[0-9]{1,8}(?:\.[0-9]*)?|\.[0-9]+)"
 _LINE = re.compile(rf"\s*(?:[0-9]+ +)?L((?: +[XYZABC]{_NUM})*)(?: +R0)?(?: +(FMAX|F{_NUM}))?((?: +M[0-9]+)*)\s*")
 _TOOL = re.compile(rf'TOOL CALL(?:\s*("[^"]*"|{NUMBER}|QS?[0-9]+))?(?:\s+([XYZUVW])(?![A-Z0-9+-]))?(.*)')
-_TOOL_WORD = re.compile(rf"\s*(S|F|DL|DR2|DR)\s*({VALUE})(?=\s|$)|\s*(VC)\s*=?\s*{VALUE}(?=\s|$)")
+_TOOL_WORD = re.compile(rf"\s*(S|FU|FZ|F|DL|DR2|DR)\s*({VALUE})(?=\s|$)|\s*(VC)\s*=?\s*{VALUE}(?=\s|$)")
 _BEGIN = re.compile(r"BEGIN PGM (?:\S.*)? ?(MM|INCH)")
 _DOTTED = re.compile(r"CYCL DEF ([0-9]+)\.([0-9]+)\s*(.*)")
 _TCPM = re.compile(rf"FUNCTION TCPM(?:\s+F\s*(TCP|CONT))?(?:\s+AXIS\s*(POS|SPAT))?(?:\s+PATHCTRL\s*(AXIS|VECTOR))?"
@@ -43,6 +43,11 @@ _TCPM = re.compile(rf"FUNCTION TCPM(?:\s+F\s*(TCP|CONT))?(?:\s+AXIS\s*(POS|SPAT)
 _CALLED = re.compile(r"CYCL CALL(?:\s+(POS|PAT))?\s*(.*)")
 _COORDINATE = re.compile(rf"\s*(I?)([XYZABC])\s*({VALUE})(?=\s|$)")
 _UNTILTED = re.compile(rf"(?:(?:[ABCF]|ABST|DIST)\s*{VALUE}\s*)*")
+_SKIPPED = re.compile(r"\s*(?:/\s*|([0-9]+\s+)/\s*)(?=[0-9A-Za-z])")
+_STATEMENT = re.compile(r"(?:CALL\s+)?LBL|FN\s*[0-9]|Q[LRS]?[0-9]+\s*=|(?:CALL|BEGIN|END)\s+PGM")
+_DEVICES = re.compile(r"(?:STOP|L)?\s*(?:M[0-9]+\s*)+")
+_CHANGES = re.compile(r"[XYZABCGTFS]|M0*(?:2|3|4|5|6|19|30)(?![0-9.])")
+"""Words that move the tool, or that a later move depends on."""
 SMALL = 0.01
 """deg, deviation of a rotary axis that needs no note."""
 _DEF = re.compile(rf"TOOL DEF\s+(\"[^\"]*\"|{NUMBER}|QS?[0-9]+)((?:\s+[LR]\s*{VALUE})*)")
@@ -100,12 +105,32 @@ class HeidenhainReader(HeidenhainPaths):
         """Blocks of one line, by its keyword. Raises BlockError where it cannot be read."""
         if self.is_simple and (m := _LINE.fullmatch(raw)) and not _corner_ahead(self.flow.ahead):
             return list(self._simple(m[1], m[2], [int(w[1:]) for w in m[3].split()]))
+        if skipped := _SKIPPED.match(raw):
+            return self._switched((skipped[1] or "") + raw[skipped.end():])
         text = block_text(raw)
         if not text or text.startswith(_IDLE) and not text.startswith("SEL TABLE"):
             return []
         if (moved := self.motion_blocks(text)) is not None:
             return self._called_after(moved)
         return list(self._other(text))
+
+    def _switched(self, raw: str) -> list[str | tuple[int, str]]:
+        """Blocks of a line with a /, which a switch of the machine leaves out.
+
+        Raises
+        ------
+        BlockError
+            The order of the blocks, or a value, would depend on that switch.
+        """
+        text = block_text(raw)
+        if _STATEMENT.match(text):
+            raise BlockError(f"a / before '{text[:20]}': the flow of the program would depend on a switch of the "
+                             "machine")
+        out = self.blocks(raw)
+        idle = not text or text.startswith(_IDLE) or _DEVICES.fullmatch(text)
+        if not idle or any(_CHANGES.search(b if isinstance(b, str) else b[1]) for b in out):
+            self.remarks.append("a block with / depends on a switch of the machine; the proof runs it")
+        return out
 
     @property
     def is_simple(self) -> bool:
@@ -143,7 +168,7 @@ class HeidenhainReader(HeidenhainPaths):
         if m := re.fullmatch(r"PRESET SELECT #\s*([0-9]+)", text):
             self._unheld("PRESET SELECT")
             self.reset_frames()
-            return [zero_word(int(m[1]), f"preset {m[1]}")]
+            return [self.zero(int(m[1]), f"preset {m[1]}")]
         if text.startswith("TRANS DATUM"):
             return self._datum(text)
         if re.fullmatch(r"(?:STOP)?\s*(?:M.*)?", text):
@@ -177,9 +202,18 @@ class HeidenhainReader(HeidenhainPaths):
                 given[w[1]] = self.q.value(w[2])
             at = w.end()
         out = [f"S{digits(given['S'])}"] if "S" in given else []
+        if "FZ" in given:
+            raise BlockError("FZ (a feed per tooth) of TOOL CALL is not followed: the tool table of the control has "
+                             "the number of teeth", "give the feed per turn (FU) or per minute")
         if "F" in given:
-            self.auto = given["F"]
-            self.rate = self.feed_word(given["F"])
+            self.auto, self.auto_turn = given["F"], False
+            self.rate = self.counted(given["F"], False)
+            out.append(self.rate)
+        elif "FU" in given or (self.per_turn is not None and "S" in given):
+            if "FU" in given:
+                self.auto, self.auto_turn, self.per_turn = given["FU"], True, given["FU"]
+            assert self.per_turn is not None
+            self.rate = self.turning(given.get("S", self.machine.s.speed), self.per_turn)
             out.append(self.rate)
         if m[1] is None and not {"DL", "DR", "DR2"}.isdisjoint(given):
             raise BlockError("TOOL CALL with DL or DR and without a tool is not followed", "name the tool in it")
@@ -252,7 +286,7 @@ class HeidenhainReader(HeidenhainPaths):
                                  f"the row "
                                  "of the preset table")
             self.reset_frames()
-            return [zero_word(int(row), f"preset {int(row)}")]
+            return [self.zero(int(row), f"preset {int(row)}")]
         if n in AT_ONCE or n in TOUCHES or n in (290, 800, 801, 880) or 1000 <= n:
             what = NOT_FOLLOWED.get(n, "a touch probe" if n in TOUCHES or n >= 1000 else "turning")
             raise BlockError(f"cycle {n} ({what}) is not followed")

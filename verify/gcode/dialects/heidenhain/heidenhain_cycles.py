@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 from verify.gcode.dialects.base import BlockError, Machine
 from verify.gcode.dialects.heidenhain.heidenhain_q import NUM, VALUE
-from verify.gcode.dialects.holes import DrilledHole, even_pecks, hole_blocks
+from verify.gcode.dialects.holes import DrilledHole, even_leads, even_pecks, hole_blocks
 from verify.gcode.dialects.stated_places import digits
 
 _HEAD = re.compile(r"CYCL DEF ([0-9]+)(?![0-9.])\s*(.*)")
-_ITEM = re.compile(rf"(Q[0-9]+)\s*=\s*({VALUE}|FMAX|FAUTO|[+-]?\s*MAX)")
+_ITEM = re.compile(rf"(Q[0-9]+)\s*=\s*({VALUE}|FMAX|FAUTO|AUTO|[+-]?\s*MAX)")
 DRILLS = frozenset({200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241})
 NOT_FOLLOWED = {
     204: "back boring", 210: "a slot", 211: "a circular slot", 212: "a pocket", 213: "a stud", 214: "a circular pocket",
@@ -69,7 +69,7 @@ def defined(text: str, value: Callable[[str], float]) -> CycleCall | None:
         return None
     values = {}
     for name, given in _ITEM.findall(m[2]):
-        values[name] = math.inf if given.endswith(("FMAX", "FAUTO", "MAX")) else value(given)
+        values[name] = math.inf if given.endswith(("AUTO", "MAX")) else value(given)
     rest = _ITEM.sub("", m[2])
     if "=" in rest:
         raise BlockError(f"cannot read '{rest.strip()[:50]}' in the definition of cycle {m[1]}")
@@ -153,8 +153,10 @@ def _ways(call: CycleCall, machine: Machine, surface: float, depth: float, feed:
     pecks = even_pecks(depth, first, shrink, min(least, first) if first > 0 else least, machine)
     breaks = (n == 203 and call.get("Q213", 0.0) > 0) or (n == 205 and call.get("Q257", 0.0) > 0)
     lift = math.inf if not breaks else max(call.get("Q256", 0.2) * unit, 0.0)
+    leads = () if n != 205 or breaks or "Q258" not in call.values else even_leads(
+        len(pecks), abs(call.get("Q258")) * unit, abs(call.get("Q259", call.get("Q258"))) * unit)
     out = feed(call.get("Q208")) if n == 203 and 0 < call.get("Q208", 0.0) < 99999 else None
-    return {"feed": down, "pecks": pecks, "lift": lift, "out": out}
+    return {"feed": down, "pecks": pecks, "lift": lift, "leads": leads, "out": out}
 
 
 def _bore_mill(call: CycleCall, here: Sequence[float], machine: Machine, heights: tuple[float, float, float], feed: str,

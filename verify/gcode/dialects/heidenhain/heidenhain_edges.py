@@ -124,8 +124,9 @@ class HeidenhainEdges(HeidenhainWords):
         size = self.q.value(m[1]) * self.factor_of_unit
         if not size > 0:
             raise BlockError(f"{key} with {size:g} mm")
-        old, feed = self.rate, self._rate(m[2] or "")
-        self.rate = old
+        old = self.rate, self.per_turn
+        feed = self._rate(m[2] or "")
+        self.rate, self.per_turn = old
         self.corner = (key, size, feed, self.number)
         return []
 

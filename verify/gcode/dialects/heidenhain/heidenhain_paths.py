@@ -34,7 +34,7 @@ class HeidenhainPaths(HeidenhainEdges):
         self.heading = None
         self._note_turns({w[0]: float(w[1:]) for w in words.split() if w[0] in "ABC"})
         rapid = feed == "FMAX"
-        rate = self.feed_word(float(feed[1:])) if feed and not rapid else ""
+        rate = self.counted(float(feed[1:]), False) if feed and not rapid else ""
         self.rate, self.last_rapid = rate or self.rate, rapid
         ms = self._switch(ms)
         self._check_turn(any(w[0] in "ABC" for w in words.split()), rapid)

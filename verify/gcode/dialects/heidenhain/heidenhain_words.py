@@ -33,7 +33,7 @@ _KNOWN_M = M_BEFORE | M_AFTER | M_IDLE | {89, 91, 99}
 _WORD = re.compile(rf"""\s*(?:M\s*(?P<m>[0-9]+)(?![0-9.])
     |(?P<side>R0|RL|RR)(?![A-Z0-9.])
     |DR\s*(?P<sense>[+-])(?![0-9.])
-    |F\s*(?P<feed>MAX|AUTO|{VALUE})
+    |F\s*(?P<feed>MAX|AUTO|[UZ]?\s*{VALUE})
     |(?P<name>I?[XYZABC]|I?P[AR]|N[XYZ]|T[XYZ]|CCA|LEN|R)\s*(?P<value>{VALUE}))(?![A-Z0-9.])""", re.VERBOSE)
 _STRIPPED = re.compile(rf"\bM118(?:\s+[XYZABC]\s*{VALUE})*|\bM120(?:\s+LA\s*[0-9]+)?|\bM103(?:\s+F\s*{VALUE})?")
 _RETRACT = re.compile(rf"\bM140(?:\s+MB\s*(MAX|{VALUE}))(?:\s+F\s*(MAX|{VALUE}))?")
@@ -112,6 +112,8 @@ class HeidenhainWords(HeidenhainFrames):
     wound    : deg by which a rotary word counts less than the axis has turned (M94)
     calls    : whether the latest move calls a cycle at its end, ``end``; modal_call : whether every move does (M89)
     rate     : the F word in force; auto : feed of TOOL CALL
+    per_turn : units of the program per turn of the spindle (FU), None where F counts per minute
+    auto_turn : whether F of TOOL CALL counts per turn
     """
 
     style, refused_m = HEIDENHAIN_STYLE, HEIDENHAIN_M
@@ -131,6 +133,8 @@ class HeidenhainWords(HeidenhainFrames):
         self.centre = [math.nan] * 2
         self.rate = ""
         self.auto: float | None = None
+        self.per_turn: float | None = None
+        self.auto_turn = False
         self.held: Move | None = None
         self.corner: tuple[str, float, str, int] | None = None
         self.approach: Way | None = None
@@ -167,6 +171,8 @@ class HeidenhainWords(HeidenhainFrames):
             if self.auto is None:
                 raise BlockError("FAUTO, FMAX or MAX as the feed of a cycle, and TOOL CALL has no F",
                                  "give the feed as a number")
+            if self.auto_turn:
+                return self.turning(self.machine.s.speed, self.auto)
             number = self.auto
         return f"F{0.1 * number:.9f}" if self.inch else f"F{digits(number)}"
 
@@ -273,6 +279,9 @@ class HeidenhainWords(HeidenhainFrames):
             elif m["sense"]:
                 w.sense = m["sense"]
             elif m["feed"]:
+                if m["feed"].startswith("Z"):
+                    raise BlockError(f"F{m['feed']} (a feed per tooth) is not followed: the tool table of the control "
+                                     "has the number of teeth", "give the feed per turn (FU) or per minute")
                 if w.feed:
                     raise BlockError(f"two feeds in one block: F{w.feed} and F{m['feed']}")
                 w.feed = m["feed"]
@@ -296,12 +305,35 @@ class HeidenhainWords(HeidenhainFrames):
         if feed == "AUTO":
             if self.auto is None:
                 raise BlockError("FAUTO, and TOOL CALL has no F")
-            self.rate = self.feed_word(self.auto)
+            self.rate = self.counted(self.auto, self.auto_turn)
             return self.rate
         if feed and feed != "MAX":
-            self.rate = self.feed_word(self.q.value(feed))
+            self.rate = self.counted(self.q.value(feed.lstrip("UZ ")), feed.startswith("U"))
             return self.rate
         return ""
+
+    def counted(self, number: float, per_turn: bool) -> str:
+        """The F word of a feed, and keep how it counts: per minute, or per turn of the spindle (FU).
+
+        Raises
+        ------
+        BlockError
+            A feed per turn without a spindle speed.
+        """
+        self.per_turn = number if per_turn else None
+        return self.turning(self.machine.s.speed, number) if per_turn else self.feed_word(number)
+
+    def turning(self, speed: float, per_turn: float) -> str:
+        """The F word of a feed per turn, units of the program, at a spindle speed, turns per minute.
+
+        Raises
+        ------
+        BlockError
+            The spindle has no speed.
+        """
+        if not speed > 0:
+            raise BlockError(f"FU{per_turn:g} without a spindle speed", "give S in TOOL CALL")
+        return f"F{digits(per_turn * speed)}"
 
     def _side(self, word: str) -> str:
         """The word of the reader that begins or ends radius compensation, '' for none."""

@@ -15,7 +15,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 
-from verify.gcode.dialects.base import ZEROS, BlockError, Machine, zero_word
+from verify.gcode.dialects.base import ZEROS, BlockError, Machine
 from verify.gcode.dialects.orientation import needed
 from verify.gcode.dialects.siemens.siemens_calls import SiemensCalls
 from verify.gcode.dialects.siemens.siemens_cycles import DrillingCall
@@ -323,7 +323,7 @@ class SiemensReader(SiemensCalls):
         elif n in UNITS:
             line.out.append(f"G{UNITS[n]}")
         elif 505 <= n <= 599:
-            line.out.append(zero_word(n - 500, f"G{n}"))
+            line.out.append(self.zero(n - 500, f"G{n}"))
         elif n == 60:
             self.bound(True)
             line.out.append("G61")
@@ -530,9 +530,9 @@ class SiemensReader(SiemensCalls):
         if not moves:
             self.corner_of({k: v for k, v in line.values.items() if k in ("RNDM", "FRCM")})
             head = [*line.out, *self._rates(line)]
+            ends = self.flushed() if {"M2", "M30"} & set(line.out) or self.changes_plane(codes) else []
             if line.after or any(w[0] in "TG" for w in line.out):
                 self.unheld("another word")
-            ends = self.flushed() if {"M2", "M30"} & set(line.out) else []
             return [*line.before, *ends, *([" ".join(head)] if head else []), *line.after]
         if "G53" in line.out:
             self.forget()

@@ -135,10 +135,28 @@ class SiemensCorners(SiemensPaths):
             return out
         return [*out, self._text(move)]
 
+    def changes_plane(self, codes: Sequence[int]) -> bool:
+        """Whether the G words of a block select another plane."""
+        return any(n in (17, 18, 19) and n != self.machine.s.plane for n in codes)
+
     def flushed(self) -> list[str | tuple[int, str]]:
-        """The block of the move held back, with its corner left out: the program ends there."""
+        """The block of the move held back, with its corner left out.
+
+        The control puts no corner between moves of which one leaves the plane, where the plane changes, and at the end
+        of the program.
+        """
         held, self.held = self.held, None
-        return [] if held is None else [(held.number, self._text(held))]
+        if held is None:
+            return []
+        if held.corner is not None:
+            self.left_out(held.corner[0], held.number)
+        return [(held.number, self._text(held))]
+
+    def left_out(self, name: str, number: int) -> None:
+        """Note a corner that the control does not put in; ``name`` is its word, ``number`` its line."""
+        if name != "RNDM":
+            self.notes.append(f"line {number}: {name}= puts no corner here, as a move next to it leaves the plane, the "
+                              "plane changes, or no move follows")
 
     def _between(self, first: Cornered, second: Cornered) -> tuple[list[str | tuple[int, str]], Cornered]:
         """Blocks of the move before a corner and of the corner, and the shortened move after it."""

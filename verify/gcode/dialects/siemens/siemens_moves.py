@@ -104,12 +104,10 @@ class SiemensMoves(SiemensCorners):
         plane = {"XYZ"[n] for n in PLANE_AXES[self.machine.s.plane][:2]}
         level = all(k in plane or abs(self.end["XYZ".index(k)] - here["XYZ".index(k)]) < 1e-9 for k in linear)
         if corner is not None and not (plane & linear.keys() and level):
-            if corner[0] != "RNDM":
-                raise BlockError(f"{corner[0]}= at the end of a move that leaves the plane")
+            self.left_out(corner[0], self.number)
             corner = None
-        if self.held is not None and self.held.corner is not None and self.held.corner[0] == "RNDM" and not level:
-            ends = self.flushed()
-            return [*ends, *self._move(line)]
+        if self.held is not None and (not level or self.changes_plane(line.codes)):
+            return [*self.flushed(), *self._move(line)]
         if self.held is not None or corner is not None:
             if (machine_place or self.relative or turns or any(v is not None for v in vector)
                     or {"TURN", "FB"} & line.values.keys() or self.motion not in (0, 1, 2, 3)

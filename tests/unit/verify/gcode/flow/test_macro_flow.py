@@ -43,6 +43,8 @@ def test_local_calls_of_haas():
     ("G65 P20 X10. I2. J3. A5\nM30\nO20\nG1 X#24 Y#4 F100.\nX#5 Y#1\n#24=1\nM99\n", [(10, 2), (3, 5)]),
     ("G65 P20 I1. I2. I3.\nM30\nO20\nG1 X#4 Y#7 F100.\nX#10\nM99\n", [(1, 2), (3, 2)]),
     ("#1=7\nG65 P20 L2\nG1 X#1 F100.\nM30\nO20\n#1=2\nM99\n", [(7, 0)]),
+    ("#1=#0\nG1 X5. Y#1 F100.\n#500=#0\nX6. Y#500\nM30\n", [(5, 0), (6, 0)]),
+    ("G65 P20 X5.\nM30\nO20\nG1 X#24 Y#25 F100.\nX#0 Y2.\nM99\n", [(5, 0), (5, 2)]),
     ("DPRNT[X#5041[43]]\n#3006=1 (CHECK)\nG1 X1. F100.\nM30\n", [(1, 0)])])
 def test_macros_compute_and_branch(body, expected):
     """Loops, jumps, vacant variables, functions, arguments of G65 and its own level of local variables."""

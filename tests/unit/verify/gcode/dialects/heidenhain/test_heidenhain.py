@@ -304,3 +304,35 @@ def test_a_whole_number_that_rounding_decides_is_refused(function):
     with pytest.raises(ProgramError, match="the rounding of the control decides"):
         read([f"Q1 = {function}(0.3/0.1)", "L X+1 F100"], "heidenhain")
     assert len(read([f"Q1 = {function}(0.35/0.1)", "L X+1 F100"], "heidenhain"))
+
+
+def test_feeds_per_turn():
+    """FU counts with the speed in force, of TOOL CALL too, and FAUTO takes it back."""
+    p = read("L X+6 FU0.05\nTOOL CALL S2000\nL X+7\nL X+8 F70\nTOOL CALL S500\nL X+9\nTOOL CALL 1 Z S400 FU 0.1\nM3\n"
+             "L X+10 FAUTO\nRND R1 F9\nL Y+5", "heidenhain")
+    assert p.feed[p.kind == 1][[0, 1, 2, 3, 4, 5, -1]].tolist() == [50, 100, 70, 70, 40, 9, 40]
+    for word in ("L X+6 FZ0.05", "TOOL CALL 1 Z S100 FZ0.1"):
+        with pytest.raises(ProgramError, match="a feed per tooth"):
+            read(word, "heidenhain")
+
+
+@pytest.mark.parametrize(("line", "told"), [("/12 L X+5", True), ("12 /L X+5", True), ("/ TOOL CALL S900", True),
+                                           ("/7 M8", False), ("/7 ; text", False), ("/9 CYCL DEF 7.1 X+5", True)])
+def test_a_block_with_a_slash_runs_and_is_told_where_it_counts(line, told):
+    p = read(f"{line}\nL X+5", "heidenhain")
+    assert p.end[-1].tolist()[:1] == [10 if "CYCL" in line else 5]
+    assert [r.message[:14] for r in p.remarks] == ["a block with /"] * told
+
+
+@pytest.mark.parametrize("line", ["/12 CALL LBL 1", "/LBL 1", "12 /FN 9: IF +1 EQU +1 GOTO LBL 3", "/Q1=5"])
+def test_a_slash_before_what_decides_the_order_is_refused(line):
+    with pytest.raises(ProgramError, match="would depend on a switch"):
+        read(f"{line}\nL X+5", "heidenhain")
+
+
+def test_pecks_begin_their_stop_distance_above_the_last_depth():
+    """Cycle 205: Q258 above the first depth, Q259 above the last one, evenly between; Q206 is the feed of TOOL CALL."""
+    given = "Q200=+2 Q201=-20 Q206=AUTO Q202=+5 Q203=+0 Q204=+20 Q212=+0 Q205=+0 Q257=+0 Q256=+0.2"
+    p = read(f"CYCL DEF 205 {given} Q258=+0.5 Q259=+1\nL X+5 FMAX M99", "heidenhain")
+    down = p.end[(p.end[:, 0] == 5) & (p.start[:, 2] == 2) & (p.kind == 0)][:, 2]
+    assert down[:3].tolist() == [-4.5, -9.25, -14] and set(p.feed[p.kind == 1]) == {200}

@@ -69,7 +69,7 @@ REFUSED = [
     ("CYCLE90(1)", "thread milling"), ("CYCLE97(1)", "a thread"), ("L99", "subprogram L99 is not in this file"),
     ("KONT", "KONT (another approach"), ("BSPLINE X1", "a spline"), ("G58 X1", "programmable work offset"),
     ("G33 Z1 K1", "thread cutting"), ("G1 X9 F9 RND=20\nY9", "does not fit"),
-    ("G1 X9 F9 CHR=2\nTRANS X1", "TRANS between a corner"), ("G1 Z1 F9 RND=2", "leaves the plane"),
+    ("G1 X9 F9 CHR=2\nTRANS X1", "TRANS between a corner"),
     ("X=R5", "R5 has no value yet"), ("DIAMON", "X by the diameter"),
     ("POS[X]=5", "POS (a positioning axis)"), ("ORIRESET(0,0)", "a turn of the tool"),
     ("WAITM(1,1,2)", "another channel"),
@@ -386,3 +386,19 @@ def test_a_whole_number_that_rounding_decides_is_refused(unsure, right):
     with pytest.raises(ProgramError, match="the rounding of the control decides"):
         read(f"R1={unsure}\nG1 X1 F9", "siemens")
     assert len(read(f"R1={right}\nG1 X1 F9", "siemens"))
+
+
+@pytest.mark.parametrize(("lines", "plain", "corners"), [
+    ("G1 X20 RND=2\nZ5", "G1 X20\nZ5", 1), ("G1 X20 CHF=2\nX30 Z40", "G1 X20\nX30 Z40", 1),
+    ("G1 Z1 RND=2\nX4", "G1 Z1\nX4", 1), ("G1 X9 Z1 CHR=2\nX14", "G1 X9 Z1\nX14", 1),
+    ("G1 X9 RND=2\nG18\nX12 Z45", "G1 X9\nG18\nX12 Z45", 1), ("G1 X9 RND=2\nG18 X12", "G1 X9\nG18 X12", 1),
+    ("G1 X9 RND=2\nG17 Y9", "G1 X7\nG3 X9 Y2 I0 J2\nG1 Y9", 0),
+    ("G1 X9 RND=2\nY9 RND=1\nZ9", "G1 X7\nG3 X9 Y2 I0 J2\nG1 Y9\nZ9", 1)])
+def test_no_corner_next_to_a_move_that_leaves_the_plane(lines, plain, corners):
+    p = read(lines, "siemens")
+    assert apart(p, read(plain, "siemens")) < 1e-9 and not p.remarks
+    assert sum("puts no corner here" in n for n in p.notes) == corners
+
+
+def test_smoothing_of_the_tool_axis_moves_nothing():
+    assert not read("ORISON\nG1 X3\nORISOF", "siemens").remarks
