@@ -13,8 +13,6 @@ PECK_LIFT = 0.254
 MOVES_A_PECK = 3
 MOVES_A_HOLE = 5
 SAME_DEPTH = 1e-9
-MAX_SHRINKS = 1e6
-"""Pecks that shrink so often are too many for any block."""
 
 
 class HoleExit(Enum):
@@ -57,10 +55,15 @@ class Hole:
             return 0.0
         if self.peck <= 0:
             return math.inf
+        if self.step > 0:
+            b = self.peck + 0.5 * self.step  # n pecks reach n b - n^2 step / 2
+            square = b * b - 2.0 * self.step * depth
+            falling = 2.0 * depth / (b + math.sqrt(square)) if square >= 0 else math.inf
+            if falling <= max(self.peck - self.least, 0.0) / self.step + 1.0:
+                return math.ceil(falling) + 1.0
         shortest = min(self.peck, self.least) if self.step > 0 else self.peck
         if shortest <= 0:
-            falling = math.ceil(min(self.peck / self.step, MAX_SHRINKS))
-            return float(falling) if falling * (self.peck - 0.5 * (falling - 1) * self.step) >= depth else math.inf
+            return math.inf
         share = depth / shortest
         return float(math.ceil(share)) if math.isfinite(share) else math.inf
 
@@ -73,7 +76,7 @@ class Hole:
             yield from [whole][:count]
             return
         while at < whole - SAME_DEPTH:
-            at = at + peck if at + peck < whole - SAME_DEPTH else whole
+            at = at + peck if peck > 0 and at + peck < whole - SAME_DEPTH else whole
             yield at
             peck = max(peck - self.step, self.least)
 
