@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import VerificationError
+from geometry.errors import SetupError
 from geometry.mesh import F64, I32
 from geometry.tool_body import ToolBody
 from verify.kernels.tables import MoveArrays
@@ -16,6 +16,7 @@ from verify.tool_axes import ToolAxes
 
 Progress = Callable[[float], None]
 BOW = 5e-4
+FLUTE_ROUNDING = 1e-9  # mm, of the height of a corner: a cone's comes from a tangent
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,16 +75,19 @@ def cutter_table(tools: Sequence[ToolBody]) -> F64:
 
     Returns (k, 4) float64, mm, in the tool frame.
 
+    Flutes that end at the corner to the rounding of its height reach to it.
+
     Raises
     ------
-    VerificationError
+    SetupError
         Code flute_too_short: the flutes end inside the corner of the cutting part.
     """
-    for tool in tools:
-        corner_height = 2.0 * tool.corner_radius if tool.kind == "bull" else max(tool.corner_radius, tool.cone_height)
-        if tool.flute_length < corner_height:
-            raise VerificationError(
+    corner = [2.0 * t.corner_radius if t.kind == "bull" else max(t.corner_radius, t.cone_height) for t in tools]
+    for tool, corner_height in zip(tools, corner, strict=True):
+        if tool.flute_length < corner_height - FLUTE_ROUNDING:
+            raise SetupError(
                 f"{tool.id}: the flute length {tool.flute_length} mm ends inside the corner of the cutting part",
                 code="flute_too_short", subjects=(tool.id,), measured=tool.flute_length, limit=corner_height,
                 remedy="give the flute length measured from the tip")
-    return np.array([[t.radius, t.corner_width, t.flute_length, t.cone_height] for t in tools]).reshape(-1, 4)
+    return np.array([[t.radius, t.corner_width, max(t.flute_length, high), t.cone_height]
+                     for t, high in zip(tools, corner, strict=True)]).reshape(-1, 4)

@@ -21,6 +21,7 @@ from verify.assumptions import Assumed, AssumedKind, in_order
 from verify.checks.body_assumptions import body_assumptions
 from verify.checks.changed_tools import as_collisions
 from verify.checks.empty_spindle import with_nose
+from verify.checks.idle_tools import idle_programs, idle_tools
 from verify.checks.program_assumptions import program_assumptions, rapids_decided, untold_axes
 from verify.checks.program_sequence import (
     FramedProgram,
@@ -144,6 +145,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     run = met.run
     used = [tools[k] for k in np.unique(moves.tool[moves.feed])]
     fine = unseen(used, met.spacing, met.upright)
+    no_trace = [t for t in fine if t.cone_height <= 0.0]
     skins = setup.plunge_skin * np.array([t.diameter for t in tools])[moves.tool] if len(moves) else np.zeros(0)
     stretches, of = in_parts(moves, tools)
     known = counted(framed, np.unique(source.tool).tolist())
@@ -164,7 +166,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                 *cuts.gouges, *cuts.excluded, *loaded, *drills.findings, *turned, *_program_findings(framed),
                 *(f for p in framed for f in p.findings(tools)), *_unlisted(run.lost, framed),
                 *(f for p in framed for f in table_findings([p.program], tools, p.setup)),
-                *_idle_findings(framed, run, moves, source, [t for t in fine if t.cone_height <= 0.0], asked),
+                *idle_programs(source.names, run.cut, moves, source, no_trace, asked),
                 *again, *sideways_findings(moves, run.cut, tools, source),
                 *torn_threads(moves, run.cut, tapped[:, 0], tools, source),
                 *tapped_out(moves, run.cut, tapped[:, 0], tools, source, [p.program.taps for p in framed]),
@@ -180,7 +182,10 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                             error_bound([p.program for p in framed]))
         unread = None if asked.whole is None else unread_work(asked.whole, framed[0], measured, cutting, tools)
         work, left = work_done(asked, measured, cutting, run.cut, source, unread)
-        findings += [*cuts.allowance, *left, *deep_findings(scored.samples, cuts.residual, cuts.mover, cutting, source),
+        findings += [*cuts.allowance, *left,
+                     *idle_tools(run.cut, _speeds(framed, known), source, scored.samples,
+                                 slack + asked.facet + measured.error, cutting, no_trace),
+                     *deep_findings(scored.samples, cuts.residual, cuts.mover, cutting, source),
                      *slot_findings(scored.samples, cuts.residual, cutting, source)]
     notes = [*cuts.notes, *springs, *(note for p in framed for note in p.notes())]
     dips = [Assumed(AssumedKind.BETWEEN_SAMPLES, round(met.dip, 3), "the fixtures are so large that a ball may enter "
@@ -217,6 +222,12 @@ def _pitches(setup: ProofSetup) -> dict[int, float]:
     return {number: said.pitch for number, said in setup.cutting.items() if said.pitch is not None}
 
 
+def _speeds(read: Sequence[FramedProgram], known: NDArray[np.bool_]) -> F64:
+    """(m,) float64, 1/min, of the spindle in each move; inf where nothing states it."""
+    speeds = (p.speed if len(p.speed) else np.full(len(p), np.inf) for p in (r.program for r in read))
+    return np.concatenate([np.zeros(0), *speeds])[known]
+
+
 def _settled(scored: ScoredSamples, part: Part, tools: Sequence[ToolBody], setup: ProofSetup, moves: Moves,
              threads: int, tell: Report) -> ScoredSamples:
     """The samples with close ones in each place that a coarse one does not speak for; no zone answers for them."""
@@ -236,24 +247,6 @@ def _unlisted(lost: int, read: Sequence[FramedProgram]) -> list[Finding]:
         return []
     return [Finding(FindingKind.PROGRAM, read[0].program.name, 0, None, None, None, 0.0, 0.0,
                     f"{lost} contacts are not listed, as there are too many: mend those that are listed first", lost)]
-
-
-def _idle_findings(read: Sequence[FramedProgram], run: StockPass, moves: Moves, source: Source,
-                   fine: Sequence[ToolBody], asked: Asked | None) -> list[Finding]:
-    """Programs whose feed moves never meet the stock: wrong zero, or inch for mm.
-
-    fine  : tools so thin that the stock model may not show their cuts
-    asked : the work to do; where no program does any, that is a kind of its own
-    """
-    kind = FindingKind.PROGRAM if asked is None or run.cut.any() else FindingKind.NOTHING_CUT
-    out, traceless = [], np.isin(source.tool, [t.number for t in fine])
-    for number, p in enumerate(read):
-        own = (source.program == number) & moves.feed
-        if own.any() and not run.cut[own].any() and not traceless[own].all():
-            m = int(np.flatnonzero(own)[0])
-            out.append(Finding(kind, p.program.name, int(source.line[m]), None, None, None, 0.0, 0.0,
-                               "no feed move meets the stock: check the unit, the program zero and the tool"))
-    return out
 
 
 def _finishes(cuts: SurfaceCuts, setup: ProofSetup, count: int) -> NDArray[np.bool_]:

@@ -4,7 +4,7 @@ import tracemalloc
 
 import pytest
 
-from geometry.errors import ProgramError, VerificationError
+from geometry.errors import ProgramError
 from verify.gcode.reader import read_program
 from verify.program import move_log
 from verify.program.move_log import MAX_MOVES_A_BLOCK
@@ -183,7 +183,7 @@ def test_a_program_that_breaks_off(text):
     "G81 X0 Y0 Z-5 R1 L1000000 F100\n", "G83 X0 Y0 Z-50000000 R1 Q0.00000001 F100\n"])
 def test_a_block_that_would_grow_without_bound_costs_no_memory(body):
     tracemalloc.start()
-    with pytest.raises(VerificationError) as caught:
+    with pytest.raises(ProgramError) as caught:
         read_program(HEAD + body + TAIL, name="a.ngc")
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
@@ -197,7 +197,7 @@ def test_a_program_of_too_many_moves(body, line, monkeypatch):
     """Plain lines are counted whenever a chunk of them is packed, arcs before they are written out."""
     monkeypatch.setattr(move_log, "MAX_MOVES", 90)
     monkeypatch.setattr(move_log.Log, "full", 5)
-    with pytest.raises(VerificationError) as caught:
+    with pytest.raises(ProgramError) as caught:
         read_program(HEAD + body + TAIL)
     assert caught.value.code == "program_too_long" and caught.value.limit == 90
     assert caught.value.subjects == (f"line {line}",)

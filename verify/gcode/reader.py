@@ -298,10 +298,10 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
         Lines that cannot be read; the subjects name them. Reasons are unknown words, two words of one modal group, a
         feed move without a feed, and an arc without a centre or with ends on two circles. Further reasons are a tool
         that is not in the table, an incomplete program, and a move of the joints off rotary zero without known
-        pivots. Without a line: ``spindle_tool`` is not in the table.
+        pivots. Without a line: ``spindle_tool`` is not in the table. Code program_too_long: a block of more than
+        200 000 moves, a program of more than 5 000 000, or a loop without an end.
     VerificationError
-        Code program_too_long: a block of more than 200 000 moves, or a program of more than 5 000 000;
-        unknown_dialect.
+        Code unknown_dialect.
 
     Notes
     -----

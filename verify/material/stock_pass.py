@@ -228,7 +228,7 @@ def free_rapids(moves: Moves) -> NDArray[np.bool_]:
     They are retracts along the tool axis, and returns along it no deeper than a feed move before, without a sideways
     move since: a peck. An unprogrammed move, as after a visit to a fixed place of the machine, counts as sideways.
     """
-    rise, straight, linked = _along_axis(moves)
+    rise, straight, linked = along_axis(moves)
     out = np.asarray(~moves.feed & straight & (rise > 0))
     for m in np.flatnonzero(~moves.feed & straight & (rise < 0)).tolist():
         height, i = 0.0, m - 1  # of the end of move i over the start of move m
@@ -244,7 +244,7 @@ def rapid_arrays(moves: Moves, setup: ProofSetup) -> RapidArrays:
 
     A rapid that may leave its straight way keeps as much more.
     """
-    free, (rise, straight, linked) = free_rapids(moves), _along_axis(moves)
+    free, (rise, straight, linked) = free_rapids(moves), along_axis(moves)
     down = ~moves.feed & straight & (rise <= 0.0)
     onto = np.zeros(len(free), np.bool_)  # a move straight down that a feed move follows, or another such move
     for m in np.flatnonzero(down)[::-1].tolist():
@@ -259,9 +259,15 @@ def contact_limits(setup: ProofSetup) -> ContactLimits:
     return ContactLimits(setup.clearance_rapid, setup.gouge_tolerance, BESIDE)
 
 
-def _along_axis(moves: Moves) -> tuple[F64, NDArray[np.bool_], NDArray[np.bool_]]:
-    """How far each move goes up the tool axis, mm, whether it goes straight along it, and whether it continues the
-    move before; each (m,)."""
+def along_axis(moves: Moves) -> tuple[F64, NDArray[np.bool_], NDArray[np.bool_]]:
+    """How each of m moves goes along the tool axis.
+
+    Returns
+    -------
+    rise     : (m,) float64, mm, how far it goes up
+    straight : (m,) bool, whether it goes along the axis only
+    linked   : (m,) bool, whether it goes on where the move before ends
+    """
     d = moves.end - moves.start
     up = np.tile([0.0, 0.0, 1.0], (len(d), 1)) if moves.axes is None else moves.axes.axis
     rise = np.einsum("ij,ij->i", d, up)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import ProgramError, VerificationError
+from geometry.errors import ProgramError
 from geometry.mesh import F64
 from verify.program.axis_log import TurnLog
 from verify.program.move_kinds import FEED
@@ -148,7 +148,7 @@ class Log:
 
         Raises
         ------
-        VerificationError
+        ProgramError
             Code program_too_long: over 200 000 moves in the block or 5 000 000 in the program.
         """
         if moves > MAX_MOVES_A_BLOCK:
@@ -157,7 +157,7 @@ class Log:
             self._too_long("the program makes too many moves", self.count + moves, MAX_MOVES, self.line)
 
     def flush(self) -> None:
-        """Pack the latest moves. Raises VerificationError as ``room`` does where the program has too many."""
+        """Pack the latest moves. Raises ProgramError as ``room`` does where the program has too many."""
         if not self.rows:
             return
         if self.count > MAX_MOVES:
@@ -199,7 +199,7 @@ class Log:
                                                   "know")
 
     def _too_long(self, problem: str, moves: float, limit: int, line: int) -> None:
-        raise VerificationError(f"{self.name}, line {line}: {problem} ({limit} allowed)", code="program_too_long",
-                                subjects=(f"line {line}",), measured=int(min(moves, 1e18)), limit=limit,
-                                remedy="correct the turns, radius, peck, repeats or rotary words of the line, or split "
-                                       "the program")
+        raise ProgramError(f"{self.name}, line {line}: {problem} ({limit} allowed)", code="program_too_long",
+                           subjects=(f"line {line}",), measured=int(min(moves, 1e18)), limit=limit,
+                           remedy="correct the turns, radius, peck, repeats or rotary words of the line, or split "
+                                  "the program")

@@ -26,6 +26,7 @@ from verify.surface.sample_scores import proved_samples
 WORKED_SHARE = 0.2  # of the area of a face, along whose normals feed moves remove stock
 MAX_ASKED = 400  # samples of a face that are followed to the end of the stock; their share is known to 2 %
 MAX_GOOD = 200_000  # good samples among which the nearest one is looked for
+LEAST_PASSED, MAX_PASSED = 50, 40_000  # samples of each face, and of all, that are followed tool by tool
 ASIDE, ASIDE_ROOM = 2.0, 0.3  # shortest ways, and mm: a good place of the same face so near makes a sample a side
 OFF_FACETS = 0.02  # mm from a sample on: facets of its own surface are no obstacle of its ray
 BOOL = NDArray[np.bool_]
@@ -69,12 +70,26 @@ class Cutting:
         """
         if not len(points):
             return np.zeros(0), np.zeros(0, np.int32)
-        stock = stock_on_normals(points, directions, self.tree.mesh.bounds, self.setup, most)
-        wall, _ = first_hits(self.tree, points, directions, t_min=start)
+        stock, wall = self.blank_on_rays(points, directions, most, start)
         initial = np.minimum(stock, wall)
         left, mover = residual_on_normals(points, directions, initial, self.moves, self.tools, threads=self.threads)
         outside = (stock < wall) & (stock < most)
         return np.where((mover >= 0) | outside, np.maximum(left, 0.0), np.inf), mover
+
+    def blank_on_rays(self, points: F64, directions: F64, most: float, start: float) -> tuple[F64, F64]:
+        """Stock of the blank on rays, and where they first hit the part.
+
+        points, directions : (n, 3) float64, mm and unit, setup frame; points lie outside of the part or on it
+        most  : mm; stock is followed no farther
+        start : mm; nearer facets of the part are no obstacle
+
+        Returns
+        -------
+        stock : (n,) float64, mm, not above ``most``
+        wall  : (n,) float64, mm; inf where the ray meets no part
+        """
+        stock = stock_on_normals(points, directions, self.tree.mesh.bounds, self.setup, most)
+        return stock, first_hits(self.tree, points, directions, t_min=start)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,6 +208,77 @@ def worked_faces(samples: SurfaceSamples, residual: F64, mover: I32, reach: floa
     if not worked.any():
         worked = sure + np.where(open_, more, 0.0) > 0.0
     return tuple(int(n) for n in numbers[worked])
+
+
+def passed_faces(samples: SurfaceSamples, residual: F64, mover: I32, known: Sequence[int],
+                 cutting: Cutting) -> tuple[int, ...]:
+    """Faces that a tool before the last one works on, though a later tool takes off all that it leaves there.
+
+    What a tool takes off above a face on its way over another one does not count: where it leaves a plane, and works as
+    much, or on a fifth of the area, towards a parallel face that lies higher. So a tool that roughs the top of a plate
+    does not work on the floors of its pockets.
+
+    samples  : SurfaceSamples, n of them
+    residual : (n,) float64, mm of stock on their normals after all moves; mover : (n,) int32, index, the move that left
+               it, -1 for none
+    known    : face numbers that are worked on anyway
+
+    Returns face numbers, ascending, without those known.
+    """
+    stretch = np.cumsum(np.concatenate([[0], np.diff(cutting.moves.tool[cutting.moves.feed]) != 0]))
+    numbers, place = np.unique(samples.face, return_inverse=True)
+    if stretch[-1] == 0 or len(numbers) == len(known):
+        return ()
+    share = max(LEAST_PASSED, min(MAX_ASKED, MAX_PASSED // len(numbers)))
+    rows = np.concatenate([thinned(np.flatnonzero(place == k), share) for k in range(len(numbers))])
+    points, normals, of = samples.points[rows], samples.normals[rows], place[rows]
+    # each sample stands for an even part of its face
+    weight = (np.bincount(place, weights=samples.area) / np.bincount(of))[of]
+    planes, feeds = FinishedPlanes.of(samples, residual, mover, cutting), np.flatnonzero(cutting.moves.feed)
+    left = np.minimum(*cutting.blank_on_rays(points, normals, cutting.farthest, OFF_FACETS))
+    found, rest = set[int](), ~np.isin(numbers, known)
+    for k in range(int(stretch[-1])):
+        own = feeds[stretch == k]
+        left, by = residual_on_normals(points, normals, left, cutting.moves.only(own), cutting.tools,
+                                       threads=cutting.threads)
+        cut = by >= 0
+        by[cut] = own[by[cut]]
+        worked = cut & ~planes.holds(points, normals, left, by)
+        enough = np.bincount(of, weights=weight * worked) >= WORKED_SHARE * np.bincount(of, weights=weight)
+        if (enough & rest).any():
+            worked &= ~_on_the_way(points, normals, left, of, weight, cut, planes.width)
+            enough = np.bincount(of, weights=weight * worked) >= WORKED_SHARE * np.bincount(of, weights=weight)
+            found.update(numbers[enough & rest].tolist())
+    return tuple(sorted(found))
+
+
+def _on_the_way(points: F64, normals: F64, left: F64, face: INT, weight: F64, cut: BOOL, width: float) -> BOOL:
+    """Whether what a tool takes off above a place belongs to a parallel face that lies higher.
+
+    points, normals : (n, 3) float64, mm and unit; left : (n,) float64, mm that the tool leaves on each normal
+    face   : (n,) int64, index, from 0; weight : (n,) float64, mm² that each place stands for
+    cut    : (n,) bool, places above which the tool takes something off
+
+    Returns (n,) bool.
+    """
+    out, total, rows = np.zeros(len(points), np.bool_), np.bincount(face, weights=weight), np.flatnonzero(cut)
+    ends = points[rows] + left[rows, None] * normals[rows]
+    plane = _plane_keys(np.zeros(len(rows), np.int64), ends, normals[rows], width)
+    own = np.einsum("ij,ij->i", points[rows], normals[rows])
+    keys, group = np.unique(np.column_stack([plane, face[rows]]), axis=0, return_inverse=True)
+    group = group.reshape(-1)
+    area = np.bincount(group, weights=weight[rows])
+    height = np.bincount(group, weights=weight[rows] * own) / area
+    at: dict[tuple[int, ...], list[int]] = {}
+    for k, key in enumerate(map(tuple, keys.tolist())):
+        at.setdefault(key[:5], []).append(k)
+    belongs = np.zeros(len(keys), np.bool_)
+    for k, key in enumerate(map(tuple, keys.tolist())):
+        beside = (b for d in (-1, 0, 1) for b in at.get((*key[:4], key[4] + d), ()))
+        belongs[k] = any(height[b] > height[k] + width
+                         and area[b] >= min(WORKED_SHARE * total[keys[b, 5]], area[k]) for b in beside)
+    out[rows] = belongs[group]
+    return out
 
 
 def distance_aside(samples: SurfaceSamples, good: INT, rows: INT) -> F64:

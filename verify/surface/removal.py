@@ -41,7 +41,7 @@ def residual_on_normals(points: F64, normals: F64, initial: F64, moves: Moves, t
 
     Raises
     ------
-    VerificationError
+    SetupError
         A cutting part whose flutes end inside its corner.
 
     Notes

@@ -37,7 +37,7 @@ def unread_work(whole: Program, framed: FramedProgram, measured: Measured, cutti
 
     Raises
     ------
-    VerificationError
+    SetupError
         As ``verify.surface.removal.residual_on_normals``.
     """
     numbers = [t.number for t in tools]

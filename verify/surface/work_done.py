@@ -29,6 +29,7 @@ from verify.surface.asked_faces import (
     Cutting,
     Measured,
     distance_aside,
+    passed_faces,
     thinned,
     worked_faces,
 )
@@ -100,6 +101,8 @@ def work_done(asked: Asked, measured: Measured, cutting: Cutting, cut: BOOL, sou
     s, setup = measured.samples, cutting.setup
     faces = worked_faces(s, measured.residual, measured.mover, measured.reach, cutting) if asked.faces is None else \
         tuple(sorted(asked.faces & set(np.unique(s.face).tolist())))
+    if asked.faces is None and cut.any():
+        faces = tuple(sorted({*faces, *passed_faces(s, measured.residual, measured.mover, faces, cutting)}))
     if asked.faces is None and unread is not None:
         faces = tuple(sorted({*faces, *unread.faces}))
     reason = np.full(len(s), "", dtype=object)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Protocol
 
-from geometry.errors import VerificationError
+from geometry.errors import ProgramError
 from verify.assumptions import Assumed
 from verify.gcode.block_words import NUMBER, WORK_OFFSETS, BlockError
 from verify.gcode.cutter_compensation import FANUC_STYLE, Style
@@ -153,11 +153,11 @@ def zero_word(number: int, word: str) -> str:
     return ZEROS[number - 1]
 
 
-def too_many_jumps(log: Log, limit: int) -> VerificationError:
+def too_many_jumps(log: Log, limit: int) -> ProgramError:
     """The error of a program that makes more jumps than the limit allows, at the line that is read."""
-    return VerificationError(f"{log.name}, line {log.line}: the program makes more than {limit} jumps; a loop may have "
-                             "no end", code="program_too_long", subjects=(f"line {log.line}",), measured=limit + 1,
-                             limit=limit, remedy="correct the condition of the loop or jump, or split the program")
+    return ProgramError(f"{log.name}, line {log.line}: the program makes more than {limit} jumps; a loop may have no "
+                        "end", code="program_too_long", subjects=(f"line {log.line}",), measured=limit + 1,
+                        limit=limit, remedy="correct the condition of the loop or jump, or split the program")
 
 
 __all__ = ["NUMBER", "ZEROS", "BlockError", "DialectReader", "too_many_jumps", "zero_word"]

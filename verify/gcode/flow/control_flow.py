@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol
 
-from geometry.errors import VerificationError
+from geometry.errors import ProgramError
 from verify.gcode.block_words import BlockError, bare
 from verify.gcode.flow.expressions import Value
 from verify.gcode.flow.o_words import OWordStep, Structure, StructureError, find_structure
@@ -86,7 +86,7 @@ class Flow:
 
         Raises
         ------
-        VerificationError
+        ProgramError
             Code program_too_long: more than 5 000 000 lines run.
         """
         try:
@@ -176,10 +176,9 @@ class Flow:
 
     def _endless(self, line: int) -> None:
         log = self.machine.log
-        raise VerificationError(f"{log.name}, line {line}: the program runs more than {MAX_BLOCKS} lines; a loop "
-                                "may have no end", code="program_too_long", subjects=(f"line {line}",),
-                                measured=MAX_BLOCKS + 1, limit=MAX_BLOCKS,
-                                remedy="correct the condition of the loop, or split the program")
+        raise ProgramError(f"{log.name}, line {line}: the program runs more than {MAX_BLOCKS} lines; a loop may have "
+                           "no end", code="program_too_long", subjects=(f"line {line}",), measured=MAX_BLOCKS + 1,
+                           limit=MAX_BLOCKS, remedy="correct the condition of the loop, or split the program")
 
     def _holds(self, step: OWordStep) -> bool:
         return step.word.values[0](self.scope) != 0

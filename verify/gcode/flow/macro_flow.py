@@ -13,7 +13,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from geometry.errors import VerificationError
+from geometry.errors import ProgramError
 from verify.gcode.block_words import NUMBER, BlockError, bare
 from verify.gcode.dialects.base import Machine
 from verify.gcode.flow.expressions import ExpressionReader, Value
@@ -146,7 +146,7 @@ class MacroFlow:
         ------
         BlockError
             The order, or a value, cannot be known.
-        VerificationError
+        ProgramError
             Code program_too_long: a loop has no end.
         """
         section, at, runs = self.sections[0], 0, 0
@@ -202,10 +202,10 @@ class MacroFlow:
 
     def _endless(self, line: int) -> None:
         log = self.machine.log
-        raise VerificationError(f"{log.name}, line {line}: the program runs more than {MAX_RUNS} lines or {MAX_JUMPS} "
-                                "jumps and calls; a loop may have no end", code="program_too_long",
-                                subjects=(f"line {line}",), measured=self.jumps, limit=MAX_JUMPS,
-                                remedy="correct the condition of the loop, or split the program")
+        raise ProgramError(f"{log.name}, line {line}: the program runs more than {MAX_RUNS} lines or {MAX_JUMPS} "
+                           "jumps and calls; a loop may have no end", code="program_too_long",
+                           subjects=(f"line {line}",), measured=self.jumps, limit=MAX_JUMPS,
+                           remedy="correct the condition of the loop, or split the program")
 
     def _step(self, at: int) -> _Step | _Filled | None:
         """What a line does, parsed once; None where it is a plain block."""

@@ -65,7 +65,7 @@ class HeidenhainFlow:
         ------
         BlockError
             A jump or call cannot be followed.
-        VerificationError
+        ProgramError
             Code program_too_long: more than ``MAX_JUMPS`` jumps.
         """
         at, lines = 0, self.lines

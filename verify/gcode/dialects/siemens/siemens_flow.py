@@ -112,7 +112,7 @@ class SiemensFlow:
         ------
         BlockError
             A jump, loop or call cannot be followed.
-        VerificationError
+        ProgramError
             Code program_too_long: more than ``MAX_JUMPS`` jumps.
         """
         main = self.sections[""]

@@ -6,7 +6,7 @@ import random
 import numpy as np
 import pytest
 
-from geometry.errors import CamError, ProgramError, VerificationError
+from geometry.errors import CamError, ProgramError
 from verify.checks.machine_limits import notes_on
 from verify.gcode.flow import control_flow
 from verify.gcode.flow.control_flow import has_flow
@@ -192,7 +192,7 @@ def test_the_stage_before_changes_nothing_of_plain_blocks():
 
 def test_a_loop_without_end(monkeypatch):
     monkeypatch.setattr(control_flow, "MAX_BLOCKS", 1000)
-    with pytest.raises(VerificationError) as caught:
+    with pytest.raises(ProgramError) as caught:
         read("o1 while [1]\no1 endwhile\n")
     error = caught.value
     assert error.code == "program_too_long" and error.limit == 1000 and error.measured == 1001

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.errors import ProgramError, VerificationError
+from geometry.errors import ProgramError
 from tests.heidenhain_pairs import PAIRS
 from tests.program_pairs import HEIDENHAIN, NAMES, RADII, apart, read, same_feeds
 from verify.gcode.dialects.heidenhain import heidenhain_flow
@@ -140,7 +140,7 @@ def test_what_is_not_followed_is_named_with_its_line(line, said):
 
 def test_a_loop_without_end_is_bounded(monkeypatch):
     monkeypatch.setattr(heidenhain_flow, "MAX_JUMPS", 1000)
-    with pytest.raises(VerificationError, match="jumps") as refused:
+    with pytest.raises(ProgramError, match="jumps") as refused:
         read("LBL 1\nFN 9: IF +1 EQU +1 GOTO LBL 1", "heidenhain")
     assert refused.value.code == "program_too_long"
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.errors import ProgramError, VerificationError
+from geometry.errors import ProgramError
 from tests.program_pairs import NAMES, RADII, apart, read, same_feeds
 from tests.siemens_pairs import PAIRS
 from verify.gcode.dialects import dialect_of
@@ -102,7 +102,7 @@ def test_what_is_not_followed_is_named_with_its_line(line, said):
 
 def test_a_loop_without_end_is_bounded(monkeypatch):
     monkeypatch.setattr(siemens_flow, "MAX_JUMPS", 1000)
-    with pytest.raises(VerificationError, match="jumps") as refused:
+    with pytest.raises(ProgramError, match="jumps") as refused:
         read("AA: R1=1\nGOTOB AA", "siemens")
     assert refused.value.code == "program_too_long" and refused.value.limit == 1000
 
