@@ -20,7 +20,7 @@ is_stepnc = is_exchange_file
 
 
 def read_moves(text: str, *, name: str = "program") -> CutterMoves:
-    """Tool motion of a STEP-NC file in the setup frame. Raises ProgramError, VerificationError as ``read_stepnc``."""
+    """Tool motion of a STEP-NC file in the setup frame. Raises ProgramError as ``read_stepnc``."""
     return _recorder(text, name).moves()
 
 
@@ -43,7 +43,6 @@ def read_stepnc(text: str, *, name: str = "program", tools: Sequence[ToolBody] |
     ProgramError
         The text is not an exchange file or is incomplete; its schema is not one of STEP-NC; an instance (subjects:
         '#123') does not have the required form or moves the tool in an unknown way; a tool is not in the setup.
-    VerificationError
         Code program_too_long: more than 5 000 000 moves.
     """
     recorder = _recorder(text, name)

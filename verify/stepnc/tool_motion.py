@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import ProgramError, VerificationError
+from geometry.errors import ProgramError
 from geometry.mesh import F64, I32
 from verify.kinematics import Kinematics
 from verify.program.move_kinds import FEED, RAPID
@@ -120,7 +120,7 @@ class MotionRecorder:
     def take(self, cutter: CutterRecord, line: int) -> int:
         """Change to a tool where it is not in the spindle; returns its place among the cutters.
 
-        Raises VerificationError where the program has too many moves, ProgramError where its axis cannot turn so.
+        Raises ProgramError where the program has too many moves, or its axis cannot turn so.
         """
         place = next((k for k, c in enumerate(self.cutters) if c.instance == cutter.instance), None)
         if place is None:
@@ -134,7 +134,7 @@ class MotionRecorder:
     def stop(self, event: str, line: int) -> None:
         """Record a stop of the program; afterwards the place of the tool is unknown.
 
-        Raises VerificationError and ProgramError as ``take``.
+        Raises ProgramError as ``take``.
         """
         self._change(event, line)
 
@@ -174,7 +174,7 @@ class MotionRecorder:
         feed  : mm/min; speed : 1/min, clockwise positive
         lines : (n,) float64, index, 1-based lines of the file
 
-        Raises VerificationError and ProgramError as ``take``.
+        Raises ProgramError as ``take``.
         """
         there = np.empty((len(tips), 6))
         there[:, :3], there[:, 3:] = tips, UP if axes is None else axes
@@ -298,9 +298,8 @@ class MotionRecorder:
             start, end, lines = self._in_pieces(start, end, lines)
         self._count += len(start)
         if self._count > MAX_MOVES:
-            raise VerificationError(f"{self.name} makes too many moves ({MAX_MOVES} allowed)",
-                                    code="program_too_long", measured=self._count, limit=MAX_MOVES,
-                                    remedy="split the job")
+            raise ProgramError(f"{self.name} makes too many moves ({MAX_MOVES} allowed)", code="program_too_long",
+                               measured=self._count, limit=MAX_MOVES, remedy="split the job")
         axes = None if upright else (start[:, 3:].copy(), end[:, 3:].copy())
         shared = (*(float(v) for v in row), float(arrival), float(self.coolant))
         self._chunks.append(_Chunk(start[:, :3].copy(), end[:, :3].copy(), axes, shared, lines.astype(np.int32)))

@@ -45,7 +45,7 @@ def even_pecks(depth: float, first: float, step: float, least: float, machine: M
 
     Raises
     ------
-    VerificationError
+    ProgramError
         More pecks than a block may make.
     """
     if first <= 0 or first >= depth:
