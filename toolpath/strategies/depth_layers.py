@@ -201,9 +201,11 @@ def slots(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], t
           tolerance: float) -> Iterator[Line]:
     """Lines of a layer along strips too narrow for a ring, where more stands than rims are made for.
 
+    area : (ny, nx) bool on the lattice, where this tool has something to finish below
     tips : (n, 3) float64, mm, of samples to finish, access frame: those below show strips that nodes do not meet
+    z, allowance, tolerance : mm, as in ``rim``
 
-    Other parameters as in ``rim``. Stock is left to the rims, and to the second wall of a strip, where it is no thicker
+    Stock is left to the rims, and to the second wall of a strip, where it is no thicker
     than twice the allowance.
 
     Yields

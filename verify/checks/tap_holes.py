@@ -33,7 +33,7 @@ INCH: dict[float, tuple[int, ...]] = {
     0.138: (32, 40), 0.164: (32, 36), 0.19: (24, 32), 0.216: (24, 28), 0.25: (20, 28), 0.3125: (18, 24),
     0.375: (16, 24), 0.4375: (14, 20), 0.5: (13, 20), 0.5625: (12, 18), 0.625: (11, 18), 0.75: (10, 16),
     0.875: (9, 14), 1.0: (8, 12)}
-"""Threads to the inch by diameter in inches: coarse and fine series of unified threads [ASMEB11]."""
+"""Threads to the inch by diameter in inches: coarse and fine series of unified threads [ASME2003]."""
 MINOR = 1.0825
 """Pitches by which the hole of a thread of 60 degrees is narrower than its outer diameter [ISO68]."""
 HOLE = (0.85, 1.1)  # pitches: least and most by which holes of such threads are drawn narrower
@@ -72,7 +72,7 @@ def needed_hole(diameter: float, pitch: float) -> tuple[float, bool]:
 
     Notes
     -----
-    D and P of a usual thread [ISO262] [ASMEB11] are outer diameter and pitch, unless a more or as usual thread has a
+    D and P of a usual thread [ISO262] [ASME2003] are outer diameter and pitch, unless a more or as usual thread has a
     hole of D. Else D is the hole itself.
 
     >>> [round(x, 2) for x in (needed_hole(5.0, 0.8)[0], needed_hole(4.2, 0.8)[0])]

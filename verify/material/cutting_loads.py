@@ -50,7 +50,7 @@ FINEST, COARSEST = 0.01, 0.5
 fine threads of 1 mm go up to 100 mm."""
 PITCH_ERROR = 0.02
 """Share by which feed over speed of a tap may differ from its pitch: what a floating holder takes up."""
-MOST_POWER, MOST_TORQUE, MOST_THRUST = 150.0, 3000.0, 50e3
+MAX_POWER, MAX_TORQUE, MAX_THRUST = 150.0, 3000.0, 50e3
 """kW, Nm and N that no machining centre has. Large ones for titanium have 60 kW [ModernMachineShop2026] and 2700 Nm
 [CuttingTool2026]; the thrust is a guess of several times what feed drives give."""
 POWER_TIMES = 2.0
@@ -360,12 +360,12 @@ class _Judge:
         """What cuts ask of a machine: torque in Nm, power in kW and thrust in N of each row."""
         findings: list[Finding] = []
         stated, cautions = self.said.power, list[ProgramCaution]()
-        bound = MOST_POWER if stated is None else min(POWER_TIMES * stated, MOST_POWER)
+        bound = MAX_POWER if stated is None else min(POWER_TIMES * stated, MAX_POWER)
         why = "more than any machine has" if stated is None else f"max_power_kw of the machine is {stated:g}"
         for value, most, wanted, unit, text in (
                 (power, bound, math.inf if stated is None else stated, "kW", why),
-                (torque, MOST_TORQUE, math.inf, "Nm", "more than any spindle has"),
-                (thrust, MOST_THRUST, math.inf, "N", "more than any machine bears")):
+                (torque, MAX_TORQUE, math.inf, "Nm", "more than any spindle has"),
+                (thrust, MAX_THRUST, math.inf, "N", "more than any machine bears")):
             found, told = self._over(rows, value, most, wanted, "power",
                                      partial(lambda unit, value, i: f"{cut(i)} needs {value:.0f} {unit}", unit), text,
                                      why, "cut in layers, narrower or slower")
