@@ -168,7 +168,7 @@ def test_the_controller_itself_goes_there(tmp_path, kins, kind):
     file.write_text(f"G21 G17 G90 G94\nM428\nG0 {words}\nM429\nG4 P0.1\nM2\n")
     with open(Path(tempfile.gettempdir()) / "zonemill-linuxcnc.lock", "w") as alone:
         fcntl.flock(alone, fcntl.LOCK_EX)  # a machine has shared memory for one controller
-        for _ in range(8):  # LinuxCNC's interpreter, which other tests run beside it, takes the same memory for a moment
+        for _ in range(8):  # the interpreter, which other tests run beside it, takes the same memory for a moment
             done = subprocess.run(["bash", str(CONTROLLER), "--kins", kins, "--limit", "60", str(file)],
                                   capture_output=True, text=True, timeout=180)
             if "did not start" not in done.stdout + done.stderr:
