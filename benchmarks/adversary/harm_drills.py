@@ -48,6 +48,17 @@ def _hole(s: Script, x: float, y: float, a_turn: float, down: float = BOTTOM) ->
     return op
 
 
+def _over_a_hole(rng: Rng, hole: float) -> tuple[Script, float, float]:
+    """A program that has drilled a hole and stands over it with the tap; its place, mm."""
+    x, y = _place(rng)
+    s = base("plate")
+    _hole(s, x, y, 0.02 * hole)
+    s.tool(4, 500)
+    s.rapid(x, y)
+    s.rapid(z=TOP + 2.0)
+    return s, x, y
+
+
 def flutes_shut_in(rng: Rng) -> Case:
     """A drill goes deeper than its flutes in one go, by more than half of its diameter."""
     d = round(float(rng.uniform(2.0, 5.0)), 2)
@@ -91,12 +102,7 @@ def drill_buckles(rng: Rng) -> Case:
 def narrow_tap_hole(rng: Rng) -> Case:
     """A tap in the hole of the next smaller thread."""
     diameter, pitch, hole = THREADS[int(rng.integers(len(THREADS)))]
-    x, y = _place(rng)
-    s = base("plate")
-    _hole(s, x, y, 0.02 * hole)
-    s.tool(4, 500)
-    s.rapid(x, y)
-    s.rapid(z=TOP + 2.0)
+    s, x, y = _over_a_hole(rng, hole)
     stated = {"pitch_mm": pitch} if rng.random() < 0.5 else {}
     op = s.raw(f"G84 X{x} Y{y} Z{BOTTOM + 2.0} R{TOP + 2.0} F{500 * pitch:g}")
     s.raw("G80")
@@ -107,12 +113,7 @@ def narrow_tap_hole(rng: Rng) -> Case:
 def tap_fed_out(rng: Rng) -> Case:
     """A tap that goes out as it went in: the spindle turns on."""
     diameter, pitch, hole = ((5.0, 0.8, 4.2), (6.0, 1.0, 5.0), (4.0, 0.7, 3.3))[int(rng.integers(3))]
-    x, y = _place(rng)
-    s = base("plate")
-    _hole(s, x, y, 0.02 * hole)
-    s.tool(4, 500)
-    s.rapid(x, y)
-    s.rapid(z=TOP + 2.0)
+    s, x, y = _over_a_hole(rng, hole)
     s.feed(x, y, BOTTOM + 2.0, 500 * pitch)
     op = s.feed(x, y, TOP + 2.0)
     return made("tap fed out", "plate", s, ("program",), [op], None, _setup(_drill(hole), _tap(diameter)),

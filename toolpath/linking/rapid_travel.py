@@ -87,6 +87,7 @@ class Travel:
     found        : findings of a proof of an earlier plan
     trajectories : so far
     at           : (3,) float64, mm, access frame, tip of the tool; None before the first move
+    loose        : mm, of the cuts that follow (``Trajectory.loose``)
     """
 
     field: TipField

@@ -346,7 +346,7 @@ class _Layers:
             self.stock.settle()
             between.extend(depth_layers.between(self.above, z, cut.step_down))
             self.above = z
-            for line in depth_layers.slots(field, self.stock, z, place.area, self.tips, self.allowance, chord):
+            for line in depth_layers.strip_lines(field, self.stock, z, place.area, self.tips, self.allowance, chord):
                 linker.add(turned(line, settings))
             self._walk(linker, z, place, 0.0 if settings.semi_finishing else ISLAND * cut.step_down)
             finished = lat.mask(self.walls[np.abs(self.walls[:, 2] - z) <= 2.0 * cut.step_down, :2])

@@ -114,7 +114,7 @@ def layer(field: TipField, stock: StockMap, z: float, place: LayerArea, allowanc
     lists = list(rings(field, z, active, (allowance,), side_step))
     worth = _Worth(lat, place.bare, max(STOCK_WORTH, island))
     yield from filter(None, _outwards(stock, tool, lists, beyond, worth) if walled else
-                      (_in_stock(stock, tool, lines, STOCK_WORTH, beyond) for lines in lists))
+                      (_in_stock(stock, tool, lines, _Worth(lat), beyond) for lines in lists))
     # Where rings turn sharply, islands stay between them; rings half a step off take these.
     for lines in rings(field, z, active, (allowance + 0.5 * side_step,), side_step):
         yield from filter(None, [_in_stock(stock, tool, lines, worth, beyond)])
@@ -125,8 +125,8 @@ class _Worth:
     """Stock above the cutter that makes a place worth a pass, mm: ``STOCK_WORTH`` on a mask, else ``island``."""
 
     lattice: Lattice
-    bare: NDArray[np.bool_] | None
-    island: float
+    bare: NDArray[np.bool_] | None = None
+    island: float = STOCK_WORTH
 
     def at(self, points: F64) -> F64 | float:
         """(n,) float64, mm, at tips (n, 3), mm, access frame."""
@@ -149,21 +149,17 @@ def _outwards(stock: StockMap, tool: ToolBody, lists: Sequence[Sequence[Line]], 
     kept: list[list[Line]] = []
     with stock.undone(np.array([places.min(axis=0) - tool.radius, places.max(axis=0) + tool.radius])):
         for lines in reversed(lists):
-            kept.append(_in_stock(stock, tool, lines, worth if kept else STOCK_WORTH, beyond))
+            kept.append(_in_stock(stock, tool, lines, worth if kept else _Worth(worth.lattice), beyond))
             for part in kept[-1]:
                 stock.cut(part.points, tool)
     return kept[::-1]
 
 
-def _in_stock(stock: StockMap, tool: ToolBody, lines: Sequence[Line], worth: _Worth | float,
-              beyond: float) -> list[Line]:
-    """The parts of lines with more than ``worth`` mm of stock over the cutter, ``beyond`` mm more at both ends."""
-    out: list[Line] = []
-    for line in lines:
-        least = worth.at(line.points) if isinstance(worth, _Worth) else worth
-        over = stock.overlap(line.points, tool, lower_bound=0.0) > least
-        out.extend(pieces_where(line, over, beyond, 3.0 * tool.radius))
-    return out
+def _in_stock(stock: StockMap, tool: ToolBody, lines: Sequence[Line], worth: _Worth, beyond: float) -> list[Line]:
+    """The parts of lines with more stock over the cutter than ``worth`` says, ``beyond`` mm more at both ends."""
+    return [part for line in lines
+            for part in pieces_where(line, stock.overlap(line.points, tool, lower_bound=0.0) > worth.at(line.points),
+                                     beyond, 3.0 * tool.radius)]
 
 
 def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], finished: NDArray[np.bool_],
@@ -197,16 +193,15 @@ def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], fin
     return out
 
 
-def slots(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], tips: F64, allowance: float,
-          tolerance: float) -> Iterator[Line]:
+def strip_lines(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], tips: F64, allowance: float,
+                tolerance: float) -> Iterator[Line]:
     """Lines of a layer along strips too narrow for a ring, where more stands than rims are made for.
 
     area : (ny, nx) bool on the lattice, where this tool has something to finish below
     tips : (n, 3) float64, mm, of samples to finish, access frame: those below show strips that nodes do not meet
     z, allowance, tolerance : mm, as in ``rim``
 
-    Stock is left to the rims, and to the second wall of a strip, where it is no thicker
-    than twice the allowance.
+    Stock is left to the rims, and to the second wall of a strip, where it is no thicker than twice the allowance.
 
     Yields
     ------
