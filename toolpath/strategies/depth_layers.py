@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 from toolpath.lines import Line, pieces_where
-from toolpath.passes.contours import contour_pieces, contours, dilated, from_walls, rings
+from toolpath.passes.contours import contour_pieces, contours, dilated, rings, wall_distance
 from toolpath.stock.stock_map import SURE_RIM, StockMap
 from zones.lattice import Lattice
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
@@ -209,10 +209,9 @@ def strip_lines(field: TipField, stock: StockMap, z: float, area: NDArray[np.boo
         Where stock stands when it is asked for.
     """
     lat, tool = field.lattice, field.tool
-    # a ring less than a step from the middle of its strip falls to pieces, and so do the nodes of a narrow strip
-    wide = _wide(field, z, allowance + lat.step)
     free = (field.height <= z + LEVEL_TOLERANCE) & dilated(area, tool.radius / lat.step)
-    narrow = (free | lat.mask(tips[tips[:, 2] <= z, :2])) & ~wide
+    # a ring less than a step from the middle of its strip falls to pieces, and so do the nodes of a narrow strip
+    narrow = _beside_no_ring(field, z, allowance + lat.step, free | lat.mask(tips[tips[:, 2] <= z, :2]))
     mine, beyond = dilated(narrow, APART), 0.5 * tool.radius
     for line in contour_pieces(field, z, mine, mine, beyond, 2.0 * tool.radius, tolerance):
         seen = stock.overlap(line.points, tool, -2.0 * allowance / stock.lattice.step - SURE_RIM, lower_bound=0.0)
@@ -221,11 +220,20 @@ def strip_lines(field: TipField, stock: StockMap, z: float, area: NDArray[np.boo
 
 def _slots(field: TipField, z: float, allowance: float) -> NDArray[np.bool_]:
     """(ny, nx) bool: free places in strips too narrow for a ring; their walls are all there is to follow."""
-    return np.asarray((field.height <= z + LEVEL_TOLERANCE) & ~_wide(field, z, allowance))
+    return _beside_no_ring(field, z, allowance, field.height <= z + LEVEL_TOLERANCE)
 
 
-def _wide(field: TipField, z: float, allowance: float) -> NDArray[np.bool_]:
-    """(ny, nx) bool: places round which a ring goes ``allowance`` mm from the walls, or that are beside one."""
-    away = from_walls(field, z, allowance)
-    wide = field.height <= z + LEVEL_TOLERANCE if away is None else away
-    return dilated(np.asarray(wide), allowance / field.lattice.step + 1.0)
+def _beside_no_ring(field: TipField, z: float, allowance: float, places: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(ny, nx) bool: those of some places that no ring comes beside which goes ``allowance`` mm from the walls."""
+    blocked = field.nearest_blocked(z)
+    if blocked is None:
+        return np.zeros_like(places)
+    lat = field.lattice
+    off, reach = blocked[0], allowance / lat.step + 1.0
+    sure = off >= allowance + lat.step
+    # exact distances are asked for only where those of the nodes leave a doubt, which is nowhere on most parts
+    left = places & ~dilated(sure, reach)
+    if not left.any():
+        return left
+    walls = wall_distance(field, z, ~sure & (off >= allowance) & dilated(left, reach))
+    return left if walls is None else left & ~dilated(sure | (walls >= allowance), reach)
