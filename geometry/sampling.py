@@ -275,7 +275,10 @@ def _barycentric(u: F64, v: F64, w: F64) -> F64:
 
 
 def joined(parts: list[SurfaceSamples]) -> SurfaceSamples:
-    """Several sets of samples as one, in order."""
+    """Several sets of samples as one, in order; of none, no samples."""
+    if not parts:
+        none = np.zeros(0, np.int32)
+        return SurfaceSamples(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), none, none)
     covers = None
     if any(p.covers is not None for p in parts):
         covers = np.concatenate([np.zeros(len(p)) if p.covers is None else p.covers for p in parts])

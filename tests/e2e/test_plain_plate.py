@@ -60,11 +60,12 @@ def test_a_program_is_judged_with_few_samples_as_with_many(tmp_path, monkeypatch
                       tmp_path / "plate.step")
     setup = Setup.model_validate({"tools": TOOLS, "stock": {"kind": "box", "margin_mm": 1.0, "uncertainty_mm": 0.0}})
     reports = {}
-    for name, least in (("few", 300.0), ("many", np.inf)):
+    for name, least in (("few", 300.0), ("all of them few", 50.0), ("many", np.inf)):
         monkeypatch.setattr(sample_spacing, "LEAST_AREA", least)
         reports[name] = verify_program(path, setup, text, lambda *_: None)
     few, many = reports["few"], reports["many"]
-    assert few["state"] == many["state"] and few["finding_counts"] == many["finding_counts"]
+    for report in reports.values():
+        assert report["state"] == many["state"] and report["finding_counts"] == many["finding_counts"]
     assert kinds <= {f["kind"] for f in few["findings"]} and (kinds or not few["findings"])
     assert few["coverage"] == pytest.approx(many["coverage"], abs=2e-3) and few["asked"] == many["asked"]
     for one, other in zip(few["findings"], many["findings"], strict=True):

@@ -60,6 +60,13 @@ def test_the_normal_of_the_facet_stays_where_the_surface_has_none_or_another():
         TriangleMesh(mesh.vertices, mesh.faces, mesh.face_ids, corners[:-1])
 
 
+def test_no_sets_of_samples_joined_are_no_samples():
+    """A plate whose faces all have samples far apart has no set of close ones."""
+    none = joined([])
+    assert len(none) == 0 and none.points.shape == none.normals.shape == (0, 3) and none.covers is None
+    assert len(joined([none, none])) == 0
+
+
 def test_a_sample_on_a_border_has_the_normal_of_its_own_face():
     """Two strips of different radius that meet at a right angle: along the common border each keeps its own."""
     mesh = bent_strip(4.0, 0.01)
