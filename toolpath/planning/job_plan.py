@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -304,13 +305,9 @@ class _Layers:
         self.left: list[tuple[float, LayerArea]] = []
         if top <= bottom or snapshot is not None and not snapshot.left:
             return
-        # what layers left on a floor would be cut at the feed of its finish, in a slot as wide as the tool
-        level = np.concatenate([z.tips[:, 2] for z in zones if z.form is AreaForm.LEVEL] or [np.zeros(0)])
-        ends = [top]
-        for z in np.unique(np.round(level + low, 3))[::-1].tolist():
-            if bottom + 1e-3 < z < ends[-1] - FLOORS_APART * step:
-                ends.append(z)
-        ends.append(bottom)
+        level = np.vstack([np.zeros((0, 3)), *(z.tips for z in zones if z.form is AreaForm.LEVEL)]) + [0.0, 0.0, low]
+        level = level[(level[:, 2] > bottom + 1e-3) & (level[:, 2] < top)]
+        ends = _ends(field, tips, level, top, bottom, step)
         heights = [z for a, b in pairwise(ends) for z in depth_layers.layer_heights(a, b, step)]
         if settings.turning is not None and settings.finishing and curvature_matched.suits(tool):
             spans = [(float(z.tips[:, 2].min()), float(z.tips[:, 2].max())) for z in zones
@@ -319,7 +316,9 @@ class _Layers:
         also = [plane - under for plane in settings.planes]
         if also:
             heights = sorted({*heights, *(z for z in also if bottom < z < top)}, reverse=True)
-        self.left = list(zip(heights, _areas(field, tips, heights, step), strict=True))
+        places = _areas(field, tips, heights, step)
+        floors = _between_layers(field, level, [top, *heights], places, FLOORS_APART * step)
+        self.left = sorted([*zip(heights, places, strict=True), *floors], key=itemgetter(0), reverse=True)
         if snapshot is not None:
             del self.left[:-snapshot.left]
 
@@ -344,14 +343,17 @@ class _Layers:
             settle()
             z, place = self.left.pop(0)
             self.stock.settle()
-            between.extend(depth_layers.between(self.above, z, cut.step_down))
-            self.above = z
+            if not place.floor:
+                between.extend(depth_layers.between(self.above, z, cut.step_down))
+                self.above = z
             for line in depth_layers.strip_lines(field, self.stock, z, place.area, self.tips, self.allowance, chord):
                 linker.add(turned(line, settings))
             self._walk(linker, z, place, 0.0 if settings.semi_finishing else ISLAND * cut.step_down)
+            if place.floor:
+                continue
             finished = lat.mask(self.walls[np.abs(self.walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
             unseen = z <= self.swept - self.rim_depth
-            if settings.finishing and not unseen and self.left and self.left[0][0] >= lowest - 1e-9:
+            if settings.finishing and not unseen and any(a >= lowest - 1e-9 and not p.floor for a, p in self.left):
                 continue  # flutes reach up to the rims of an earlier layer
             self.swept = z if unseen else self.swept
             deep = self.rim_depth + cut.step_down if unseen or settings.finishing else cut.step_down
@@ -471,3 +473,56 @@ def _areas(field: TipField, tips: F64, heights: Sequence[float], step: float) ->
                 met = met | dilated(reach, field.disc_radius(disc, 0.0) / lat.step)
         out.append(LayerArea(own | met, dilated(met, field.tool.radius / lat.step)))
     return out[::-1]
+
+
+def _floors(level: F64, apart: float) -> Iterator[tuple[float, F64]]:
+    """Floors less than ``apart`` mm below each other as one: height of the first, mm, and tips (k, 3), descending.
+
+    level : (n, 3) float64, mm, tips above the samples of floors, access frame
+    """
+    level = level[np.argsort(-level[:, 2], kind="stable")]
+    while len(level):
+        z = float(level[0, 2])
+        mine = level[:, 2] > z - apart
+        yield z, level[mine]
+        level = level[~mine]
+
+
+def _ends(field: TipField, tips: F64, level: F64, top: float, bottom: float, step: float) -> list[float]:
+    """Heights between which layers are even, mm, descending: the top of the stock, some floors, and the last layer.
+
+    A layer that ends on a floor saves that floor a layer of its own, but there may be one layer more. Those floors are
+    taken that make the sum of the areas of all layers least, as far as nodes near samples tell it.
+
+    tips, level : (n, 3) float64, mm, tips at all samples, and above those of floors as in ``_between_layers``
+    """
+    found = list(_floors(level, FLOORS_APART * step))
+    ends = [top, *(z for z, _ in found), bottom]
+    wide = np.array([_own(field, tips, z).sum() for z in ends[::-1]])
+    own = [int(_own(field, floor, z).sum()) for z, floor in found]
+
+    def between(upper: float, lower: float) -> float:
+        heights = np.array(depth_layers.layer_heights(upper, lower, step))
+        over = [min(h for h in [upper, *heights] if h >= z) if lower < z < upper else z for z, _ in found]
+        return float(np.interp(heights, ends[::-1], wide).sum()
+                     + sum(n for n, (z, _), h in zip(own, found, over, strict=True) if h - z > FLOORS_APART * step))
+
+    best: list[tuple[float, list[float]]] = [(0.0, [top])]
+    for z in ends[1:]:
+        best.append(min((cost + between(way[-1], z), [*way, z]) for cost, way in best))
+    return best[-1][1]
+
+
+def _between_layers(field: TipField, level: F64, heights: Sequence[float], places: Sequence[LayerArea],
+                    apart: float) -> list[tuple[float, LayerArea]]:
+    """Layers above floors on which the others leave more than ``apart`` mm, with their heights, mm, descending.
+
+    What layers leave on a floor is cut at the feed of its finish, in a slot by the whole width of the tool.
+
+    level   : (n, 3) float64, mm, tips above the samples of floors by what layers leave there, access frame
+    heights : mm, of the top of the stock and of the other layers, descending; places : of these layers
+    """
+    rising = np.array(heights[::-1])
+    above = rising[np.searchsorted(rising, level[:, 2] - 1e-3)]
+    return [(z, LayerArea(_own(field, floor, z), places[int(np.flatnonzero(np.array(heights) < z)[0]) - 1].bare, True))
+            for z, floor in _floors(level[above > level[:, 2] + apart], apart)]

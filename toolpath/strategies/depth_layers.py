@@ -83,10 +83,12 @@ class LayerArea(NamedTuple):
     area : (ny, nx) bool on the lattice, where this tool has something to finish below, or shank or holder come
     bare : (ny, nx) bool on the lattice, places of the tip within a radius of where shank or holder come in a deeper
            layer: an island that stayed there would stop them; None: nowhere
+    floor : whether it is a layer above a floor, between those of the whole depth
     """
 
     area: NDArray[np.bool_]
     bare: NDArray[np.bool_] | None = None
+    floor: bool = False
 
 
 def layer(field: TipField, stock: StockMap, z: float, place: LayerArea, allowance: float,
