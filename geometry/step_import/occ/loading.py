@@ -50,7 +50,8 @@ def load_solid(path: str | Path, solid: int | None = None, fuse: bool = False) -
     step = read_shape(path)
     warnings = list(step.warnings)
     _check_size(step.shape, step)
-    body, others = one_solid(step.products, solid, warnings, fuse=fuse)
+    body, others = one_solid(step.products, solid, warnings, fuse=fuse,
+                             uncertainty=0.0 if step.text.uncertainty is None else _tolerance(step))
     _check_size(body, step)
     surfaces = [surface_name(f) for f in faces_of(body)]
     return LoadedSolid(step, swept_as_splines(body), surfaces, warnings, others)
