@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any
 
@@ -79,11 +79,18 @@ class OtherSolid:
     number : 1-based, among the separate solids of the file
     name   : of its products, '' for none
     bounds : (2, 3) float64, mm, setup frame
+    boxes  : (k, 2, 3) float64, mm, setup frame, boxes that together hold it; empty: the one box of ``bounds``
     """
 
     number: int
     name: str
     bounds: F64
+    boxes: F64 = field(default_factory=lambda: np.zeros((0, 2, 3)))
+
+    @property
+    def held_by(self) -> F64:
+        """(k, 2, 3) float64, mm, setup frame: boxes that together hold it, one at least."""
+        return self.boxes if len(self.boxes) else self.bounds[None]
 
     def __str__(self) -> str:
         return f"solid {self.number}" + (f" ({self.name})" if self.name else "")
@@ -132,7 +139,7 @@ class Part:
                       for e in self.edges],
             "volume": self.volume, "unit": self.unit, "chord": self.chord, "angle": self.angle,
             "deviation": self.deviation, "warnings": list(self.warnings), "sha256": self.sha256,
-            "others": [(o.number, o.name, o.bounds.tolist()) for o in self.others],
+            "others": [(o.number, o.name, o.bounds.tolist(), o.boxes.tolist()) for o in self.others],
         }
         sizes = np.array([len(e.points) for e in self.edges], dtype=np.int64)
         points: NDArray[np.float64] = np.concatenate([e.points for e in self.edges]) if self.edges else np.zeros((0, 3))
@@ -161,7 +168,8 @@ class Part:
             uv = z["uv"] if "uv" in z else None
         return cls(mesh, tuple(FaceInfo(**f) for f in meta["faces"]), edges, meta["volume"], bounds, meta["unit"],
                    meta["chord"], meta["angle"], meta["deviation"], tuple(meta["warnings"]), meta["sha256"], uv,
-                   tuple(OtherSolid(n, name, np.array(box)) for n, name, box in meta["others"]))
+                   tuple(OtherSolid(n, name, np.array(box), np.array(boxes).reshape(-1, 2, 3))
+                         for n, name, box, boxes in meta["others"]))
 
 
 __all__ = ["F64", "I32", "EdgeInfo", "EdgeKind", "FaceInfo", "OtherSolid", "Part"]

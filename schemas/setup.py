@@ -36,9 +36,9 @@ class PartChoice(WireModel):
                     "united. false: products that an assembly places are separate solids, and so is a body that only "
                     "touches another.")] = False
     others: Annotated[Literal["fixtures", "absent"] | None, Field(
-        description="The other solids of the file, where solid names one of several. fixtures: the bounding box of "
-                    "each, in the setup frame, is a fixture. absent: they are not on the machine. null: absent, and "
-                    "proof.assumed lists those that a tool enters.")] = None
+        description="The other solids of the file, where solid names one of several. fixtures: boxes that hold "
+                    "each, along the axes of the setup frame, are fixtures. absent: they are not on the machine. null: "
+                    "absent, and proof.assumed lists those that a tool enters.")] = None
 
 
 class Placement(WireModel):

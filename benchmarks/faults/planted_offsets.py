@@ -4,13 +4,15 @@ Run from the root of the checkout: ``python benchmarks/faults/planted_offsets.py
 [--programs A,B] [--rows FILE]``. The programs are plans of small parts in five dialects, whole and of one operation
 each, one by hand on five axes, and, where the collection of cases lies beside the checkout, one of its programs. The
 operation on the dome and the one on five axes also take stock off a plane beside their face, so their setups name the
-face; the other setups name none. Offsets go along X, Y and Z, both ways, into one tool length, and into the work
-offset. The smallest is twice the larger of scallop and gouge tolerance.
+face; the other setups name none. One more program by hand drills holes, blind and right through. Offsets go along X, Y
+and Z, both ways, into one tool length, and into the work offset. The smallest is twice the larger of scallop and gouge
+tolerance.
 
 Whether an offset changes anything is judged without the code under test: some samples of a face that is asked, which
 the right program leaves within tolerance, must be out of it by their residuals alone, or some sample of any face is
 gouged. Depth and height that must be found are the largest part of the offset along the normals of such samples of one
-face, if so much stock stands there, or the offset goes into it. Right means within 10 % or 5 µm.
+face, if so much stock stands there, or the offset goes into it. What a drill leaves is as high as the offset along its
+axis. Right means within 10 % or 5 µm.
 """
 
 from __future__ import annotations
@@ -49,18 +51,27 @@ CHANGED = 5  # samples out of tolerance, from which on an offset has changed som
 FIXED = re.compile(r"G53|G28|G30|M91|SUPA|G10|CYCL DEF|TOOL CALL|^\s*[(;]")
 WORD = re.compile(r"(?<![A-Z_])([XYZ])=?([+-]?(?:\d+\.?\d*|\.\d+))")
 FLAT = {"id": "T1", "number": 1, "kind": "flat", "diameter_mm": 4, "flute_length_mm": 12, "stickout_mm": 25}
+DRILL = {"id": "T3", "number": 3, "kind": "drill", "diameter_mm": 3, "point_angle_deg": 118, "flute_length_mm": 20,
+         "stickout_mm": 30}
+POINT = 1.5 / math.tan(math.radians(59.0))  # mm, height of its point
+# X, Y and depth of the full diameter; the last hole goes right through
+HOLES = ((5.0, 5.0, 5.0), (12.0, 10.0, 6.5), (19.0, 5.0, 14.0))
 BALL = {"id": "T2", "number": 2, "kind": "ball", "diameter_mm": 3, "flute_length_mm": 8, "stickout_mm": 25}
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A correct program of a part: its name, the part as it was read, setup, text, and ending of its file."""
+    """A correct program of a part: its name, the part as it was read, setup, text, and ending of its file.
+
+    drills : whether all that it cuts is drilled down along Z
+    """
 
     name: str
     job: ReadPart
     setup: Setup
     text: str
     ending: str
+    drills: bool = False
 
     @property
     def smallest(self) -> float:
@@ -130,6 +141,17 @@ def cases(folder: Path, wanted: set[str]) -> Iterator[Case]:
             "stock": {"margin_mm": 1.0, "uncertainty_mm": 0.0},
             "machine": {"kind": "5-axis", "kinematics": "table-table-AC", "tcp": True, "dialects": ["siemens"]}}))
         yield Case("slope-five", read_job_part(step, setup, _quiet), setup, five_axis_text(), ".mpf")
+    if not wanted or "drilled" in wanted:
+        holes = cq.Workplane().box(24, 16, 14, centered=False)
+        for x, y, deep in HOLES:
+            holes = holes.cut(cq.Workplane().circle(1.5).extrude(-deep).translate((x, y, 14)))
+            holes = holes.cut(cq.Workplane(cq.Solid.makeCone(1.5, 0.0, POINT, pnt=cq.Vector(x, y, 14 - deep),
+                                                             dir=cq.Vector(0, 0, -1))))
+        step = write_step(holes, folder / "drilled.step")
+        setup = parse_setup(json.dumps({"tools": [DRILL], "quality": {"scallop_height_mm": 0.02},
+                                        "stock": {"kind": "box", "box_mm": [[0, 0, 0], [24, 16, 14]],
+                                                  "uncertainty_mm": 0.0}}))
+        yield Case("drilled", read_job_part(step, setup, _quiet), setup, drilled_text(), ".ngc", drills=True)
     if (CASES / "nc" / "pocket_ok.ngc").is_file() and (not wanted or "pocket_ok" in wanted):
         setup = parse_setup((CASES / "nc" / "pocket_setup.json").read_bytes())
         yield Case("pocket_ok", read_job_part(CASES / "parts" / "pocket_plate.step", setup, _quiet), setup,
@@ -152,6 +174,13 @@ def five_axis_text() -> str:
                   f"G0 {words(s, 17.0, 5.0)}"]
     return "\n".join([*lines, f"G0 {words(9.5, 17.0, 30.0)}", "G0 Z60 A3=0 B3=0 C3=1", "TRAFOOF", "SUPA G0 Z0 D0",
                       "M30", ""])
+
+
+def drilled_text() -> str:
+    """The holes of the plate, each in pecks down to its full diameter and the point of the drill."""
+    lines = ["G21 G17 G90 G94 G40 G49 G80 G64 P0.001", "G54", "T3 M6", "S3000 M3", "G0 X5 Y5", "G43 H3 Z30"]
+    lines += [f"G98 G83 X{x:g} Y{y:g} Z{14.0 - deep - POINT:.4f} R16 Q2 F150" for x, y, deep in HOLES]
+    return "\n".join([*lines, "G80", "G0 Z30", "M5", "G53 G0 Z0", "M2", ""])
 
 
 def _quiet(_stage: str, _share: float) -> None:
@@ -205,15 +234,20 @@ def planted(case: Case, sizes: tuple[float, ...]) -> Iterator[tuple[str, np.ndar
         yield "G55", np.zeros(3), case.text.replace("G54", "G55")
 
 
-def shown(right: ProgramProof, made: ProgramProof, out: np.ndarray, by: np.ndarray) -> list[float]:
+def shown(right: ProgramProof, made: ProgramProof, out: np.ndarray, by: np.ndarray, drills: bool) -> list[float]:
     """What an offset (3,) mm makes on the faces that are asked: for each, the largest part of it along the normals of
-    its samples that went out of tolerance (n,); faces where it is more than the stock are left out."""
+    its samples that went out of tolerance (n,); faces where it is more than the stock are left out. A drill leaves the
+    whole of an offset up, on walls too."""
     asked = {int(f[1:]) for f in right.report["asked"]["faces"]}
     faces = {}
     for face in np.unique(right.samples.face[out]).tolist():
         rows = np.flatnonzero(out & (right.samples.face == face))
         s = right.samples.subset(rows)
         gouged, along = made.proof.residual[rows] < 0.0, s.normals @ by
+        if drills and by[2] > 0.0:
+            if face in asked and (~gouged).sum() > CHANGED:
+                faces[face] = float(by[2])
+            continue
         most = float(np.abs(along).max())
         stock = stock_on_normals(s.points, s.normals, right.frame.part.mesh.bounds, right.conditions, 100.0)
         near = (np.abs(along) > 0.98 * most) & np.where(along > 0.0, (stock >= most) & ~gouged, gouged)
@@ -228,7 +262,7 @@ def judge(case: Case, right: ProgramProof, where: str, by: np.ndarray, text: str
     made = case.proof(text)
     good = np.asarray(right.proof.proved, np.bool_)
     out = good & ~proved_samples(made.proof.residual, made.conditions)
-    wanted = shown(right, made, out, by)
+    wanted = shown(right, made, out, by, case.drills)
     harm = bool((out & (made.proof.residual < 0.0)).sum() > CHANGED)
     depths = [(abs(f.depth), str(f.kind)) for f in made.proof.findings if str(f.kind) in ("gouge", "stock_left")]
     pairs = [(abs(d - w) / max(0.1 * w, 0.005), w, d, kind) for w in wanted for d, kind in depths]

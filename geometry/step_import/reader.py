@@ -40,7 +40,8 @@ def read_part(path: str | os.PathLike[str], *, placement: SetupFrame | None = No
     Returns Part in the setup frame; ``part.deviation`` is the distance measured against the exact surface.
     Raises StepError (``no_file``, ``empty_file``, ``not_step``, ``truncated_step``, ``dangling_reference``,
     ``bad_number``, ``file_too_large``, ``unreadable_step``, ``no_solid``), PartError (``open_shell``,
-    ``several_solids``, ``no_such_solid``, ``part_too_small``, ``part_too_large``, ``mesh_failed``, ``kernel_failed``),
+    ``several_solids``, ``no_such_solid``, ``inconsistent_faces``, ``part_too_small``, ``part_too_large``,
+    ``mesh_failed``, ``kernel_failed``),
     SetupError (``bad_placement``, ``bad_tolerance``). A part that exceeds the limits of the reader
     or crashes it is PartError (``reader_timeout``, ``reader_memory``, ``reader_crashed``), since a retry fails as well.
     A reader killed from outside is ResourceError (``reader_crashed``).

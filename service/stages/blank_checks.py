@@ -226,9 +226,12 @@ def _faces_to_cut(setup: Setup, part: Part) -> np.ndarray:
 
 
 def _check_fixtures(setup: Setup, part: Part) -> None:
+    other = [o for o in part.others for _ in o.held_by]
     for number, (lower, upper) in enumerate(fixtures_of(setup, part.others)):
         given = number < len(setup.fixtures)
-        name = f"fixtures[{number}]" if given else f"the box of {part.others[number - len(setup.fixtures)]}"
+        solid = None if given else other[number - len(setup.fixtures)]
+        name = f"fixtures[{number}]" if solid is None else \
+            f"{'the box' if len(solid.held_by) == 1 else 'a box'} of {solid}"
         shrink = np.minimum(OVERHANG, 0.25 * (upper - lower))
         point = point_of_mesh_in_box(part.mesh, lower + shrink, upper - shrink)
         if point is not None:

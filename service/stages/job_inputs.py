@@ -205,7 +205,7 @@ class JobInputs:
 def fixtures_of(setup: Setup, others: Sequence[OtherSolid]) -> tuple[F64, ...]:
     """Fixtures as (2, 3) float64, mm, setup frame: those of the setup, then the other solids that it takes for some."""
     boxes = [np.array(f.box_mm, dtype=np.float64) for f in setup.fixtures]
-    return (*boxes, *(o.bounds for o in others if setup.part.others == "fixtures"))
+    return (*boxes, *(box for o in others if setup.part.others == "fixtures" for box in o.held_by))
 
 
 def _cut_table(setup: Setup, bodies: Sequence[ToolBody]) -> dict[str, CutData]:

@@ -52,7 +52,9 @@ def fixture_boxes(job: JobPart, view: View | ProofFrame) -> tuple[np.ndarray, ..
 
 def other_solids(job: JobPart, view: View | ProofFrame) -> tuple[OtherSolid, ...]:
     """The other solids of the part's file that the setup does not speak of, boxes in the frame of a view."""
-    return tuple(replace(o, bounds=turned_box(o.bounds, view.rotation)) for o in job.inputs.others)
+    return tuple(replace(o, bounds=turned_box(o.bounds, view.rotation),
+                         boxes=np.array([turned_box(b, view.rotation) for b in o.boxes]).reshape(-1, 2, 3))
+                 for o in job.inputs.others)
 
 
 def access_of(job: JobPart, view: View | ProofFrame) -> Access:

@@ -76,12 +76,13 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
     nc = NcProgram("program", text, dialect=dialect or likeliest(may, setup.machine.dialects))
     tools, machine = tool_bodies(setup), machine_kinematics(setup.machine)
     gauges, assumed = gauge_lengths(setup.tools, tools), list[Assumed]()
+    teeth = {body.number: t.flutes for t, body in zip(setup.tools, tools, strict=True)}
 
     def reading(of: Kinematics | None, program: NcProgram = nc, longer: Mapping[int, float] | None = None) -> Program:
         return read_one(program, tools, work_offset=own.work_offset, gouge_tolerance=setup.quality.gouge_tolerance_mm,
                         kinematics=of, gauge_length={**gauges, **(longer or {})}, spindle_tool=spindle_tool,
                         change=change_in_frame(setup.machine.change_position, level=level),
-                        gauge_given=gauges_given(setup.tools))
+                        gauge_given=gauges_given(setup.tools), teeth=teeth)
 
     if dialect is None and not is_exchange_file(text):
         assumed.extend(_assumed_dialect(nc.dialect, others(may, _stated_dialects(setup))))

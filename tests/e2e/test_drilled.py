@@ -17,6 +17,7 @@ from service.verification.program_proof import proved_program
 from tests.step_files import write_step
 
 POINT = 1.5 / math.tan(math.radians(59.0))  # height of the point of the drill, 0.901 mm
+LEAD = 0.4 / math.tan(math.radians(30.0))  # height of the lead of the tap, 0.693 mm
 BARE = {"shank_diameter_mm": 3, "stickout_mm": 30}
 SETUP = {
     "tools": [{"id": "T1", "kind": "drill", "diameter_mm": 3, "point_angle_deg": 118, "flute_length_mm": 20, **BARE},
@@ -86,11 +87,23 @@ def test_a_drill_too_deep_is_a_gouge_as_deep_at_its_point(verify):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("change", [{"deep": -4.0 - POINT}, {"through": -7.0}])
-def test_a_hole_that_is_not_deep_enough_is_stock_left(verify, change):
+@pytest.mark.parametrize(("change", "high"), [
+    *(({"deep": short - 5.0 - POINT}, short) for short in (0.04, 0.1, 0.3, 1.0, 2.0, 4.5)),
+    # right through: the wall stands as high as the full diameter ends over the bottom
+    *(({"through": -8.0 - POINT + short}, short) for short in (0.3, 1.0, 2.0, 5.0)),
+    ({"through": -2.0}, 6.0 + POINT)])
+def test_a_hole_that_is_not_deep_enough_is_stock_left_as_high_as_the_drill_is_short(verify, change, high):
     report = verify(program(**change))
     assert report["state"] == "clean" and kinds(report).keys() == {"stock_left"}
-    assert max(f["depth"] for f in report["findings"]) > 0.6
+    found = [f["depth"] for f in report["findings"]]
+    assert max(found) == pytest.approx(high, rel=0.01, abs=0.002), found
+
+
+@pytest.mark.slow
+def test_a_tap_that_stays_short_leaves_as_much(verify):
+    report = verify(program(tapped_at=(4.0, -6.0)))
+    assert kinds(report).keys() == {"stock_left"}
+    assert max(f["depth"] for f in report["findings"]) == pytest.approx(LEAD + 2.0, rel=0.01)
 
 
 @pytest.mark.slow

@@ -181,6 +181,9 @@ def test_other_solids_are_fixtures_absent_or_open(others, boxes, open_):
     inputs = JobInputs.of(setup, (OtherSolid(1, "clamp", np.array([[10.0, -5, 0], [30, 5, 8]])),))
     assert len(inputs.fixtures) == boxes and len(inputs.others) == open_
     assert boxes == 1 or inputs.fixtures[1].tolist() == [[10, -5, 0], [30, 5, 8]]
+    two = np.array([[[10.0, -5, 0], [30, 5, 4]], [[20, -5, 4], [30, 5, 8]]])
+    inputs = JobInputs.of(setup, (OtherSolid(1, "clamp", np.array([[10.0, -5, 0], [30, 5, 8]]), two),))
+    assert [b.tolist() for b in inputs.fixtures[1:]] == (two.tolist() if boxes == 2 else [])
 
 
 def test_repeated_names_are_refused():

@@ -1,4 +1,4 @@
-"""Solids of the part's file that are not the part, and the tools that enter the boxes round them."""
+"""Solids of the part's file that are not the part, and the tools that enter the boxes that hold them."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ def other_assumptions(moves: Moves, source: Source, tools: Sequence[ToolBody], s
         met = np.flatnonzero(_enters(other, moves, tools, setup))
         if len(met):
             m = int(met[0])
-            yield Assumed(AssumedKind.OTHER_SOLIDS, f"{other} is absent; T{source.tool[m]} enters the box round it "
+            yield Assumed(AssumedKind.OTHER_SOLIDS, f"{other} is absent; T{source.tool[m]} enters a box that holds it "
                           f"(line {source.line[m]})", "a tool mills into what stands there", "state part.others")
 
 
 def _enters(other: OtherSolid, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup) -> NDArray[np.bool_]:
-    """(m,) bool, moves on which a tool enters the box round a solid; a tool that leans counts as a ball."""
+    """(m,) bool, moves on which a tool enters the boxes that hold a solid; a tool that leans counts as a ball."""
     cutters, bodies = cutter_table(tools), Bodies.of(tools, setup)
     reach, out = bodies.reach(cutters), np.zeros(len(moves), np.bool_)
     for k, tool in enumerate(tools):
@@ -46,7 +46,8 @@ def _enters(other: OtherSolid, moves: Moves, tools: Sequence[ToolBody], setup: P
             discs = [(-reach[k], reach[k], reach[k])]
         for low, high, wide in discs:
             room = np.array([[wide, wide, high], [wide, wide, -low]]) - TOUCH
-            out[mine] |= _crosses(moves.start[mine], moves.end[mine], other.bounds + room * [[-1.0], [1.0]])
+            for box in other.held_by:
+                out[mine] |= _crosses(moves.start[mine], moves.end[mine], box + room * [[-1.0], [1.0]])
     return out
 
 

@@ -70,6 +70,7 @@ class ContourMotion(Origins):
         self.control: DialectReader | None = None
         self._open_tables()
         self.names: dict[str, int] = {}
+        self.teeth: dict[int, int] = {}
         self.contour: Contour | None = None
         self.actual: list[float] | None = None
         self.across = False

@@ -269,7 +269,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
                  gauge_length: Mapping[int, float] | None = None, spindle_tool: int = 0,
                  report: Report = silent, dialect: str = LINUXCNC, radii: Mapping[int, float] | None = None,
                  names: Mapping[str, int] | None = None, change: Sequence[float] | None = None,
-                 lengths: Mapping[int, float] | None = None) -> Program:
+                 lengths: Mapping[int, float] | None = None, teeth: Mapping[int, int] | None = None) -> Program:
     """Read a program of three, four or five axes.
 
     text        : the program
@@ -286,6 +286,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
     names       : T numbers by the ids of the tools, for programs that name their tools
     change      : mm, setup frame, Z or X, Y and Z of the spindle face at a tool change; None where it is not stated
     lengths     : mm by T number, spindle face to tip, of the tools whose length is known
+    teeth       : numbers of teeth by T number, where they are known, for feeds per tooth
 
     Returns
     -------
@@ -323,7 +324,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
                            subjects=(f"T{spindle_tool}",), measured=spindle_tool, limit=sorted(tools),
                            remedy="give a tool of the table as spindle_tool")
     reader = Reader(Log(name), tools, work_offset, blend_limit, kinematics, gauge_length, spindle_tool)
-    reader.radii, reader.names = dict(radii or {}), dict(names or {})
+    reader.radii, reader.names, reader.teeth = dict(radii or {}), dict(names or {}), dict(teeth or {})
     reader.change = None if change is None else tuple(change)
     reader.hangs, reader.stays = {0: 0.0, **(lengths or {})}, dialect == LINUXCNC
     return reader.read(text, report, dialect)

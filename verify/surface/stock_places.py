@@ -17,6 +17,7 @@ from verify.model import Finding, FindingKind, ProofSetup
 
 LEAST_PLACE = 0.05  # mm²: a smaller place is five samples or fewer, which prove nothing
 CONNECTED = 0.5  # mm, or three distances of samples: so near samples are one place
+SAME_WAY = 0.05  # dimensionless: ways of which the parts along the face differ by less are the same
 ROUND = 0.5  # mm, or 2.5 distances of samples: a height is the lower third so far around
 HIGHEST = 300  # samples of a place whose surroundings are looked at
 MAX_LINES = 50
@@ -26,16 +27,21 @@ INT = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class StandingStock:
-    """Stock on n samples: height over the allowance, (n,) float64, mm, and the move that left it, (n,) int32, index, -1
-    where none did.
+    """Stock on n samples.
+
+    height : (n,) float64, mm over the allowance
+    mover  : (n,) int32, index, the move that left it, -1 where none did
+    aside  : (n, 3) float64, dimensionless, setup frame, the part along the face of the unit vector in which the height
+             is measured; 0 for the normal
     """
 
     height: F64
     mover: I32
+    aside: F64
 
     def subset(self, rows: INT) -> StandingStock:
         """The selected samples. rows : (k,) int64, index."""
-        return StandingStock(self.height[rows], self.mover[rows])
+        return StandingStock(self.height[rows], self.mover[rows], self.aside[rows])
 
 
 def stock_findings(samples: SurfaceSamples, stock: StandingStock, each: float, source: Source,
@@ -50,7 +56,8 @@ def stock_findings(samples: SurfaceSamples, stock: StandingStock, each: float, s
     Notes
     -----
     The height of a place is the largest lower third of the heights within ``ROUND`` of a sample. So the scallop that a
-    right pass leaves hardly counts: stock of height d under scallops of height c has the lower third d + c / 9.
+    right pass leaves hardly counts: stock of height d under scallops of height c has the lower third d + c / 9. Where
+    heights are measured along the face, as up a wall, each neighbour counts up to the same top.
     """
     found: list[Finding] = []
     told = np.zeros(len(samples), np.bool_)
@@ -76,13 +83,21 @@ def _connected(points: F64, apart: float) -> INT:
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)[of.reshape(-1)]
 
 
+def _lower_third(of: int, near: INT, points: F64, aside: F64, height: F64) -> float:
+    """Lower third of the heights of the samples ``near`` sample ``of``, (k,) index, each up to its top over ``of``."""
+    same = np.abs(aside[near] - aside[of]).max(axis=1) < SAME_WAY
+    tops = height[near] + np.where(same, np.einsum("ij,ij->i", aside[near], points[near] - points[of]), 0.0)
+    return float(np.partition(tops, len(near) // 3)[len(near) // 3])
+
+
 def _finding(samples: SurfaceSamples, stock: StandingStock, rows: INT, area: float, reach: float, source: Source,
              setup: ProofSetup) -> Finding:
     height, points = stock.height[rows], samples.points[rows]
     tree = cKDTree(points)
     highest = np.lexsort((np.arange(len(rows)), -height))[:HIGHEST]
-    typical = np.array([float(np.partition(height[near], len(near) // 3)[len(near) // 3])
-                        for near in tree.query_ball_point(points[highest], reach)])
+    around = tree.query_ball_point(points[highest], reach)
+    typical = np.array([_lower_third(k, np.asarray(near, np.int64), points, stock.aside[rows], height)
+                        for k, near in zip(highest.tolist(), around, strict=True)])
     best = int(np.argmax(typical))
     k, tall = int(highest[best]), float(typical[best])
     movers = np.unique(stock.mover[rows][stock.mover[rows] >= 0])

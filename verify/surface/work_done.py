@@ -36,7 +36,7 @@ from verify.surface.asked_faces import (
 from verify.surface.sample_scores import proved_samples
 from verify.surface.stock_places import StandingStock, stock_findings
 from verify.surface.unread_work import UnreadWork
-from verify.surface.ways_out import ways_out
+from verify.surface.ways_out import ROUNDING, WaysOut, ways_out
 
 MAX_TRIED = 12_000  # samples with stock that tools are tried on; the others share the answer of their neighbour
 LEAST_TRIED = 50  # of them on each face
@@ -94,7 +94,7 @@ def work_done(asked: Asked, measured: Measured, cutting: Cutting, cut: BOOL, sou
     1. A tool touches it with room of h + e to everything else, and more than h + e stands on it. That room keeps away
        from stock that other faces may keep.
     2. A tool without such room comes within h / 2 of it, and more than 1.5 h + e stands on it, along the normal and
-       along the shortest way out.
+       along the shortest way out. Of stock that a drill or tap left, the depth that it must still go counts instead.
 
     Beside a place of the same face that is cut, stock of which a way out is h + e or shorter is none.
     """
@@ -198,17 +198,70 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     touched = tight[reached(tight, limits.near, 0.0)]
     beyond = np.setdiff1d(tight, touched)
     why[beyond] = asked.touch.reasons(few.subset(beyond), tools, axes)
+    deep = _missing_depths(few, touched, mover, axes, limits.lift, cutting)
     corner = np.zeros(len(tried), np.bool_)
-    corner[touched[height[touched] > limits.corner]] = True
+    corner[touched[np.where(deep.found, deep.length, height[touched]) > limits.corner]] = True
     left |= corner
     rows, aside = _sides(measured, few, tried, height, np.flatnonzero(left), corner, cutting.setup)
-    way, by = _ways(few, rows, cutting.setup.stock_allowance + limits.h, cutting)
+    ways = _ways(few, rows, axes, cutting.setup.stock_allowance + limits.h, cutting)
+    way, drilled = ways.length, np.isin(rows, touched[deep.found])
     nearer = (way < height[rows]) & (aside <= ASIDE * way + ASIDE_ROOM)
-    left[rows[(nearer & (way <= limits.face)) | (corner[rows] & (way <= limits.corner))]] = False
-    moved = rows[(by >= 0) & (nearer | (mover[rows] < 0))]
-    mover[moved] = by[np.isin(rows, moved)]
-    height[rows[nearer]] = way[nearer]
-    return StandingStock(np.where(np.isfinite(height), height, MAX_WAY), mover), left, why
+    left[rows[~drilled & ((nearer & (way <= limits.face)) | (corner[rows] & (way <= limits.corner)))]] = False
+    direction = few.normals.copy()
+    moved = (ways.mover >= 0) & (nearer | (mover[rows] < 0))
+    mover[rows[moved]] = ways.mover[moved]
+    height[rows[nearer]], direction[rows[nearer]] = way[nearer], ways.direction[nearer]
+    rows = touched[deep.found]
+    height[rows], mover[rows], direction[rows] = (a[deep.found] for a in (deep.length, deep.mover, deep.direction))
+    direction -= np.einsum("ij,ij->i", direction, few.normals)[:, None] * few.normals
+    return StandingStock(np.where(np.isfinite(height), height, MAX_WAY), mover, direction), left, why
+
+
+@dataclass(frozen=True, eq=False)
+class _MissingDepths:
+    """How much deeper a drill or tap must go, at n samples, where that is known.
+
+    found  : (n,) bool
+    length : (n,) float64, mm over the allowance; direction : (n, 3) float64, unit, setup frame, of its axis
+    mover  : (n,) int32, index, the move that is too short
+    """
+
+    found: BOOL
+    length: F64
+    direction: F64
+    mover: I32
+
+
+def _missing_depths(few: SurfaceSamples, rows: INT, mover: I32, axes: F64, lift: float,
+                    cutting: Cutting) -> _MissingDepths:
+    """Depths that drills and taps miss at some samples, (r,) int64, index, which tools touch.
+
+    mover : (n,) int32, index, of all samples: the move that left the stock on the normal; axes : (k, 3), unit, of tools
+    lift  : mm, how far off the surface the ways begin, against the facets of the hole
+
+    Such a tool takes stock off along its axis only, however near its hole is to the sample. It counts where it left
+    the stock on the normal too, or where no move did, or where the sample is as far from its axis as it is wide: a tap
+    or reamer in the hole of another drill.
+    """
+    moves, normals, by = cutting.moves, few.normals[rows], mover[rows]
+    axis = np.tile(axes[0], (len(rows), 1))
+    if moves.axes is not None:
+        axis[by >= 0] = moves.axes.only(by[by >= 0].astype(np.int64)).middle
+    alone = np.array([t.along_axis_only for t in cutting.tools], np.bool_)
+    if not len(rows) or not alone.any():
+        return _MissingDepths(np.zeros(len(rows), np.bool_), np.zeros(len(rows)), axis, by)
+    allowance = cutting.setup.stock_allowance
+    start = few.points[rows] + (allowance + lift) * normals
+    length, end = cutting.way_through_stock(start, axis, cutting.farthest, ROUNDING)
+    tool, before = moves.tool[end], np.where(by >= 0, moves.tool[by], -1)
+    radius = np.array([t.radius for t in cutting.tools])[tool]
+    off = np.abs(np.linalg.norm(np.cross(few.points[rows] - moves.end[end], axis), axis=1) - radius)
+    own = (before == tool) | (by < 0) | (off <= allowance + cutting.setup.scallop_height)
+    # what the start off the surface takes from the way, up to the cone of the tool
+    up = np.einsum("ij,ij->i", normals, axis)
+    slope = np.array([t.cone_height / t.corner_width if t.cone_height > 0.0 else 0.0 for t in cutting.tools])[tool]
+    length = length + lift * (up + slope * np.sqrt(np.clip(1.0 - up * up, 0.0, 1.0)))
+    return _MissingDepths(np.isfinite(length) & (end >= 0) & alone[tool] & own, length, axis, end)
 
 
 def _reached(asked: Asked, few: SurfaceSamples, tools: Sequence[ToolBody], axes: F64,
@@ -241,15 +294,17 @@ def _sides(measured: Measured, few: SurfaceSamples, tried: INT, height: F64, row
     return rows[wanted], np.where(blocked, 0.0, aside)[wanted]
 
 
-def _ways(few: SurfaceSamples, rows: INT, lift: float, cutting: Cutting) -> tuple[F64, I32]:
-    """Shortest ways out of the stock on some samples, (r,) mm, and the moves they lead to, (r,).
+def _ways(few: SurfaceSamples, rows: INT, axes: F64, lift: float, cutting: Cutting) -> WaysOut:
+    """Shortest ways out of the stock on some samples, (r,) index; axes : (k, 3) float64, unit; lift : mm.
 
     Of more than ``MAX_WAYS`` samples an even share is followed; each other one gets the way of the nearest of its face.
     """
     chosen = thinned(rows, MAX_WAYS)
-    way, by = ways_out(few.points[chosen], few.normals[chosen], lift, MAX_WAY, cutting)
+    ways = ways_out(few.points[chosen], few.normals[chosen], axes, lift, MAX_WAY, cutting)
     if len(chosen) == len(rows):
-        return way, by
+        return ways
     near = KeyedPoints(few.face[chosen].astype(np.int64), few.points[chosen])
     of = near.nearest(few.face[rows].astype(np.int64), few.points[rows])[:, 0]
-    return np.where(of >= 0, way[of], np.inf), np.where(of >= 0, by[of], -1).astype(np.int32)
+    none = of < 0
+    return WaysOut(np.where(none, np.inf, ways.length[of]), ways.direction[of],
+                   np.where(none, -1, ways.mover[of]).astype(np.int32))

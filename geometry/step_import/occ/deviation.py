@@ -47,9 +47,9 @@ def face_deviations(shapes: Sequence[Shape], faces: Sequence[FaceMesh], chord: f
     out = []
     for shape, face in zip(shapes, faces, strict=True):
         surface = BRepAdaptor_Surface(shape, True)
-        exact = _formula(surface, face.nodes[face.triangles].mean(axis=1))
+        exact = elementary_distances(surface, face.nodes[face.triangles].mean(axis=1))
         if exact is not None:
-            out.append(exact)
+            out.append(float(exact.max()))
             continue
         count = len(face.triangles)
         share = max(10, int(MAX_SAMPLES * count / max(total, 1)))
@@ -57,15 +57,20 @@ def face_deviations(shapes: Sequence[Shape], faces: Sequence[FaceMesh], chord: f
     return np.array(out)
 
 
-def _formula(surface: BRepAdaptor_Surface, points: F64) -> float | None:
-    """Largest distance of points to an elementary surface, None for a free-form one."""
+def elementary_distances(surface: BRepAdaptor_Surface, points: F64) -> F64 | None:
+    """Distances of points from a plane, cylinder, cone, sphere or torus without its trim; None for another surface.
+
+    surface : kernel surface; points : (n, 3) float64, mm, frame of the surface
+
+    Returns (n,) float64, mm, or None.
+    """
     kind = surface.GetType()
     if kind == GeomAbs_Plane:
         plane = surface.Plane()
-        return float(np.abs((points - plane.Location().Coord()) @ plane.Axis().Direction().Coord()).max())
+        return np.asarray(np.abs((points - plane.Location().Coord()) @ plane.Axis().Direction().Coord()))
     if kind == GeomAbs_Sphere:
         sphere = surface.Sphere()
-        return float(np.abs(np.linalg.norm(points - sphere.Location().Coord(), axis=1) - sphere.Radius()).max())
+        return np.asarray(np.abs(np.linalg.norm(points - sphere.Location().Coord(), axis=1) - sphere.Radius()))
     if kind not in (GeomAbs_Cylinder, GeomAbs_Cone, GeomAbs_Torus):
         return None
     body = {GeomAbs_Cylinder: surface.Cylinder, GeomAbs_Cone: surface.Cone, GeomAbs_Torus: surface.Torus}[kind]()
@@ -73,13 +78,13 @@ def _formula(surface: BRepAdaptor_Surface, points: F64) -> float | None:
     along = offset @ np.array(body.Axis().Direction().Coord())
     away = np.sqrt(np.maximum(np.einsum("ij,ij->i", offset, offset) - along**2, 0.0))
     if kind == GeomAbs_Cylinder:
-        return float(np.abs(away - body.Radius()).max())
+        return np.asarray(np.abs(away - body.Radius()))
     if kind == GeomAbs_Torus:
-        return float(np.abs(np.hypot(away - body.MajorRadius(), along) - body.MinorRadius()).max())
+        return np.asarray(np.abs(np.hypot(away - body.MajorRadius(), along) - body.MinorRadius()))
     slope = body.SemiAngle()
     # for a positive angle the kernel's cone axis points to growing radii; the lower nappe is never meshed
     sides = [(s * away - body.RefRadius()) * np.cos(slope) - along * np.sin(slope) for s in (1.0, -1.0)]
-    return float(np.minimum(np.abs(sides[0]), np.abs(sides[1])).max())
+    return np.asarray(np.minimum(np.abs(sides[0]), np.abs(sides[1])))
 
 
 def _sample(face: FaceMesh, share: int) -> np.ndarray:

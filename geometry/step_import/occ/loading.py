@@ -9,9 +9,11 @@ import numpy as np
 from OCP.gp import gp_Trsf
 from OCP.TopLoc import TopLoc_Location
 
+from geometry.errors import PartError
 from geometry.mesh import F64
 from geometry.part import EdgeInfo, FaceInfo, OtherSolid, Part
 from geometry.setup_frame import SetupFrame
+from geometry.step_import.box_cover import box_cover
 from geometry.step_import.occ.curvature import face_info, surface_name
 from geometry.step_import.occ.edges import edge_infos
 from geometry.step_import.occ.meshing import SolidMesh, mesh_solid
@@ -19,12 +21,17 @@ from geometry.step_import.occ.reading import StepShape, read_shape
 from geometry.step_import.occ.sizes import REFUSE_ABOVE, REFUSE_BELOW, check_size, doubts
 from geometry.step_import.occ.solid.healing import Body, one_solid, swept_as_splines
 from geometry.step_import.occ.topology import Shape, box_of, exact_volume, faces_of, quick_box
+from geometry.step_import.occ.triangulating import triangulate
 from geometry.step_import.reader import check_tolerances
 
 # Modelling tolerance (mm) of a file that names none, and the range in which a named one is accepted.
 USUAL_TOLERANCE, TOLERANCE_RANGE = 1e-3, (1e-5, 0.05)
 # A mesh off by d everywhere changes the volume by area * d. A change this many times larger has another cause.
 VOLUME_ROOM = 2.0
+# Boxes that hold the other solids of a file: of all, of each, and faces of a solid from which on it is one box. The
+# mesh that they are found on: chord as a share of the diagonal, and angle (rad).
+MOST_BOXES, BOXES_EACH, MOST_FACES = 120, 40, 500
+COVER_CHORD, COVER_ANGLE = 2e-3, 0.3
 
 
 @dataclass(frozen=True)
@@ -50,7 +57,8 @@ def load_solid(path: str | Path, solid: int | None = None, fuse: bool = False) -
     step = read_shape(path)
     warnings = list(step.warnings)
     _check_size(step.shape, step)
-    body, others = one_solid(step.products, solid, warnings, fuse=fuse)
+    body, others = one_solid(step.products, solid, warnings, fuse=fuse,
+                             uncertainty=0.0 if step.text.uncertainty is None else _tolerance(step))
     _check_size(body, step)
     surfaces = [surface_name(f) for f in faces_of(body)]
     return LoadedSolid(step, swept_as_splines(body), surfaces, warnings, others)
@@ -81,7 +89,24 @@ def load_part(path: str | Path, *, placement: SetupFrame | None = None, solid: i
     return Part(mesh=moved, faces=faces, edges=tuple(_moved(e, matrix) for e in edges), volume=volume,
                 bounds=moved.bounds, unit=step.unit, chord=chord, angle=angle, deviation=mesh.deviation,
                 warnings=tuple(dict.fromkeys(warnings)), sha256=step.text.sha256, uv=mesh.uv,
-                others=tuple(OtherSolid(n, b.name, box_of(_placed(b.shape, matrix))) for n, b in loaded.others))
+                others=tuple(_other(n, b.name, _placed(b.shape, matrix), MOST_BOXES // len(loaded.others))
+                             for n, b in loaded.others))
+
+
+def _other(number: int, name: str, shape: Shape, most: int) -> OtherSolid:
+    """Another solid of the file, in the setup frame, held by at most ``most`` boxes."""
+    bounds, faces = box_of(shape), faces_of(shape)
+    if most < 2 or len(faces) > MOST_FACES:
+        return OtherSolid(number, name, bounds)
+    chord = COVER_CHORD * float(np.linalg.norm(bounds[1] - bounds[0]))
+    try:
+        meshes = triangulate(shape, chord, COVER_ANGLE)
+    except PartError:  # a body that cannot be meshed is no part; the box round it holds it
+        return OtherSolid(number, name, bounds)
+    plane = [np.full(len(m.triangles), surface_name(f) == "plane") for m, f in zip(meshes, faces, strict=True)]
+    triangles = np.concatenate([m.nodes[m.triangles] for m in meshes])
+    boxes = box_cover(triangles, np.concatenate(plane), 2.0 * chord, bounds, min(most, BOXES_EACH))
+    return OtherSolid(number, name, bounds, boxes if len(boxes) > 1 else np.zeros((0, 2, 3)))
 
 
 def _placed(shape: Shape, matrix: F64) -> Shape:

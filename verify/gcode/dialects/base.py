@@ -25,6 +25,7 @@ class Machine(Protocol):
     s       : modal state after the blocks so far; log : record of the reading
     machine : rotary axes of the machine, or None; rotary : their letters
     radii   : mm by T number, radius of the tools of the setup
+    teeth   : numbers of teeth by T number, of the tools for which the setup states it
     elements : number of moves of compensated contours so far; idle : blocks since the last one
     """
 
@@ -33,6 +34,7 @@ class Machine(Protocol):
     machine: Kinematics | None
     rotary: str
     radii: dict[int, float]
+    teeth: dict[int, int]
     elements: int
     idle: int
 

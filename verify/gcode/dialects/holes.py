@@ -20,8 +20,9 @@ class DrilledHole:
     clear, bottom, back : where the feed begins, the bottom, and where the tool goes afterwards
     pecks   : depths of the pecks, mm, from ``clear`` or the surface downwards; empty for one stroke
     surface : height from which the pecks count
-    leads   : mm above the last depth where each next peck begins to feed again; empty for ``LEAD``
+    leads   : mm above the last depth where the feed begins again behind each peck that went out; empty for ``LEAD``
     lift    : mm that a peck retracts, inf for all the way to ``clear``
+    outs    : of each peck, whether it retracts to ``clear`` all the same; empty: none
     feed    : F word of the way down, '' to keep the one in force; out: of the way up to ``clear``, None for a rapid
     dwell   : s at the bottom
     """
@@ -36,6 +37,7 @@ class DrilledHole:
     out: str | None = None
     dwell: float = 0.0
     leads: tuple[float, ...] = ()
+    outs: tuple[bool, ...] = ()
 
 
 def even_pecks(depth: float, first: float, step: float, least: float, machine: Machine) -> tuple[float, ...]:
@@ -61,6 +63,27 @@ def even_pecks(depth: float, first: float, step: float, least: float, machine: M
         out.append(at)
         peck = max(peck - step, least, 1e-9) if step > 0 else peck
     return tuple(out)
+
+
+def broken_pecks(depth: float, pecks: tuple[float, ...], step: float,
+                 machine: Machine) -> tuple[tuple[float, ...], tuple[bool, ...]]:
+    """Pecks with stops between them, to break the chip.
+
+    depth : mm, of the hole; pecks : mm, depths at which the tool goes out; step : mm between stops, from each of them
+
+    Returns the depths of all, mm, and of each whether the tool goes out there.
+
+    Raises
+    ------
+    ProgramError
+        More stops than a block may make.
+    """
+    machine.log.room(4.0 * (depth / step + len(pecks) + 2))
+    stops: list[tuple[float, bool]] = []
+    for begin, end in zip((0.0, *pecks), (*pecks, depth), strict=True):
+        count = max(math.ceil((end - begin) / step - 1e-9) - 1, 0)
+        stops += [(begin + step * (k + 1), False) for k in range(count)] + [(end, True)]
+    return tuple(d for d, _ in stops[:-1]), tuple(out for _, out in stops[:-1])
 
 
 def even_leads(count: int, first: float, last: float) -> tuple[float, ...]:
@@ -99,14 +122,17 @@ def hole_blocks(hole: DrilledHole, here: Sequence[float], axis: int, unit: float
         at = height
 
     go("G0", hole.clear)
+    gone = 0
     for n, depth in enumerate(hole.pecks):
         height = max(hole.surface - depth, hole.bottom)
         if height >= hole.clear:
             continue
         go("G1", height, hole.feed)
-        go("G0", min(height + hole.lift, hole.clear))
-        if math.isinf(hole.lift):
-            go("G0", min(height + (hole.leads[n] if hole.leads else LEAD), hole.clear))
+        lift = math.inf if hole.outs and hole.outs[n] else hole.lift
+        go("G0", min(height + lift, hole.clear))
+        if math.isinf(lift):
+            go("G0", min(height + (hole.leads[gone] if hole.leads else LEAD), hole.clear))
+            gone += 1
     go("G1", hole.bottom, hole.feed)
     if hole.dwell > 0:
         out.append(f"G4 P{digits(hole.dwell)}")
@@ -116,4 +142,4 @@ def hole_blocks(hole: DrilledHole, here: Sequence[float], axis: int, unit: float
     return out
 
 
-__all__ = ["DrilledHole", "even_leads", "even_pecks", "hole_blocks"]
+__all__ = ["DrilledHole", "broken_pecks", "even_leads", "even_pecks", "hole_blocks"]

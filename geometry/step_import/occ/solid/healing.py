@@ -20,6 +20,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from geometry.errors import PartError
+from geometry.step_import.occ.solid.consistency import check_edges
 from geometry.step_import.occ.solid.gaps import free_edge_gap, free_edges
 from geometry.step_import.occ.solid.meetings import FUSE_TOLERANCE, Meeting, Share, box_groups, meetings, split_bodies
 from geometry.step_import.occ.solid.products import Product
@@ -61,20 +62,21 @@ class Body:
 
 
 def one_solid(products: Sequence[Product], solid: int | None, warnings: list[str], *,
-              fuse: bool = False) -> tuple[Shape, list[tuple[int, Body]]]:
+              fuse: bool = False, uncertainty: float = 0.0) -> tuple[Shape, list[tuple[int, Body]]]:
     """Reduce the products of a file to the one solid to machine.
 
     products : Product each
     solid    : 1-based number among the separate solids, None when there must be only one
     warnings : sentences are appended for every change made
     fuse     : all products are one part: bodies that overlap or share a face are united, also those of two products
+    uncertainty : mm, that the file states of its lengths
 
     Returns a closed kernel solid with its normals outward, and the other bodies with their numbers.
 
     Raises
     ------
     PartError
-        ``open_shell``, ``several_solids``, ``no_such_solid``.
+        ``open_shell``, ``several_solids``, ``no_such_solid``, ``inconsistent_faces``.
 
     Notes
     -----
@@ -93,6 +95,7 @@ def one_solid(products: Sequence[Product], solid: int | None, warnings: list[str
                         "part.others: fixtures")
     chosen = _chosen(bodies, solid, met, fuse)
     others = [(n, b) for n, b in enumerate(bodies, 1) if b.shape is not chosen]
+    check_edges(chosen, uncertainty, warnings)
     return _outward(_valid(chosen, warnings), warnings), others
 
 

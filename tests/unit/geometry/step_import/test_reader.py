@@ -1,5 +1,6 @@
 """The STEP reader on shapes whose truth is known in closed form."""
 
+import re
 from collections import Counter
 
 import numpy as np
@@ -8,11 +9,12 @@ import pytest
 import trimesh
 
 from benchmarks.reach.exact_faces import ExactFaces
+from geometry.errors import PartError
 from geometry.mesh import TriangleMesh
 from geometry.part import EdgeKind
 from geometry.setup_frame import SetupFrame
 from geometry.step_import.occ.holes import fill_slivers
-from geometry.step_import.occ.loading import load_part
+from geometry.step_import.occ.loading import load_part, load_solid
 from geometry.step_import.occ.meshing import count_open_edges
 from geometry.step_import.reader import read_part
 from tests.step_files import real_part, write_step
@@ -211,6 +213,43 @@ def test_inch_propeller():
     assert part.unit == "inch"
     assert np.allclose(part.bounds[1] - part.bounds[0], [19.76, 7.36, 218.76], atol=0.03)
     assert count_open_edges(part.mesh) == 0 and part.deviation <= 0.03
+
+
+def damaged(tmp_path, pattern, by):
+    """A plate of 20 x 20 x 5 mm with a hole of 6 mm; ``by`` replaces what the group of the pattern finds."""
+    path = write_step(cq.Workplane().box(20, 20, 5).faces(">Z").workplane().hole(6), tmp_path / "plate.step")
+    text = path.read_text()
+    assert load_part(path).warnings == () and re.search(pattern, text)
+    path.write_text(re.sub(pattern, lambda m: m[0].replace(m[1], by), text))
+    return path
+
+
+@pytest.mark.parametrize(("pattern", "by", "off", "subject"), [
+    (r"CYLINDRICAL_SURFACE\('',#\d+,(3\.)\)", "30.", 27.0, "F7"),
+    (r"CYLINDRICAL_SURFACE\('',#\d+,(3\.)\)", "3.2", 0.2, "F7"),
+    # a corner, with whatever else stands there: 11 and 12 mm off the upright edge through it
+    (r"CARTESIAN_POINT\('',\((-10\.,-10\.,2\.5)\)\)", "1.,2.,2.", np.hypot(11, 12), "F1")])
+def test_faces_that_do_not_meet_are_refused_with_their_place(tmp_path, pattern, by, off, subject):
+    with pytest.raises(PartError) as caught:
+        load_solid(damaged(tmp_path, pattern, by))
+    error = caught.value
+    assert error.code == "inconsistent_faces" and subject in error.subjects and error.limit == 0.1
+    assert error.measured == pytest.approx(off, abs=1e-3)
+    assert re.search(r" by [\d.]+ mm at \([-\d., ]+\) in STEP coordinates", error.message) and error.remedy
+
+
+def test_faces_that_nearly_meet_are_told(tmp_path):
+    def told(path):
+        return [w for w in load_solid(path).warnings if "meet" in w]
+
+    radius = r"CYLINDRICAL_SURFACE\('',#\d+,(3\.)\)"
+    (warning,) = told(damaged(tmp_path, radius, "3.05"))
+    assert "an edge lies off F7 by 0.05 mm at (" in warning
+    assert not told(damaged(tmp_path, radius, "3.005"))
+    # a file may state that its lengths are no better
+    loose = damaged(tmp_path, radius, "3.15")
+    loose.write_text(re.sub(r"(UNCERTAINTY_MEASURE_WITH_UNIT\(LENGTH_MEASURE\()[^)]*", r"\g<1>0.02", loose.read_text()))
+    assert not told(loose)
 
 
 @pytest.mark.slow

@@ -14,16 +14,17 @@ from verify.moves import Moves
 from verify.tool_axes import ToolAxes
 
 TOOL = ToolBody("T4", 4, 8.0, 0.0, 20.0, 8.0, 20.0, 8.0, 45.0, (HolderFrustum(30.0, 30.0, 30.0),))
+NONE = np.zeros((0, 2, 3))
 BOX = np.array([[10.0, -5.0, 0.0], [20.0, 5.0, 9.0]])
 
 
-def told(*ways, tilted=False):
+def told(*ways, tilted=False, boxes=NONE):
     start, end = (np.array([w[k] for w in ways], dtype=np.float64) for k in (0, 1))
     count = len(ways)
     moves = Moves(start, end, np.zeros(count, np.bool_), np.zeros(count, np.int32),
                   axes=ToolAxes.upright(count) if tilted else None)
     source = SimpleNamespace(tool=np.full(count, 4), line=np.arange(7, 7 + count))
-    setup = ProofSetup(others=(OtherSolid(2, "jaw", BOX),))
+    setup = ProofSetup(others=(OtherSolid(2, "jaw", BOX, boxes),))
     return list(other_assumptions(moves, source, [TOOL], setup))
 
 
@@ -38,6 +39,14 @@ def told(*ways, tilted=False):
     (((-9, 0, -37), (-4.9, 0, -37)), True)])
 def test_tools_that_enter_the_box_are_told(way, met):
     assert bool(told(way)) == met
+
+
+def test_air_in_the_box_round_a_solid_is_free():
+    foot, wall = [[10, -5, 0], [20, 5, 3]], [[17, -5, 3], [20, 5, 9]]
+    over, into = ((0, 0, 3), (12.9, 0, 3)), ((0, 0, 2.9), (12.9, 0, 2.9))
+    assert told(over) and not told(over, boxes=np.array([foot, wall], np.float64))
+    assert told(into, boxes=np.array([foot, wall], np.float64))
+    assert told(((0, 0, 3), (13.1, 0, 3)), boxes=np.array([foot, wall], np.float64))
 
 
 def test_the_assumption_names_solid_tool_and_first_line():

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from verify.gcode.dialects.base import NUMBER, BlockError, Machine
 from verify.gcode.dialects.heidenhain.heidenhain_cycles import (
@@ -201,26 +201,15 @@ class HeidenhainReader(HeidenhainPaths):
             if w[1]:
                 given[w[1]] = self.q.value(w[2])
             at = w.end()
-        out = [f"S{digits(given['S'])}"] if "S" in given else []
-        if "FZ" in given:
-            raise BlockError("FZ (a feed per tooth) of TOOL CALL is not followed: the tool table of the control has "
-                             "the number of teeth", "give the feed per turn (FU) or per minute")
-        if "F" in given:
-            self.auto, self.auto_turn = given["F"], False
-            self.rate = self.counted(given["F"], False)
-            out.append(self.rate)
-        elif "FU" in given or (self.per_turn is not None and "S" in given):
-            if "FU" in given:
-                self.auto, self.auto_turn, self.per_turn = given["FU"], True, given["FU"]
-            assert self.per_turn is not None
-            self.rate = self.turning(given.get("S", self.machine.s.speed), self.per_turn)
-            out.append(self.rate)
         if m[1] is None and not {"DL", "DR", "DR2"}.isdisjoint(given):
             raise BlockError("TOOL CALL with DL or DR and without a tool is not followed", "name the tool in it")
+        before = self.tool
+        self.tool = before if m[1] is None else self._numbered(m[1])
+        out = [*([f"S{digits(given['S'])}"] if "S" in given else []), *self._tool_feed(given, self.tool != before)]
         if m[1] is None:
             return [*out] if not out else [" ".join(out)]
-        number = self._numbered(m[1])
-        self.tool, self.wider = number, given.get("DR", 0.0) * self.factor_of_unit
+        number = self.tool
+        self.wider = given.get("DR", 0.0) * self.factor_of_unit
         self.forget()
         self.lengthen(given.get("DL", 0.0) * self.factor_of_unit)
         if self.longer and self.swung:
@@ -228,6 +217,30 @@ class HeidenhainReader(HeidenhainPaths):
         if given.get("DR2", 0.0):
             self.notes.append("TOOL CALL with DR2 changes the compensation in space only; the reader has none")
         return [" ".join([f"T{number} M6", *out]), *([f"G43 H{number}"] if number else [])]
+
+    def _tool_feed(self, given: Mapping[str, float], other: bool) -> list[str]:
+        """The F word of a TOOL CALL, or none. given : its values by letter; other : whether it calls another tool."""
+        speed = given.get("S", self.machine.s.speed)
+        if "F" in given:
+            self.auto, self.auto_turn = given["F"], False
+            self.per_tooth = self.auto_tooth = None
+            self.rate = self.counted(given["F"], False)
+            return [self.rate]
+        if "FU" in given or "FZ" in given:
+            self.per_tooth = self.auto_tooth = given.get("FZ")
+            self.per_turn = given["FZ"] * self.teeth() if "FZ" in given else given["FU"]
+            self.auto, self.auto_turn = self.per_turn, True
+        elif other and self.tool:
+            if self.auto_tooth is not None:
+                self.auto = self.auto_tooth * self.teeth()
+            if self.per_tooth is not None:
+                self.per_turn = self.per_tooth * self.teeth()
+        elif "S" not in given:
+            return []
+        if self.per_turn is None or ("S" not in given and not {"FU", "FZ"} & given.keys() and self.per_tooth is None):
+            return []
+        self.rate = self.turning(speed, self.per_turn)
+        return [self.rate]
 
     def _tool_def(self, text: str) -> list[str]:
         """TOOL DEF: a tool that is made ready. Sizes have to be those that the proof has.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from verify.gcode.dialects.base import BlockError, Machine
 from verify.gcode.dialects.heidenhain.heidenhain_q import NUM, VALUE
-from verify.gcode.dialects.holes import DrilledHole, even_leads, even_pecks, hole_blocks
+from verify.gcode.dialects.holes import DrilledHole, broken_pecks, even_leads, even_pecks, hole_blocks
 from verify.gcode.dialects.stated_places import digits
 
 _HEAD = re.compile(r"CYCL DEF ([0-9]+)(?![0-9.])\s*(.*)")
@@ -151,12 +151,20 @@ def _ways(call: CycleCall, machine: Machine, surface: float, depth: float, feed:
     shrink = call.get("Q212", 0.0) * unit if n in (203, 205) else 0.0
     least = call.get("Q205", 0.0) * unit or max(0.01, 0.05 * first)
     pecks = even_pecks(depth, first, shrink, min(least, first) if first > 0 else least, machine)
-    breaks = (n == 203 and call.get("Q213", 0.0) > 0) or (n == 205 and call.get("Q257", 0.0) > 0)
-    lift = math.inf if not breaks else max(call.get("Q256", 0.2) * unit, 0.0)
-    leads = () if n != 205 or breaks or "Q258" not in call.values else even_leads(
-        len(pecks), abs(call.get("Q258")) * unit, abs(call.get("Q259", call.get("Q258"))) * unit)
+    leads: tuple[float, ...] = ()
+    if n == 205 and "Q258" in call.values:
+        leads = even_leads(len(pecks), abs(call.get("Q258")) * unit, abs(call.get("Q259", call.get("Q258"))) * unit)
+    outs: tuple[bool, ...] = (True,) * len(pecks)
+    if n == 203 and call.get("Q213", 0.0) > 0:
+        outs = tuple((k + 1) % (int(call.get("Q213")) + 1) == 0 for k in range(len(pecks)))
+    elif n == 205 and call.get("Q257", 0.0) > 0:
+        if pecks:
+            machine.log.note("cycle 205 with chip breaking (Q257) is read as going out of the hole after each infeed "
+                             "(Q202); older controls may not go out before its end")
+        pecks, outs = broken_pecks(depth, pecks, call.get("Q257") * unit, machine)
+    lift = max(call.get("Q256", 0.2) * unit, 0.0)
     out = feed(call.get("Q208")) if n == 203 and 0 < call.get("Q208", 0.0) < 99999 else None
-    return {"feed": down, "pecks": pecks, "lift": lift, "leads": leads, "out": out}
+    return {"feed": down, "pecks": pecks, "lift": lift, "leads": leads, "outs": outs, "out": out}
 
 
 def _bore_mill(call: CycleCall, here: Sequence[float], machine: Machine, heights: tuple[float, float, float], feed: str,

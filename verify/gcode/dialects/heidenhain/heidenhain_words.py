@@ -112,8 +112,9 @@ class HeidenhainWords(HeidenhainFrames):
     wound    : deg by which a rotary word counts less than the axis has turned (M94)
     calls    : whether the latest move calls a cycle at its end, ``end``; modal_call : whether every move does (M89)
     rate     : the F word in force; auto : feed of TOOL CALL
-    per_turn : units of the program per turn of the spindle (FU), None where F counts per minute
-    auto_turn : whether F of TOOL CALL counts per turn
+    per_turn : units of the program per turn of the spindle (FU, FZ), None where F counts per minute
+    per_tooth : units of the program per tooth (FZ), None where F counts otherwise
+    auto_turn : whether F of TOOL CALL counts per turn; auto_tooth : its FZ, None where it has none
     """
 
     style, refused_m = HEIDENHAIN_STYLE, HEIDENHAIN_M
@@ -134,7 +135,9 @@ class HeidenhainWords(HeidenhainFrames):
         self.rate = ""
         self.auto: float | None = None
         self.per_turn: float | None = None
+        self.per_tooth: float | None = None
         self.auto_turn = False
+        self.auto_tooth: float | None = None
         self.held: Move | None = None
         self.corner: tuple[str, float, str, int] | None = None
         self.approach: Way | None = None
@@ -279,9 +282,6 @@ class HeidenhainWords(HeidenhainFrames):
             elif m["sense"]:
                 w.sense = m["sense"]
             elif m["feed"]:
-                if m["feed"].startswith("Z"):
-                    raise BlockError(f"F{m['feed']} (a feed per tooth) is not followed: the tool table of the control "
-                                     "has the number of teeth", "give the feed per turn (FU) or per minute")
                 if w.feed:
                     raise BlockError(f"two feeds in one block: F{w.feed} and F{m['feed']}")
                 w.feed = m["feed"]
@@ -305,10 +305,13 @@ class HeidenhainWords(HeidenhainFrames):
         if feed == "AUTO":
             if self.auto is None:
                 raise BlockError("FAUTO, and TOOL CALL has no F")
-            self.rate = self.counted(self.auto, self.auto_turn)
+            self.rate, self.per_tooth = self.counted(self.auto, self.auto_turn), self.auto_tooth
             return self.rate
         if feed and feed != "MAX":
-            self.rate = self.counted(self.q.value(feed.lstrip("UZ ")), feed.startswith("U"))
+            value, self.per_tooth = self.q.value(feed.lstrip("UZ ")), None
+            if feed.startswith("Z"):
+                self.per_tooth, value = value, value * self.teeth()
+            self.rate = self.counted(value, feed.startswith(("U", "Z")))
             return self.rate
         return ""
 
@@ -322,6 +325,21 @@ class HeidenhainWords(HeidenhainFrames):
         """
         self.per_turn = number if per_turn else None
         return self.turning(self.machine.s.speed, number) if per_turn else self.feed_word(number)
+
+    def teeth(self) -> int:
+        """Number of teeth of the tool in the spindle.
+
+        Raises
+        ------
+        BlockError
+            Nothing states it.
+        """
+        found = self.machine.teeth.get(self.tool)
+        if found is None:
+            raise BlockError(f"FZ (a feed per tooth) with T{self.tool}, whose number of teeth is not known",
+                             "give the feed per turn (FU) or per minute")
+        self.notes.append(f"feeds per tooth (FZ) of T{self.tool} count with the {found} teeth (flutes) of the setup")
+        return found
 
     def turning(self, speed: float, per_turn: float) -> str:
         """The F word of a feed per turn, units of the program, at a spindle speed, turns per minute.

@@ -311,9 +311,22 @@ def test_feeds_per_turn():
     p = read("L X+6 FU0.05\nTOOL CALL S2000\nL X+7\nL X+8 F70\nTOOL CALL S500\nL X+9\nTOOL CALL 1 Z S400 FU 0.1\nM3\n"
              "L X+10 FAUTO\nRND R1 F9\nL Y+5", "heidenhain")
     assert p.feed[p.kind == 1][[0, 1, 2, 3, 4, 5, -1]].tolist() == [50, 100, 70, 70, 40, 9, 40]
+
+
+def test_feeds_per_tooth():
+    """FZ counts with speed and teeth of the tool that is in, of TOOL CALL and of a block."""
+    text = ("L X+6 FZ0.05\nTOOL CALL S2000\nL X+7\nTOOL CALL 2\nM3\nL Z+50 FMAX\nL X+8\nL X+9 F70\n"
+            "TOOL CALL 1 Z S500 FZ 0.1\nM3\nL Z+50 FMAX\nL X+10 FAUTO\nL X+11 FU0.1\nTOOL CALL 2 Z S400\nM3\n"
+            "L Z+50 FMAX\nL X+12\nL X+13 FAUTO")
+    p = read(text, "heidenhain", teeth={1: 4, 2: 3})
+    feeds = p.feed[p.kind == 1]
+    assert feeds.tolist() == pytest.approx([200, 400, 300, 70, 200, 50, 40, 120])
+    assert any("T1 count with the 4 teeth (flutes)" in note for note in p.notes)
     for word in ("L X+6 FZ0.05", "TOOL CALL 1 Z S100 FZ0.1"):
-        with pytest.raises(ProgramError, match="a feed per tooth"):
+        with pytest.raises(ProgramError, match="whose number of teeth is not known"):
             read(word, "heidenhain")
+    with pytest.raises(ProgramError, match="FZ .* with T3"):
+        read("L X+6 FZ0.05\nTOOL CALL 3 Z S100", "heidenhain", teeth={1: 4})
 
 
 @pytest.mark.parametrize(("line", "told"), [("/12 L X+5", True), ("12 /L X+5", True), ("/ TOOL CALL S900", True),
@@ -328,6 +341,31 @@ def test_a_block_with_a_slash_runs_and_is_told_where_it_counts(line, told):
 def test_a_slash_before_what_decides_the_order_is_refused(line):
     with pytest.raises(ProgramError, match="would depend on a switch"):
         read(f"{line}\nL X+5", "heidenhain")
+
+
+def down_and_up(p):
+    """Heights of the moves along Z over X5, with their kinds."""
+    here = (p.end[:, 0] == 5) & (p.start[:, 0] == 5) & (p.end[:, 2] != p.start[:, 2])
+    return [(round(float(z), 6), "f" if k else "r") for z, k in zip(p.end[here, 2], p.kind[here], strict=True)]
+
+
+def test_cycle_205_breaks_chips_between_infeeds_and_goes_out_behind_each():
+    given = "Q200=+2 Q201=-10 Q206=90 Q202=+5 Q203=+0 Q204=+20 Q212=+0 Q205=+0 Q257=+2 Q256=+0.2 Q258=+0.5 Q259=+0.5"
+    p = read(f"CYCL DEF 205 {given}\nL X+5 FMAX M99", "heidenhain")
+    assert down_and_up(p) == [
+        (2, "r"), (-2, "f"), (-1.8, "r"), (-4, "f"), (-3.8, "r"), (-5, "f"), (2, "r"), (-4.5, "r"),
+        (-7, "f"), (-6.8, "r"), (-9, "f"), (-8.8, "r"), (-10, "f"), (20, "r")]
+    assert any("chip breaking (Q257)" in note for note in p.notes)
+    single = read(f"CYCL DEF 205 {given}\nL X+5 FMAX M99".replace("Q202=+5", "Q202=+10"), "heidenhain")
+    assert down_and_up(single) == [(2, "r"), *(x for k in (2, 4, 6, 8) for x in ((-k, "f"), (0.2 - k, "r"))),
+                                   (-10, "f"), (20, "r")]
+
+
+def test_cycle_203_goes_out_behind_its_number_of_breaks():
+    given = "Q200=2 Q201=-10 Q206=90 Q202=2 Q210=0 Q203=0 Q204=5 Q212=0 Q205=2 Q211=0 Q208=0 Q256=0.5"
+    p = read(f"CYCL DEF 203 {given} Q213=2\nL X+5 FMAX M99", "heidenhain")
+    assert down_and_up(p) == [(2, "r"), (-2, "f"), (-1.5, "r"), (-4, "f"), (-3.5, "r"), (-6, "f"), (2, "r"),
+                              (-5.8, "r"), (-8, "f"), (-7.5, "r"), (-10, "f"), (5, "r")]
 
 
 def test_pecks_begin_their_stop_distance_above_the_last_depth():
