@@ -24,6 +24,7 @@ class OffsetTables(Modes):
     lengths : mm by H number, the first value written and the present one; the first is nan where G91 only added to it
     wear    : mm by H number
     registers : mm by D number, radius that the program wrote; radius_wear : mm by D number
+    tables_written : line of the latest G10 that wrote one of these, 0 for none
     """
 
     zeros: dict[str, list[float]]
@@ -33,6 +34,7 @@ class OffsetTables(Modes):
     registers: dict[int, float]
     radius_wear: dict[int, float]
     radii: dict[int, float]
+    tables_written = 0
 
     def _open_tables(self) -> None:
         """Empty tables; only the work offset of the setup is known."""
@@ -50,6 +52,7 @@ class OffsetTables(Modes):
 
     def _set_table(self, values: dict[str, float], axes: Axes) -> None:
         """Run G10 L1, L2 and L10 to L13; L20 has its own place."""
+        self.tables_written = self.log.line
         kind = int(values.get("L", -1))
         if kind == 2:
             return self._set_zero(values, axes)

@@ -16,6 +16,7 @@ decide (``Program.unbounded``).
 
 from __future__ import annotations
 
+import copy
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -29,6 +30,7 @@ from verify.gcode.block_motion import BlockMotion
 from verify.gcode.block_words import Block, BlockError, parse_block, straight, used_letters
 from verify.gcode.dialects import CONTROLS, DIALECTS, LINUXCNC, translated_blocks
 from verify.gcode.flow.control_flow import Flow, has_flow
+from verify.gcode.flow.second_run import KEPT_MODES, TABLES, Change, first_change, left_modes
 from verify.gcode.flow.system_parameters import served
 from verify.gcode.machine_words import functions_note
 from verify.gcode.program_text import cleaned
@@ -48,22 +50,26 @@ REPORT_LINES = 4096  # lines between two reports of progress
 
 
 class Reader(BlockMotion):
-    """One reading of one program; use ``read_program``."""
+    """One reading of one program; use ``read_program``.
+
+    dialect      : of the program
+    leaves_modes : what the next run of the program takes for granted
+    """
+
+    dialect = LINUXCNC
+    leaves_modes: tuple[Assumed, ...] = ()
 
     def read(self, text: str, report: Report = silent, dialect: str = LINUXCNC) -> Program:
         """Moves and remarks of ``text``; raises as ``read_program`` says, and what ``report`` raises."""
-        log, lines, self.fits = self.log, text.split("\n"), dialect == LINUXCNC
+        log, lines, self.fits, self.dialect = self.log, text.split("\n"), dialect == LINUXCNC, dialect
         self.s.retract_to_r = dialect == LINUXCNC  # as it starts
-        blocks: Iterable[tuple[int, str]] = enumerate(lines, 1)
         if dialect != LINUXCNC:
             self.control = CONTROLS[dialect]()
             self.control.names = self.names
-            blocks = translated_blocks(lines, self.control, self)
-        elif has_flow(text):
-            blocks = Flow(lines, self).blocks()
-        seen = bytearray(len(lines) + 2)
-        percents = self._scan(_reported(blocks, len(lines), report), seen)
+        begin, seen = self._copy(), bytearray(len(lines) + 2)
+        percents = self._scan(_reported(self._blocks(text, lines), len(lines), report), seen)
         cut_off = self._name_unread(lines, seen) if self.s.ended else 0
+        compensated = self.s.side != 0 and not self.ends_contour
         self._finish()
         self.stop("end of the program")
         self.pause("end of the program", self.s.tool)
@@ -80,6 +86,7 @@ class Reader(BlockMotion):
             log.notes.append(functions_note(log.functions))
         table = log.table()
         self._path_mode(table)
+        self._run_again(begin, text, lines, table, compensated)
         speed, coolant = log.states()
         start, end, feed = (np.ascontiguousarray(table[:, k]) for k in (slice(0, 3), slice(3, 6), 7))
         return Program(log.name, start, end, table[:, 6].astype(np.int8), feed, table[:, 8].astype(np.int32),
@@ -94,10 +101,69 @@ class Reader(BlockMotion):
                        taps={int(table[row, 9]): out for row, out in log.taps if row < len(table)},
                        own_speed=self.control is not None and self.control.own_speed)
 
+    def _blocks(self, text: str, lines: list[str]) -> Iterable[tuple[int, str]]:
+        """Blocks of the program with their lines, in the words of this reader and the order they run."""
+        if self.control is not None:
+            return translated_blocks(lines, self.control, self)
+        return Flow(lines, self).blocks() if has_flow(text) else enumerate(lines, 1)
+
+    def _copy(self) -> Reader:
+        """A reader in the state of this one, with an empty log."""
+        same = (self.tools, self.machine, self.gauge, self.hangs, self.radii, self.names)
+        return copy.deepcopy(self, {id(self.log): Log(self.log.name), **{id(s): s for s in same}})
+
+    def _run_again(self, begin: Reader, text: str, lines: list[str], table: F64, compensated: bool) -> None:
+        """Remark where a second run goes other ways than the first one, because of what the first one leaves.
+
+        begin : the reader before the first block; compensated : whether a contour is open that the beginning does not
+        close
+        """
+        log = self.log
+        curved = Change(int(table[0, 9]), "G41 or G42 in force") if compensated and len(table) else None
+        if log.repeats:
+            again = self._copy()
+            again.s.ended = False
+            left = left_modes(begin.s, self.s)
+            why = f" ({', '.join(left)})" if left else ""
+            if change := curved or again._change(text, lines, table):
+                log.remark("second_run", f"M99 begins the program again with what it has left{why}: the second round "
+                           f"has {change.what} in line {change.line}; set it back before M99", line=log.repeats)
+            return
+        if self.tables_written:
+            again = begin._copy()
+            for name in TABLES:
+                setattr(again, name, copy.deepcopy(getattr(self, name)))
+            again._take_zero()
+            if change := again._change(text, lines, table):
+                log.remark("second_run", "G10 leaves another value in the tables of the control than the program began "
+                           f"with: its next run has {change.what} in line {change.line}; write the first value at the "
+                           "beginning of the program, or back at its end", line=self.tables_written)
+                return
+        left = [*left_modes(begin.s, self.s, self.assumed), *(["G41 or G42"] if curved else [])]
+        if left and self.dialect in KEPT_MODES:
+            again = self._copy()
+            again.s.ended = again.s.spindle = again.s.coolant = False
+            again.s.position = [NAN] * 3
+            if change := curved or again._change(text, lines, table):
+                self.leaves_modes = (Assumed(
+                    AssumedKind.MODES_LEFT, f"set back at the end of the program, which leaves {', '.join(left)} "
+                    f"({log.name})", f"where the control keeps modes, the next run has {change.what} in line "
+                    f"{change.line}", "state them at the beginning of the program (parameter 3402 of Fanuc and setting "
+                    "56 of Haas decide)"),)
+
+    def _change(self, text: str, lines: list[str], table: F64) -> Change | None:
+        """The first line at which this reader, which stands at the beginning, runs otherwise than ``table`` (m, 10)."""
+        try:
+            self._scan(self._blocks(text, lines), bytearray(len(lines) + 2))
+            self._finish()
+            return first_change(table, self.log.table(), self.log.errors)
+        except ProgramError:  # it is too long, which the first run is not
+            return Change(self.log.line, "too many moves")
+
     def _left_open(self) -> tuple[Assumed, ...]:
         """What the program leaves to the control."""
         if self.control is not None:
-            return tuple(self.control.assumed)
+            return (*self.control.assumed, *self.leaves_modes)
         if not self.by_axes:
             return ()
         return (Assumed(AssumedKind.TIP_CONTROL, f"off ({self.log.name}, line {self.by_axes})",
