@@ -27,6 +27,7 @@ class AssumedKind(StrEnum):
     HOLDER = "holder"
     ABOVE_HOLDER = "above_holder"
     TABLE = "table"
+    LOOSE_STOCK = "loose_stock"
     OTHER_SOLIDS = "other_solids"
     RAPID_PATH = "rapid_path"
     PATH_MODE = "path_mode"
