@@ -140,16 +140,17 @@ class Reader(BlockMotion):
                            "beginning of the program, or back at its end", line=self.tables_written)
                 return
         left = [*left_modes(begin.s, self.s, self.assumed), *(["G41 or G42"] if curved else [])]
-        if left and self.dialect in KEPT_MODES:
-            again = self._copy()
+        if left and self.dialect not in KEPT_MODES:  # the tool stays on every control
+            left = [word for word in left if word.endswith("in the spindle")]
+        if left:
+            again = self._copy() if self.dialect in KEPT_MODES else begin._copy()
             again.s.ended = again.s.spindle = again.s.coolant = False
-            again.s.position = [NAN] * 3
+            again.s.position, again.s.tool = [NAN] * 3, self.s.tool
             if change := curved or again._change(text, lines, table):
                 self.leaves_modes = (Assumed(
-                    AssumedKind.MODES_LEFT, f"set back at the end of the program, which leaves {', '.join(left)} "
-                    f"({log.name})", f"where the control keeps modes, the next run has {change.what} in line "
-                    f"{change.line}", "state them at the beginning of the program (parameter 3402 of Fanuc and setting "
-                    "56 of Haas decide)"),)
+                    AssumedKind.MODES_LEFT, f"set back before the next run: {log.name} leaves {', '.join(left)}",
+                    f"otherwise the next run has {change.what} in line {change.line} (parameter 3402 of Fanuc and "
+                    "setting 56 of Haas decide over modes)", "state them at the beginning of the program"),)
 
     def _change(self, text: str, lines: list[str], table: F64) -> Change | None:
         """The first line at which this reader, which stands at the beginning, runs otherwise than ``table`` (m, 10)."""
@@ -165,8 +166,8 @@ class Reader(BlockMotion):
         if self.control is not None:
             return (*self.control.assumed, *self.leaves_modes)
         if not self.by_axes:
-            return ()
-        return (Assumed(AssumedKind.TIP_CONTROL, f"off ({self.log.name}, line {self.by_axes})",
+            return self.leaves_modes
+        return (*self.leaves_modes, Assumed(AssumedKind.TIP_CONTROL, f"off ({self.log.name}, line {self.by_axes})",
                         "kinematics such as xyzac-trt start with it on: X, Y and Z are then the tip, and the tool goes "
                         "elsewhere", "program M428 or M429 before the rotary axes turn"),)
 

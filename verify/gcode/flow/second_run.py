@@ -45,11 +45,11 @@ def first_change(first: F64, second: F64, errors: list[tuple[int, str]]) -> Chan
         return Change(errors[0][0], f"an error ({errors[0][1]})")
     one, two = (int(np.argmax(t[:, 6] == FEED)) if (t[:, 6] == FEED).any() else len(t) for t in (first, second))
     high = float(first[:, 5].max(initial=-np.inf)) - SAME
-    ends = {int(row[9]): row[3:6] for row in first[:one]}
-    for row in second[:two]:
-        if (was := ends.get(int(row[9]))) is not None and min(row[5], was[2]) < high \
-                and _others(row[None, 3:6], was[None]).any():
-            return Change(int(row[9]), "another place")
+    ends, now = ({int(row[9]): row[3:6] for row in t} for t in (first[:one], second[:two]))  # of each line the last
+    for line in sorted(ends.keys() & now.keys()):
+        was, to = ends[line], now[line]
+        if min(was[2], to[2]) < high and _others(was[None], to[None]).any():
+            return Change(line, "another place")
     a, b = first[one:], second[two:]
     n = min(len(a), len(b))
     moved, fed = _others(a[:n, :6], b[:n, :6]), _others(a[:n, 7:8] / 1e3, b[:n, 7:8] / 1e3)
@@ -67,7 +67,7 @@ def left_modes(begin: State, end: State, assumed: tuple[str, ...] | None = None)
 
     assumed : G words that the program does not state before its first move; None: all modes count, stated or not
     """
-    unsaid = {"G90", "G17", "G94"} if assumed is None else set(assumed)
+    unsaid = {"G90", "G17", "G94", f"T{begin.tool} M6"} if assumed is None else set(assumed)
     left = {
         "a rotation, a scale or a mirror": end.frame is not None,
         "G91": end.relative and not begin.relative and "G90" in unsaid,
@@ -75,6 +75,7 @@ def left_modes(begin: State, end: State, assumed: tuple[str, ...] | None = None)
         f"G{end.feed_mode}": end.feed_mode != begin.feed_mode and "G94" in unsaid,
         "G99" if end.retract_to_r else "G98": end.retract_to_r != begin.retract_to_r,
         "another length of the tool": abs(end.length - begin.length) > SAME,
+        f"T{end.tool} in the spindle": bool(begin.tool) and end.tool != begin.tool and f"T{begin.tool} M6" in unsaid,
         "a shifted zero": not np.allclose(end.origin, begin.origin, atol=SAME),
     }
     return [word for word, on in left.items() if on]

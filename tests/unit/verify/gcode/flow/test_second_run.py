@@ -101,3 +101,29 @@ def test_controls_that_set_modes_back_leave_nothing_open():
 def test_a_contour_left_open_at_m30_is_an_assumption():
     p = read("M30", modes=MODES.replace("G40 ", ""), close="")
     assert [a.what for a in p.open] == [AssumedKind.MODES_LEFT]
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "linuxcnc"])
+def test_another_tool_left_in_the_spindle(dialect):
+    end = "M30" if dialect == "fanuc" else "M2"
+    text = ("%\nO1\nG21 G17 G90 G94 G40 G49 G80 G54\n{}G43 H1\nS6000 M3\nG0 X0. Y0.\nZ15.\nG1 Z1. F90.\nG0 Z15.\n"
+            "T2 M6\n{}\n%\n")
+    if dialect == "linuxcnc":
+        text = text.replace("O1\n", "")
+
+    def left(first, last):
+        p = read_program(text.format(first, last), dialect=dialect, tools=[1, 2], spindle_tool=1)
+        lines = [r.line for r in p.remarks if "again" in r.message]
+        return [a for a in p.open if a.what is AssumedKind.MODES_LEFT], lines
+
+    assert left("T1 M6\n", end) == ([], []) and left("T1 M6\n", "M99") == ([], [])
+    (a,), _ = left("", end)
+    assert "T2 in the spindle" in str(a.value)
+    assert left("", "M99")[1] == [11 if dialect == "fanuc" else 10]
+
+
+def test_a_cycle_that_states_its_height_of_return():
+    cycle = "G99 G81 X0. Y0. Z-3. R2. F300.\nG80\n"
+    assert not read(f"{cycle}M30", modes="G17 G90 G94 G40 G69 ").open
+    [a] = read("G81 X0. Y0. Z-3. R2. F300.\nX5.\nG80\nG99\nM30", modes="G17 G90 G94 G40 G69 ").open
+    assert "G99" in str(a.value)
