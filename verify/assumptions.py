@@ -20,6 +20,7 @@ class AssumedKind(StrEnum):
     MODES_LEFT = "modes_left"
     TIP_CONTROL = "tip_control"
     LENGTH_AXIS = "length_axis"
+    LENGTH_REGISTER = "length_register"
     RADIUS_REGISTER = "radius_register"
     TAP_DIAMETER = "tap_diameter"
     GAUGE_LENGTH = "gauge_length"

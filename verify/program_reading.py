@@ -47,7 +47,7 @@ def read_one(nc: NcProgram, tools: Sequence[ToolBody], *, work_offset: str = "G5
         gauge_length=gauge_length, spindle_tool=spindle_tool, report=report, dialect=nc.dialect,
         radii={t.number: t.radius for t in tools}, names={t.id: t.number for t in tools}, change=change,
         lengths={t.number: gauge_length[t.number] for t in tools if gauge_length and t.number in gauge_length
-                 and (t.holder or t.number in gauge_given)})
+                 and (t.holder or t.number in gauge_given)}, measured=gauge_given)
 
 
 def read_on(nc: NcProgram, read: Program, reading: Callable[[NcProgram], Program]) -> Program | None:

@@ -104,6 +104,10 @@ class Modes(ToolChanges):
         """Whether a register that no tool has by number belongs to the tool in the spindle."""
         raise NotImplementedError
 
+    def _settle_length(self) -> None:
+        """Another length comes into force."""
+        raise NotImplementedError
+
     def _unturn(self, word: float) -> None:
         """End a rotation (G69) or a scale (G50) of the programmed coordinates."""
         raise NotImplementedError
@@ -256,6 +260,7 @@ class Modes(ToolChanges):
         s = self.s
         if g == 43.4 and s.tcp_word:
             self.log.kept_on.append(self.log.line)
+        self._settle_length()
         self._control(g == 43.4, s.tcp_switch)
         self.tip_told |= g == 43.4
         if g == 49:

@@ -86,6 +86,7 @@ class Reader(BlockMotion):
             log.notes.append(functions_note(log.functions))
         table = log.table()
         self._path_mode(table)
+        self._judge_lengths()
         self._run_again(begin, text, lines, table, compensated)
         speed, coolant = log.states()
         start, end, feed = (np.ascontiguousarray(table[:, k]) for k in (slice(0, 3), slice(3, 6), 7))
@@ -163,6 +164,7 @@ class Reader(BlockMotion):
 
     def _left_open(self) -> tuple[Assumed, ...]:
         """What the program leaves to the control."""
+        self._settle_length()
         if self.control is not None:
             return (*self.control.assumed, *self.leaves_modes)
         if not self.by_axes:
@@ -336,7 +338,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
                  gauge_length: Mapping[int, float] | None = None, spindle_tool: int = 0,
                  report: Report = silent, dialect: str = LINUXCNC, radii: Mapping[int, float] | None = None,
                  names: Mapping[str, int] | None = None, change: Sequence[float] | None = None,
-                 lengths: Mapping[int, float] | None = None) -> Program:
+                 lengths: Mapping[int, float] | None = None, measured: Collection[int] = ()) -> Program:
     """Read a program of three, four or five axes.
 
     text        : the program
@@ -353,6 +355,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
     names       : T numbers by the ids of the tools, for programs that name their tools
     change      : mm, setup frame, Z or X, Y and Z of the spindle face at a tool change; None where it is not stated
     lengths     : mm by T number, spindle face to tip, of the tools whose length is known
+    measured    : T numbers of those whose length the setup states
 
     Returns
     -------
@@ -391,6 +394,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
                            remedy="give a tool of the table as spindle_tool")
     reader = Reader(Log(name), tools, work_offset, blend_limit, kinematics, gauge_length, spindle_tool)
     reader.radii, reader.names = dict(radii or {}), dict(names or {})
+    reader.measured = frozenset(lengths or ()) & frozenset(measured)
     reader.change = None if change is None else tuple(change)
     reader.hangs, reader.stays = {0: 0.0, **(lengths or {})}, dialect == LINUXCNC
     return reader.read(text, report, dialect)

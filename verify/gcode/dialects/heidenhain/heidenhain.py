@@ -248,6 +248,8 @@ class HeidenhainReader(HeidenhainPaths):
         if "L" in sizes and abs(self.lengths.setdefault(number, sizes["L"]) - sizes["L"]) > 1e-6:
             raise BlockError(f"TOOL DEF {number} with the length {sizes['L']:g} mm: an earlier one gives it "
                              f"{self.lengths[number]:g} mm")
+        if "L" in sizes:
+            self.machine.log.lengths.setdefault(number, (sizes["L"], self.machine.log.line))
         return []
 
     def _numbered(self, word: str) -> int:
