@@ -352,4 +352,5 @@ MECHANISMS = {"any dialect": in_any_dialect, "spring pass": spring_pass, "spring
               "within tolerance": within_tolerance, "everything stated": everything_stated,
               "ways of writing": both_m_words, "incremental row": incremental, "modal words": modal_words,
               "split moves": split_moves, "gentle ramp": gentle_ramp, "shallow step down": shallow_step_down,
-              "finer rows": finer_rows, "second tool": second_tool, "allowance kept": allowance_kept, "runs again": run_again}
+              "finer rows": finer_rows, "second tool": second_tool, "allowance kept": allowance_kept,
+              "runs again": run_again}

@@ -348,8 +348,9 @@ def lengths_that_contradict(rng: Rng) -> Case:
     s = PARTS[part].program()
     s.ops[:0] = [Op("raw", text=write.format(1, first)), Op("raw", text=write.format(2, round(second - off, 2)))]
     tools = [{**FLAT, "gauge_length_mm": first}, {**BALL, "gauge_length_mm": second}]
-    return made("lengths contradict", part, s, ("program",), [s.ops[1]], None,
-                {"machine": {"dialects": [dialect]}, "tools": tools}, dialect, word="gauge_length_mm", what=f"{off} off")
+    setup = {"machine": {"dialects": [dialect]}, "tools": tools}
+    return made("lengths contradict", part, s, ("program",), [s.ops[1]], None, setup, dialect, word="gauge_length_mm",
+                what=f"{off} off")
 
 
 MECHANISMS = {"wrong length offset": wrong_length_offset, "no length offset": no_length_offset,
