@@ -35,6 +35,7 @@ from verify.gcode.flow.system_parameters import served
 from verify.gcode.machine_words import functions_note
 from verify.gcode.program_text import cleaned
 from verify.kinematics import Kinematics
+from verify.program.arc_chords import CHORD
 from verify.program.move_kinds import FEED, RAPID
 from verify.program.move_log import MAX_ERRORS, Log
 from verify.program.program import NAN, Program, Remark
@@ -338,7 +339,8 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
                  gauge_length: Mapping[int, float] | None = None, spindle_tool: int = 0,
                  report: Report = silent, dialect: str = LINUXCNC, radii: Mapping[int, float] | None = None,
                  names: Mapping[str, int] | None = None, change: Sequence[float] | None = None,
-                 lengths: Mapping[int, float] | None = None, measured: Collection[int] = ()) -> Program:
+                 lengths: Mapping[int, float] | None = None, measured: Collection[int] = (),
+                 chord: float = CHORD) -> Program:
     """Read a program of three, four or five axes.
 
     text        : the program
@@ -356,6 +358,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
     change      : mm, setup frame, Z or X, Y and Z of the spindle face at a tool change; None where it is not stated
     lengths     : mm by T number, spindle face to tip, of the tools whose length is known
     measured    : T numbers of those whose length the setup states
+    chord       : mm, from 0.0002 to 0.001, by which chords may leave their arcs
 
     Returns
     -------
@@ -394,6 +397,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
                            remedy="give a tool of the table as spindle_tool")
     reader = Reader(Log(name), tools, work_offset, blend_limit, kinematics, gauge_length, spindle_tool)
     reader.radii, reader.names = dict(radii or {}), dict(names or {})
+    reader.chord = chord
     reader.measured = frozenset(lengths or ()) & frozenset(measured)
     reader.change = None if change is None else tuple(change)
     reader.hangs, reader.stays = {0: 0.0, **(lengths or {})}, dialect == LINUXCNC
