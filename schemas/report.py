@@ -156,9 +156,10 @@ class Assumption(ReportModel):
     """Something that the proof takes for granted because neither setup nor program states it. It is no finding."""
 
     what: Annotated[str, Field(
-        description="dialect, travel, max_rpm, rotary_sense, rotary_start, rotary_way, tip_control, length_axis, "
-                    "radius_register, tap_diameter, gauge_length, flute_length, holder, above_holder, table, "
-                    "other_solids, rapid_path, path_mode, change_position, coolant, cutting_force or between_samples.",
+        description="dialect, travel, max_rpm, rotary_sense, rotary_start, rotary_way, modes_left, tip_control, "
+                    "length_axis, length_register, radius_register, tap_diameter, gauge_length, flute_length, "
+                    "holder, above_holder, table, loose_stock, other_solids, rapid_path, path_mode, "
+                    "change_position, coolant, cutting_force or between_samples.",
         examples=["travel"])]
     value: Annotated[str | float, Field(description="What the proof takes it to be.", examples=["long enough"])]
     effect: Annotated[str, Field(description="What may go wrong on a machine where it is otherwise.")]

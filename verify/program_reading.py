@@ -12,6 +12,7 @@ from verify.gcode.program_text import cleaned
 from verify.gcode.reader import Program, read_program
 from verify.kinematics import Kinematics
 from verify.model import NcProgram
+from verify.program.arc_chords import CHORD
 from verify.progress import Report, silent
 from verify.stepnc.part21 import is_exchange_file
 
@@ -19,6 +20,7 @@ _END = re.compile(r"M0*(?:2|30)(?![0-9.])", re.IGNORECASE)
 MAX_ENDS = 8  # ends within one text that are read through
 BLEND = 0.001  # mm, deviation that G64 may allow; the error bound includes it
 BLEND_SHARE = 0.1  # of the gouge tolerance: allowed instead where that is more
+CHORD_SHARE, FINEST_CHORD = 0.25, 2e-4  # of the gouge tolerance, and mm: chords of arcs under a fine one
 
 
 def read_one(nc: NcProgram, tools: Sequence[ToolBody], *, work_offset: str = "G54", gouge_tolerance: float = 0.01,
@@ -48,7 +50,8 @@ def read_one(nc: NcProgram, tools: Sequence[ToolBody], *, work_offset: str = "G5
         radii={t.number: t.radius for t in tools}, names={t.id: t.number for t in tools}, change=change,
         teeth=teeth,
         lengths={t.number: gauge_length[t.number] for t in tools if gauge_length and t.number in gauge_length
-                 and (t.holder or t.number in gauge_given)})
+                 and (t.holder or t.number in gauge_given)}, measured=gauge_given,
+        chord=min(CHORD, max(CHORD_SHARE * gouge_tolerance, FINEST_CHORD)))
 
 
 def read_on(nc: NcProgram, read: Program, reading: Callable[[NcProgram], Program]) -> Program | None:

@@ -51,6 +51,7 @@ from verify.material.dogleg_rapids import box_findings
 from verify.material.drill_loads import drill_loads
 from verify.material.engagement import engaged_angles, engagement_findings, engagements, in_parts
 from verify.material.fine_plunges import fine_plunges
+from verify.material.loose_stock import loose_assumptions
 from verify.material.material import contacts, dogleg_limits, unseen, unseen_cores
 from verify.material.stock_pass import StockPass
 from verify.model import (
@@ -193,6 +194,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     tapping = {tools[k].number for k in np.unique(moves.tool[run.cut])}
     taken = [*setup.assumed, *program_assumptions(framed, tools, setup, stated), *cuts.assumed, *dips, *drills.assumed,
              *starts, *(a for number, a in threads_taken.items() if number in tapping),
+             *loose_assumptions(met.loose, moves, run.cut, source, tools),
              *body_assumptions(framed, part, moves, source, tools, setup, threads)]
     stages.tell(1.0)
     proof = _proof(findings, cuts, run, framed, known, took, moves, source, setup, scored, zone_ids,

@@ -8,6 +8,7 @@ import numpy as np
 
 from benchmarks.adversary.adversary_case import ENDINGS, SAFE, Case, Op, Script, made, written
 from benchmarks.adversary.adversary_parts import (
+    BALL,
     DOWN,
     FEED,
     FLAT,
@@ -209,6 +210,24 @@ def both_m_words(rng: Rng) -> Case:
     return Case(case.mechanism, part, case.setup, text, dialect, case.expected, case.what)
 
 
+def run_again(rng: Rng) -> Case:
+    """Programs that begin again by M99, or write tables at their beginning and end."""
+    part, dialect = choice(rng, *PARTS), choice(rng, "fanuc", "haas")
+    style = choice(rng, "loop", "loop in G91", "wear", "zero", "lengths")
+    s = PARTS[part].program()
+    end = ["M5", "G91 G28 Z0.", "G90", "M30", "%"]
+    s.foot = {"loop": [*end[:3], "M99", "%"], "loop in G91": [*end[:2], "M99", "%"],
+              "wear": [*end[:3], "G10 L11 P1 R-0.3", *end[3:]],
+              "zero": [*end[:3], "G10 L2 P1 X1.", *end[3:]], "lengths": end}[style]
+    first = {"wear": ["G10 L11 P1 R0."], "zero": ["G10 L2 P1 X0. Y0. Z0."],
+             "lengths": ["G10 L10 P1 R80.1", "G10 L10 P2 R95."]}.get(style, [])
+    s.ops[:0] = [Op("raw", text=line) for line in first]
+    setup = _machine(dialect)
+    if style == "lengths":
+        setup["tools"] = [{**FLAT, "gauge_length_mm": 80.0}, {**BALL, "gauge_length_mm": 95.2}]
+    return made("runs again", part, s, setup=setup, dialect=dialect, what=f"{style}, {dialect}")
+
+
 def incremental(rng: Rng) -> Case:
     """A row in G91."""
     part = choice(rng, *LEVELS)
@@ -333,4 +352,5 @@ MECHANISMS = {"any dialect": in_any_dialect, "spring pass": spring_pass, "spring
               "within tolerance": within_tolerance, "everything stated": everything_stated,
               "ways of writing": both_m_words, "incremental row": incremental, "modal words": modal_words,
               "split moves": split_moves, "gentle ramp": gentle_ramp, "shallow step down": shallow_step_down,
-              "finer rows": finer_rows, "second tool": second_tool, "allowance kept": allowance_kept}
+              "finer rows": finer_rows, "second tool": second_tool, "allowance kept": allowance_kept,
+              "runs again": run_again}

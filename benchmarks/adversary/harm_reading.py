@@ -314,6 +314,45 @@ def below_at_end(rng: Rng) -> Case:
     return made("ends in the part", part, s, ("program",), None)
 
 
+def left_at_m99(rng: Rng) -> Case:
+    """Fanuc, Haas: M99 begins the program again, in a mode that the first round has left."""
+    part, dialect = choice(rng, *LEVEL), choice(rng, "fanuc", "haas")
+    turn, share = float(np.round(rng.uniform(1.0, 359.0), 1)), float(np.round(rng.uniform(0.8, 0.99), 3))
+    left, word = {"G68": (f"G68 X0. Y0. R{turn:.1f}", ""), "G51": (f"G51 X0. Y0. Z0. P{share:.3f}", ""),
+                  "G91": ("G91", "G90 "), "G95": ("G95", "G94 "), "G52": (f"G52 X{turn / 90.0:.3f}", "")}[
+                      choice(rng, "G68", "G51", "G91", "G95", "G52")]
+    s = PARTS[part].program()
+    s.head = ["%", "O1000", "G21 G17 G90 G94 G40 G49 G80".replace(word, ""), "G54"]
+    s.foot = ["M5", "G91 G28 Z0.", "G90", left, "M99", "%"]
+    return made("left at M99", part, s, ("program", REFUSED), None, None, {"machine": {"dialects": [dialect]}}, dialect,
+                word="M99", what=left)
+
+
+def left_in_a_table(rng: Rng) -> Case:
+    """A value that G10 writes behind the cuts, with which the next run begins."""
+    part, dialect = choice(rng, *LEVEL), choice(rng, "fanuc", "haas")
+    by = float(np.round(rng.uniform(0.02, 2.0), 3)) * (1.0 if rng.random() < 0.5 else -1.0)
+    left = {"wear": f"G10 L11 P1 R{by}", "length": f"G91 G10 L10 P1 R{by}", "zero": f"G91 G10 L2 P1 X{by}",
+            "height": f"G91 G10 L2 P1 Z{by}"}[choice(rng, "wear", "length", "zero", "height")]
+    s = PARTS[part].program()
+    s.foot = ["M5", "G91 G28 Z0.", "G90", left, "G90", "M30", "%"]
+    return made("left in a table", part, s, ("program",), None, None, {"machine": {"dialects": [dialect]}}, dialect,
+                word="G10", what=left)
+
+
+def lengths_that_contradict(rng: Rng) -> Case:
+    """Two tools whose lengths in the program differ otherwise than those of the setup."""
+    part, dialect = choice(rng, *LEVEL), choice(rng, "linuxcnc", "fanuc", "haas")
+    first, second, off = (float(np.round(v, 2)) for v in rng.uniform([60, 60, 1.5], [120, 120, 30.0]))
+    write = "G10 L1 P{} Z{}" if dialect == "linuxcnc" else "G10 L10 P{} R{}"
+    s = PARTS[part].program()
+    s.ops[:0] = [Op("raw", text=write.format(1, first)), Op("raw", text=write.format(2, round(second - off, 2)))]
+    tools = [{**FLAT, "gauge_length_mm": first}, {**BALL, "gauge_length_mm": second}]
+    setup = {"machine": {"dialects": [dialect]}, "tools": tools}
+    return made("lengths contradict", part, s, ("program",), [s.ops[1]], None, setup, dialect, word="gauge_length_mm",
+                what=f"{off} off")
+
+
 MECHANISMS = {"wrong length offset": wrong_length_offset, "no length offset": no_length_offset,
               "no spindle": no_spindle, "stale length in rapid": stale_length_in_rapid, "shift by G92": shift_by_g92,
               "G92 before G52": fanuc_g92_g52, "no path tolerance": no_path_mode,
@@ -324,4 +363,5 @@ MECHANISMS = {"wrong length offset": wrong_length_offset, "no length offset": no
               "over a limit": over_limit, "chip too thick": chip_too_thick, "deep slot": deep_slot,
               "surface speed": surface_speed, "ends in the part": below_at_end, "bends too far": bends_too_far,
               "steep climb": steep_climb, "stands behind taps": stands_behind_taps,
-              "other feed by a word": other_feed_by_a_word}
+              "other feed by a word": other_feed_by_a_word, "left at M99": left_at_m99,
+              "left in a table": left_in_a_table, "lengths contradict": lengths_that_contradict}

@@ -23,6 +23,7 @@ from geometry.mesh_queries.nearest import nearest
 from geometry.mesh_queries.rays import first_hits
 from geometry.tool_body import ToolBody
 from verify.checks.sideways_cuts import one_a_line
+from verify.checks.thread_phase import off_phase, turns_of
 from verify.findings import Source
 from verify.model import Finding
 from verify.moves import Moves
@@ -121,6 +122,7 @@ def drawn_thread_mills(moves: Moves, cut: NDArray[np.bool_], tools: Sequence[Too
                 if measured and abs(measured - pitch) > PITCH_ERROR * pitch:
                     found.extend(one_a_line(rows[[at]], np.full(len(moves), measured), moves.start, source,
                                             partial(_off_pitch, tool.number, pitch, measured)))
+                found.extend(_off_phase(whole, rows, cut, tool, pitches, touches, moves, source))
                 way, of = whole.parted(pitch)
                 torn = _ToothWay(way, cut[rows][of], tool, (over.min(), over.max()), touches, pitch).torn()
                 np.maximum.at(depth, rows[of], torn)
@@ -132,6 +134,29 @@ def drawn_thread_mills(moves: Moves, cut: NDArray[np.bool_], tools: Sequence[Too
 def _off_pitch(number: int, pitch: float, measured: float, _m: int) -> str:
     return (f"T{number} is a thread mill of the pitch {pitch:g} mm, and its helices rise {measured:.4g} mm a turn: a "
             "thread is milled with a helix of its pitch")
+
+
+def _off_phase(way: _Way, rows: NDArray[np.intp], cut: NDArray[np.bool_], tool: ToolBody, pitches: Mapping[int, float],
+               touches: Callable[[F64], NDArray[np.bool_]], moves: Moves, source: Source) -> list[Finding]:
+    """Findings of passes that do not run in the thread of earlier ones; only where the tool states its pitch.
+
+    A pitch that helices show may be the lead of a thread of several starts, which are out of phase by right.
+    """
+    pitch = pitches.get(tool.number)
+    if pitch is None:
+        return []
+    turns = [t for first, last in _helices(way)
+             for t in turns_of(np.concatenate([way.flat[first:last], way.flat_end[last - 1:last]]),
+                               np.r_[way.high[first:last], way.high_end[last - 1]], first, pitch)]
+    turns = [t for t in turns if cut[rows[t.move]] or touches(way.end[t.move:t.move + 1])[0]]
+    off = off_phase(turns, pitch, tool.flute_length, ASIDE * pitch)
+    depth = np.zeros(len(moves))
+    bad = rows[[m for m, _ in off]]
+    depth[bad] = [by for _, by in off]
+    return one_a_line(bad, depth, moves.start, source, lambda m: (
+        f"T{tool.number} mills a thread {depth[m]:.3f} mm out of phase with the thread that it has milled there: its "
+        "teeth cut the crests off" if depth[m] else
+        f"T{tool.number} mills a thread of the other hand over the thread that it has milled there"))
 
 
 def _words(number: int, depth: F64, m: int) -> str:
@@ -299,13 +324,10 @@ def _pitch_of(way: _Way, cut: NDArray[np.bool_], diameter: float,
 
     The pitch is the greatest rise over a whole turn, as leads in and out rise less.
     """
-    corner, goes = way.corner, way.feed & (way.aside > SAME)
-    linked = goes[1:] & goes[:-1] & way.joined[1:] & (np.abs(corner) < SHARP)
+    corner = way.corner
     at, pitch = [], []
-    for first, last in zip(*_runs(goes, linked), strict=True):
+    for first, last in _helices(way):
         inner = corner[first:last - 1]
-        if last - first < 3 or abs(inner.sum()) < 0.5 * FULL:
-            continue
         turned = np.concatenate([[0.0], np.cumsum(0.5 * (np.r_[inner[:1], inner] + np.r_[inner, inner[-1:]]))])
         turned *= np.sign(turned[-1])
         high = np.r_[way.high[first:last], way.high_end[last - 1]]
@@ -324,6 +346,15 @@ def _pitch_of(way: _Way, cut: NDArray[np.bool_], diameter: float,
         return -1, 0.0
     best = some[int(np.argmax(values[some]))]
     return int(rows[best]), float(values[best])
+
+
+def _helices(way: _Way) -> Iterator[tuple[int, int]]:
+    """First and one past the last of each run of moves that turns by half a turn or more without a sharp corner."""
+    corner, goes = way.corner, way.feed & (way.aside > SAME)
+    linked = goes[1:] & goes[:-1] & way.joined[1:] & (np.abs(corner) < SHARP)
+    for first, last in zip(*_runs(goes, linked), strict=True):
+        if last - first >= 3 and abs(corner[first:last - 1].sum()) >= 0.5 * FULL:
+            yield first, last
 
 
 def _runs(goes: NDArray[np.bool_], linked: NDArray[np.bool_]) -> tuple[list[int], list[int]]:

@@ -13,7 +13,6 @@ from verify.gcode.drilling_cycles import Hole, HoleExit, hole_moves
 from verify.gcode.frame_words import FrameWords
 from verify.gcode.rotary_words import between
 from verify.program.arc_chords import (
-    CHORD,
     PLANE_AXES,
     ArcError,
     ArcTooLong,
@@ -269,7 +268,8 @@ class BlockMotion(FrameWords):
         """Largest distance of chords from their arc, mm; half where a turning axis bends the tip path once more."""
         bent = turn is not None and turn != self.s.turn and not self.s.tcp
         frame = self._frame()
-        return (CHORD - TIP if bent else CHORD) / (1.0 if frame is None else frame.scale_in(self.s.plane))
+        chord = max(self.chord - TIP, 0.5 * self.chord) if bent else self.chord
+        return chord / (1.0 if frame is None else frame.scale_in(self.s.plane))
 
     def _cycle(self, axes: list[float | None], values: dict[str, float]) -> None:
         """Write a drilling cycle along the third axis of the plane as rapids and feeds [Kramer2000].

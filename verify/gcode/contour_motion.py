@@ -61,6 +61,7 @@ class ContourMotion(Origins):
     radii   : mm by T number, radius of the tools of the setup (``OffsetTables`` keeps it)
     names   : T numbers by the ids of the tools of the setup
     actual  : (3,) mm, place of the tool where it is not the programmed one, None elsewhere
+    chord   : mm, by which chords may leave their arcs
     across  : whether the running block has a word of an axis of the plane
     elements, idle : as in ``verify.gcode.dialects.base.Machine``
     """
@@ -73,7 +74,7 @@ class ContourMotion(Origins):
         self.teeth: dict[int, int] = {}
         self.contour: Contour | None = None
         self.actual: list[float] | None = None
-        self.across = False
+        self.across, self.chord = False, CHORD
         self.elements = self.idle = 0
         self._composed: tuple[tuple[object, ...], Frame | None] | None = None
         self._stated: tuple[Frame, list[float]] | None = None  # coordinates of a place that is not known whole
@@ -284,7 +285,7 @@ class ContourMotion(Origins):
             end[k] = start[k]
         if piece.centre is None:
             return self._line_to(end, way.kind, way.feed)
-        points = swept_points(start, end, (piece.centre.real, piece.centre.imag), piece.sweep, (i, j, k), CHORD,
+        points = swept_points(start, end, (piece.centre.real, piece.centre.imag), piece.sweep, (i, j, k), self.chord,
                               MAX_MOVES_A_BLOCK).tolist()
         self.log.room(len(points))
         for p in points:

@@ -30,6 +30,8 @@ class Modes(ToolChanges):
     fits        : whether the control drops points by the P of a G64 without Q
     before_cycle : the motion before the cycle in force or the latest one, None for none
     register     : number of the latest H word, None before the first
+    assumed      : words that the program does not state before its first move
+    ends_contour : whether a G40 stands before the first move
     """
 
     fits = True
@@ -49,6 +51,7 @@ class Modes(ToolChanges):
         self.before_cycle: float | None = None
         self.register: int | None = spindle_tool or None
         self.assumed: tuple[str, ...] = ()
+        self.ends_contour = False
 
     def _set_modes(self, block: Block) -> None:
         s, values, scale = self.s, block.values, self.s.scale
@@ -99,6 +102,10 @@ class Modes(ToolChanges):
 
     def _own_register(self, number: int) -> bool:
         """Whether a register that no tool has by number belongs to the tool in the spindle."""
+        raise NotImplementedError
+
+    def _settle_length(self) -> None:
+        """Another length comes into force."""
         raise NotImplementedError
 
     def _unturn(self, word: float) -> None:
@@ -188,7 +195,7 @@ class Modes(ToolChanges):
         if self.spindle_tool and self.stated.isdisjoint({43, 43.4, 49}):
             words.append(f"G43 H{self.spindle_tool}")
         words.extend(f"{letter}0" for letter in self.rotary if letter not in self.stated_axes)
-        self.assumed = tuple(words)
+        self.assumed, self.ends_contour = tuple(words), 40 in self.stated
 
     def stop(self, event: str, *, room: bool = False) -> bool:
         """Record where the program stops, if the height is known, or the place where the tool is tilted.
@@ -253,6 +260,7 @@ class Modes(ToolChanges):
         s = self.s
         if g == 43.4 and s.tcp_word:
             self.log.kept_on.append(self.log.line)
+        self._settle_length()
         self._control(g == 43.4, s.tcp_switch)
         self.tip_told |= g == 43.4
         if g == 49:

@@ -8,10 +8,18 @@ differences from it. Another work offset written in the same coordinates is then
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
+from typing import TYPE_CHECKING
 
+from verify.assumptions import Assumed, AssumedKind
 from verify.gcode.block_words import WORK_OFFSETS, BlockError, whole
 from verify.gcode.modal_state import Modes
 
+if TYPE_CHECKING:
+    from verify.gcode.dialects.base import DialectReader
+
+LENGTHS_APART = 1.0
+"""mm by which written lengths of two tools may differ from what the setup says: measured ones differ by tenths."""
 Axes = list[float | None]
 NAMES = list(WORK_OFFSETS.values())
 
@@ -24,6 +32,10 @@ class OffsetTables(Modes):
     lengths : mm by H number, the first value written and the present one; the first is nan where G91 only added to it
     wear    : mm by H number
     registers : mm by D number, radius that the program wrote; radius_wear : mm by D number
+    measured : T numbers of the tools whose length the setup states
+    pending  : line of the G10 that wrote the length in force, number of moves before it, H number, and mm by which it
+               changed; None where G43 came after it
+    tables_written : line of the latest G10 that wrote one of these, 0 for none
     """
 
     zeros: dict[str, list[float]]
@@ -33,6 +45,11 @@ class OffsetTables(Modes):
     registers: dict[int, float]
     radius_wear: dict[int, float]
     radii: dict[int, float]
+    tables_written = 0
+    measured: Collection[int] = ()
+    pending: tuple[int, int, int, float] | None = None
+    register: int | None
+    control: DialectReader | None
 
     def _open_tables(self) -> None:
         """Empty tables; only the work offset of the setup is known."""
@@ -50,6 +67,7 @@ class OffsetTables(Modes):
 
     def _set_table(self, values: dict[str, float], axes: Axes) -> None:
         """Run G10 L1, L2 and L10 to L13; L20 has its own place."""
+        self.tables_written = self.log.line
         kind = int(values.get("L", -1))
         if kind == 2:
             return self._set_zero(values, axes)
@@ -74,8 +92,10 @@ class OffsetTables(Modes):
         s = self.s
         if kind in (1, 10):
             self._set_length(number, value)
+            self._pend_length(number)
         elif kind == 11:
             self.wear[number] = value + (self.wear.get(number, 0.0) if s.relative else 0.0)
+            self._pend_length(number)
         elif kind == 12 and s.relative and number not in self.registers:
             self.radius_wear[number] = value + self.radius_wear.get(number, 0.0)
         elif kind == 12:
@@ -88,7 +108,40 @@ class OffsetTables(Modes):
         if self.s.relative and self._foreign:  # adds to what the control holds
             self.lengths[number] = first, now + value
         else:
+            self.log.lengths.setdefault(number, (value, self.log.line))
             self.lengths[number] = value if math.isnan(first) else first, value
+
+    def _judge_lengths(self) -> None:
+        """Remark lengths of tools that the program gives and that differ otherwise than those of the setup."""
+        given = {t: (value, line) for t, (value, line) in self.log.lengths.items() if t in self.measured}
+        if not given:
+            return
+        first, *rest = given
+        for t in rest:
+            (a, _), (b, line) = given[first], given[t]
+            apart, wanted = b - a, self.hangs[t] - self.hangs[first]
+            if abs(apart - wanted) > LENGTHS_APART:
+                self.log.remark("lengths", f"the program gives T{first} the length {a:g} mm and T{t} {b:g} mm, "
+                                f"{apart:g} mm more; by their gauge_length_mm it is {wanted:g} mm more", t, line)
+
+    def _pend_length(self, number: int) -> None:
+        """Keep that the length in force was written: parameters decide whether it counts at once."""
+        s = self.s
+        changed = self._length_error(number) - s.length
+        if self._foreign and s.offset is not None and number == self.register and abs(changed) > 1e-9:
+            self.pending = self.log.line, self.log.count, number, changed
+
+    def _settle_length(self) -> None:
+        """Tell of moves since the length in force was written, before another one comes into force."""
+        if self.pending is None or self.control is None:
+            return
+        line, count, number, by = self.pending
+        self.pending = None
+        if self.log.count > count:
+            self.control.leave_open(Assumed(
+                AssumedKind.LENGTH_REGISTER, f"H{number}, which line {line} writes while it is in force, counts from "
+                "the next G43 on", f"where the control takes it at once, the tool goes {abs(by):g} mm "
+                f"{'lower' if by < 0.0 else 'higher'}", "G43 H behind the G10 (parameter 5001#6 of Fanuc)"))
 
     def _length_error(self, number: int) -> float:
         """mm, by which length offset H ``number`` differs from the length of its tool."""

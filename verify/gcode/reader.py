@@ -16,6 +16,7 @@ decide (``Program.unbounded``).
 
 from __future__ import annotations
 
+import copy
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -29,10 +30,12 @@ from verify.gcode.block_motion import BlockMotion
 from verify.gcode.block_words import Block, BlockError, parse_block, straight, used_letters
 from verify.gcode.dialects import CONTROLS, DIALECTS, LINUXCNC, translated_blocks
 from verify.gcode.flow.control_flow import Flow, has_flow
+from verify.gcode.flow.second_run import KEPT_MODES, TABLES, Change, first_change, left_modes
 from verify.gcode.flow.system_parameters import served
 from verify.gcode.machine_words import functions_note
 from verify.gcode.program_text import cleaned
 from verify.kinematics import Kinematics
+from verify.program.arc_chords import CHORD
 from verify.program.move_kinds import FEED, RAPID
 from verify.program.move_log import MAX_ERRORS, Log
 from verify.program.program import NAN, Program, Remark
@@ -48,22 +51,26 @@ REPORT_LINES = 4096  # lines between two reports of progress
 
 
 class Reader(BlockMotion):
-    """One reading of one program; use ``read_program``."""
+    """One reading of one program; use ``read_program``.
+
+    dialect      : of the program
+    leaves_modes : what the next run of the program takes for granted
+    """
+
+    dialect = LINUXCNC
+    leaves_modes: tuple[Assumed, ...] = ()
 
     def read(self, text: str, report: Report = silent, dialect: str = LINUXCNC) -> Program:
         """Moves and remarks of ``text``; raises as ``read_program`` says, and what ``report`` raises."""
-        log, lines, self.fits = self.log, text.split("\n"), dialect == LINUXCNC
+        log, lines, self.fits, self.dialect = self.log, text.split("\n"), dialect == LINUXCNC, dialect
         self.s.retract_to_r = dialect == LINUXCNC  # as it starts
-        blocks: Iterable[tuple[int, str]] = enumerate(lines, 1)
         if dialect != LINUXCNC:
             self.control = CONTROLS[dialect]()
             self.control.names = self.names
-            blocks = translated_blocks(lines, self.control, self)
-        elif has_flow(text):
-            blocks = Flow(lines, self).blocks()
-        seen = bytearray(len(lines) + 2)
-        percents = self._scan(_reported(blocks, len(lines), report), seen)
+        begin, seen = self._copy(), bytearray(len(lines) + 2)
+        percents = self._scan(_reported(self._blocks(text, lines), len(lines), report), seen)
         cut_off = self._name_unread(lines, seen) if self.s.ended else 0
+        compensated = self.s.side != 0 and not self.ends_contour
         self._finish()
         self.stop("end of the program")
         self.pause("end of the program", self.s.tool)
@@ -80,6 +87,8 @@ class Reader(BlockMotion):
             log.notes.append(functions_note(log.functions))
         table = log.table()
         self._path_mode(table)
+        self._judge_lengths()
+        self._run_again(begin, text, lines, table, compensated)
         speed, coolant = log.states()
         start, end, feed = (np.ascontiguousarray(table[:, k]) for k in (slice(0, 3), slice(3, 6), 7))
         return Program(log.name, start, end, table[:, 6].astype(np.int8), feed, table[:, 8].astype(np.int32),
@@ -94,13 +103,74 @@ class Reader(BlockMotion):
                        taps={int(table[row, 9]): out for row, out in log.taps if row < len(table)},
                        own_speed=self.control is not None and self.control.own_speed)
 
+    def _blocks(self, text: str, lines: list[str]) -> Iterable[tuple[int, str]]:
+        """Blocks of the program with their lines, in the words of this reader and the order they run."""
+        if self.control is not None:
+            return translated_blocks(lines, self.control, self)
+        return Flow(lines, self).blocks() if has_flow(text) else enumerate(lines, 1)
+
+    def _copy(self) -> Reader:
+        """A reader in the state of this one, with an empty log."""
+        same = (self.tools, self.machine, self.gauge, self.hangs, self.radii, self.names)
+        return copy.deepcopy(self, {id(self.log): Log(self.log.name), **{id(s): s for s in same}})
+
+    def _run_again(self, begin: Reader, text: str, lines: list[str], table: F64, compensated: bool) -> None:
+        """Remark where a second run goes other ways than the first one, because of what the first one leaves.
+
+        begin : the reader before the first block; compensated : whether a contour is open that the beginning does not
+        close
+        """
+        log = self.log
+        curved = Change(int(table[0, 9]), "G41 or G42 in force") if compensated and len(table) else None
+        if log.repeats:
+            again = self._copy()
+            again.s.ended = False
+            left = left_modes(begin.s, self.s)
+            why = f" ({', '.join(left)})" if left else ""
+            if change := curved or again._change(text, lines, table):
+                log.remark("second_run", f"M99 begins the program again with what it has left{why}: the second round "
+                           f"has {change.what} in line {change.line}; set it back before M99", line=log.repeats)
+            return
+        if self.tables_written:
+            again = begin._copy()
+            for name in TABLES:
+                setattr(again, name, copy.deepcopy(getattr(self, name)))
+            again._take_zero()
+            if change := again._change(text, lines, table):
+                log.remark("second_run", "G10 leaves another value in the tables of the control than the program began "
+                           f"with: its next run has {change.what} in line {change.line}; write the first value at the "
+                           "beginning of the program, or back at its end", line=self.tables_written)
+                return
+        left = [*left_modes(begin.s, self.s, self.assumed), *(["G41 or G42"] if curved else [])]
+        if left and self.dialect not in KEPT_MODES:  # the tool stays on every control
+            left = [word for word in left if word.endswith("in the spindle")]
+        if left:
+            again = self._copy() if self.dialect in KEPT_MODES else begin._copy()
+            again.s.ended = again.s.spindle = again.s.coolant = False
+            again.s.position, again.s.tool = [NAN] * 3, self.s.tool
+            if change := curved or again._change(text, lines, table):
+                self.leaves_modes = (Assumed(
+                    AssumedKind.MODES_LEFT, f"set back before the next run: {log.name} leaves {', '.join(left)}",
+                    f"otherwise the next run has {change.what} in line {change.line} (parameter 3402 of Fanuc and "
+                    "setting 56 of Haas decide over modes)", "state them at the beginning of the program"),)
+
+    def _change(self, text: str, lines: list[str], table: F64) -> Change | None:
+        """The first line at which this reader, which stands at the beginning, runs otherwise than ``table`` (m, 10)."""
+        try:
+            self._scan(self._blocks(text, lines), bytearray(len(lines) + 2))
+            self._finish()
+            return first_change(table, self.log.table(), self.log.errors)
+        except ProgramError:  # it is too long, which the first run is not
+            return Change(self.log.line, "too many moves")
+
     def _left_open(self) -> tuple[Assumed, ...]:
         """What the program leaves to the control."""
+        self._settle_length()
         if self.control is not None:
-            return tuple(self.control.assumed)
+            return (*self.control.assumed, *self.leaves_modes)
         if not self.by_axes:
-            return ()
-        return (Assumed(AssumedKind.TIP_CONTROL, f"off ({self.log.name}, line {self.by_axes})",
+            return self.leaves_modes
+        return (*self.leaves_modes, Assumed(AssumedKind.TIP_CONTROL, f"off ({self.log.name}, line {self.by_axes})",
                         "kinematics such as xyzac-trt start with it on: X, Y and Z are then the tip, and the tool goes "
                         "elsewhere", "program M428 or M429 before the rotary axes turn"),)
 
@@ -269,7 +339,8 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
                  gauge_length: Mapping[int, float] | None = None, spindle_tool: int = 0,
                  report: Report = silent, dialect: str = LINUXCNC, radii: Mapping[int, float] | None = None,
                  names: Mapping[str, int] | None = None, change: Sequence[float] | None = None,
-                 lengths: Mapping[int, float] | None = None, teeth: Mapping[int, int] | None = None) -> Program:
+                 lengths: Mapping[int, float] | None = None, teeth: Mapping[int, int] | None = None,
+                 measured: Collection[int] = (), chord: float = CHORD) -> Program:
     """Read a program of three, four or five axes.
 
     text        : the program
@@ -287,6 +358,8 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
     change      : mm, setup frame, Z or X, Y and Z of the spindle face at a tool change; None where it is not stated
     lengths     : mm by T number, spindle face to tip, of the tools whose length is known
     teeth       : numbers of teeth by T number, where they are known, for feeds per tooth
+    measured    : T numbers of those whose length the setup states
+    chord       : mm, from 0.0002 to 0.001, by which chords may leave their arcs
 
     Returns
     -------
@@ -325,6 +398,8 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
                            remedy="give a tool of the table as spindle_tool")
     reader = Reader(Log(name), tools, work_offset, blend_limit, kinematics, gauge_length, spindle_tool)
     reader.radii, reader.names, reader.teeth = dict(radii or {}), dict(names or {}), dict(teeth or {})
+    reader.chord = chord
+    reader.measured = frozenset(lengths or ()) & frozenset(measured)
     reader.change = None if change is None else tuple(change)
     reader.hangs, reader.stays = {0: 0.0, **(lengths or {})}, dialect == LINUXCNC
     return reader.read(text, report, dialect)

@@ -28,6 +28,8 @@ from verify.model import Finding, FindingKind, ProofSetup
 from verify.surface.removal import first_below
 
 RING, AROUND = 1.1, 8  # radii at which a wall beside a drill is looked for, and directions
+WEB = 0.2
+"""Radii of the core of a drill, on which no lip cuts: its point is seated where stock stands under all of it."""
 ON_LIPS = np.array([0.2, 0.45, 0.7, 0.95])  # radii along a lip
 STEP, LEAST, PLACES = 0.25, 4, 64  # diameters between places along a move, least and most places on it
 IN_ONE_GO, IN_A_PECK = 0.5, 1.5
@@ -56,9 +58,9 @@ def drill_loads(cuts: CutSequence, tools: Sequence[ToolBody], words: Mapping[int
     Flutes are shut in where their upper end is in stock all round. From there on chips have no way out. The way that a
     drill cuts so counts from where its tip was last out of its hole. If it then began to cut within its hole, it pecks.
 
-    A drill whose axis is in air at its tip cuts with one side where one lip has more stock before it than the other,
-    by b mm of radius, unless a wall all round its body guides it. The force on that lip, kc h^(-mc) f b, bends the bar
-    of the drill [Kienzle1952] [Timoshenko1955]: f is the feed per tooth, h = f sin(half of the point angle).
+    A drill with some of its core in air at its tip cuts with one side where one lip has more stock before it than the
+    other, by b mm of radius, unless a wall all round its body guides it. The force on that lip, kc h^(-mc) f b, bends
+    the bar of the drill [Kienzle1952] [Timoshenko1955]: f is the feed per tooth, h = f sin(half of the point angle).
     """
     out = DrillLoads([], [])
     for k, tool in enumerate(tools):
@@ -136,8 +138,9 @@ class _Drill:
         if not len(rows):
             return
         of, tips, up = self._along(rows)
-        free = ~self._stands(tips, up, of)
-        of, tips, up = of[free], tips[free], up[free]
+        seated = self._stands(tips, up, of)
+        seated[seated] = self._walls(tips[seated], up[seated], 0.0, of[seated], WEB).all(axis=1)
+        of, tips, up = of[~seated], tips[~seated], up[~seated]
         if not len(of):
             return
         lips = np.stack([self._ring(tips, up, r * tool.radius, r * tool.cone_height) for r in ON_LIPS], axis=2)
@@ -156,7 +159,7 @@ class _Drill:
         bend, limit = float(force[i]) * compliance(tool), BEND_TIMES * said.bend
         stress, strong = bending_stress(tool, float(force[i]), 0.0)
         if bend > limit or stress > strong:
-            yield self._finding(int(of[lone[i]]), bend, limit, "the drill cuts with one side only, its axis in air: "
+            yield self._finding(int(of[lone[i]]), bend, limit, "the drill cuts with one side only, its core in air: "
                                 f"{more[lone[i]]:.2f} mm of one lip push it aside with {force[i]:.0f} N and bend its "
                                 f"tip by {bend:.3f} mm ({BEND_TIMES:g} times the limit is {limit:.3f} mm): mill that "
                                 "place")

@@ -19,6 +19,7 @@ from verify.kernels.stock import FIXTURE, HOLDER, NECK, PLUNGE, SHANK
 from verify.kernels.tables import RapidArrays
 from verify.material.collision import fixture_points, run_clashes
 from verify.material.dogleg_rapids import spread
+from verify.material.loose_stock import LoosePiece, loose_lines, loose_nodes
 from verify.material.stock_field import DistanceField, run_field, stock_field
 from verify.material.stock_lines import blank, run_bodies, run_stock
 from verify.material.stock_pass import StockPass, Ways, end_radii, parts, rapid_arrays
@@ -38,12 +39,14 @@ class MaterialContacts:
     spacing : mm between the lines or nodes of the stock
     upright : whether the stock was a field of vertical lines
     dip     : mm, largest unseen penetration of a ball into a fixture
+    loose   : pieces of the stock that the moves cut off from what is held
     """
 
     run: StockPass
     spacing: float
     upright: bool
     dip: float
+    loose: Sequence[LoosePiece]
 
 
 def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
@@ -64,7 +67,7 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
         moves, origin = spread(moves, slides, *dogleg_limits(mesh, moves, tools, setup))
     upright, dug = moves.axes is None, np.zeros((0, 7))
     if upright:
-        run, spacing = _lines(mesh, spacing, moves, tools, setup, threads, stages.span(0.0, 0.6))
+        run, spacing, loose = _lines(mesh, spacing, moves, tools, setup, threads, stages.span(0.0, 0.6))
         upright = not _undercuts(run, moves, setup)
         dug = dug if upright else run.events[run.events[:, 1] == PLUNGE]  # lines know plunges better than the field
         moves = moves if upright else replace(moves, axes=ToolAxes.upright(len(moves)))
@@ -78,6 +81,7 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
         field = stock_field(mesh, setup, stock_spacing(setup, moves, tools), threads=threads,
                             progress=stages.span(0.0, 0.15))
         run = run_field(field, moves, tools, setup, threads=threads, progress=stages.span(0.15, 0.7))
+        loose = loose_nodes(field, mesh, setup)
         fixed = np.repeat([False, True], [len(points), len(held)])
         met, lost = run_clashes(np.concatenate([points, held]), fixed, moves, tools, setup, threads=threads,
                                 progress=stages.span(0.7, 1.0))
@@ -85,15 +89,16 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
         run = replace(run, events=np.concatenate([run.events[~known], dug]))
         spacing = field.step
     return MaterialContacts(_of_origin(_merge(run.events, met), run, lost, origin, moves, given, tools),
-                    spacing, upright, dip)
+                    spacing, upright, dip, loose)
 
 
 def _lines(mesh: TriangleMesh, spacing: float, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
-           threads: int, progress: Report) -> tuple[StockPass, float]:
-    """The pass over lines of one height, and mm between them."""
+           threads: int, progress: Report) -> tuple[StockPass, float, list[LoosePiece]]:
+    """The pass over lines of one height, mm between them, and the loose pieces of what stands after it."""
     stages = StageProgress(progress)
     lines = blank(mesh, spacing, setup, threads=threads, progress=stages.span(0.0, 0.2))
-    return run_stock(lines, moves, tools, setup, threads=threads, progress=stages.span(0.2, 1.0)), lines.step
+    run = run_stock(lines, moves, tools, setup, threads=threads, progress=stages.span(0.2, 1.0))
+    return run, lines.step, loose_lines(lines, mesh, setup)
 
 
 def _undercuts(run: StockPass, moves: Moves, setup: ProofSetup) -> bool:

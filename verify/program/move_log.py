@@ -28,6 +28,8 @@ class Log:
     line : 1-based number of the current line
     cools   : whether a word says that the coolant is on or off
     path_stated : number of moves before the first word of a path mode (G61, G64), None without one
+    repeats : line of the M99 that begins the program again, 0 for none
+    lengths : mm by T number, the first length that the program gives a tool, and its line
     functions : first line of each M word that counts as a function of the machine
     speeds, unknown, stops, blend, leaves, changes, unbounded, pauses, places, dwells, swaps, unplaced,
     by_joints, lifts, kept_on, ways_told : as in ``Program``
@@ -54,7 +56,7 @@ class Log:
         self.unknown: list[tuple[int, int]] = []
         self.stops: list[StopPoint] = []
         self.blend = self.leaves = 0.0
-        self.changes = 0
+        self.changes = self.repeats = 0
         self.places: list[tuple[int, int, float]] = []
         self.dwells: list[tuple[int, int, float]] = []
         self.swaps: list[Swap] = []
@@ -67,6 +69,7 @@ class Log:
         self.cools = False
         self.path_stated: int | None = None
         self.pauses: list[Pause] = []
+        self.lengths: dict[int, tuple[float, int]] = {}
         self.turned = TurnLog()
         self._remedy: str | None = None
         self._states: list[tuple[int, float, bool]] = [(0, 0.0, False)]

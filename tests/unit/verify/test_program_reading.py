@@ -1,5 +1,6 @@
 """Lines behind the end of a program: named, and read on for the faces that they would work on."""
 
+import numpy as np
 import pytest
 
 from tests.pocket_case import TOOL
@@ -34,3 +35,14 @@ def test_another_program_of_the_file_is_told_and_not_read_on():
     read, whole = both("X5.\nM30\nO2000\nG0 X9.\nM30\n%\n", "fanuc")
     assert read.cut_off == 0 and whole is None
     assert any("line 9 begins another program" in n for n in read.notes)
+
+
+@pytest.mark.parametrize(("tolerance", "off"), [(0.01, 1e-3), (0.002, 5e-4), (0.001, 2.5e-4), (0.0001, 2e-4)])
+def test_chords_of_arcs_are_finer_than_the_gouge_tolerance(tolerance, off):
+    """A circle of radius 20; chords lie within it."""
+    nc = NcProgram("p", HEAD + "G1 X20. Y0.\nG2 X20. Y0. I-20. J0.\nM2\n")
+    read = read_one(nc, (TOOL,), gouge_tolerance=tolerance)
+    arc = read.line == 8
+    middle = 0.5 * (read.start[arc, :2] + read.end[arc, :2])
+    most = float((20.0 - np.linalg.norm(middle, axis=1)).max())
+    assert 0.8 * off < most <= off * (1.0 + 1e-6)

@@ -48,6 +48,7 @@ def translated_blocks(lines: Sequence[str], control: DialectReader, machine: Mac
     log, frame = machine.log, control.frame
     try:
         for number, raw in control.order(lines, machine):
+            log.line = number
             try:
                 blocks = control.blocks(raw)
             except BlockError as problem:

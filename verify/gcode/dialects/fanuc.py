@@ -51,6 +51,8 @@ _NO_P: frozenset[float] = frozenset({0, 1, 2, 3, 17, 18, 19, 20, 21, 40, 41, 42,
 _KNOWN_M = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, ORIENTS, 30})
 IDLE_G: frozenset[float] = frozenset({9, 11, 13.1, 22, 23, 25, 26, 40.1, 50.2, 62, 63, 67, 69.1, 94.1, 97, 113})
 """G words without effect on a move: exact stop, end of G10, modes of taps and cutting, stroke checks, ends of modes."""
+_CONTOURING = frozenset({0.0, 1.0, 2.0, 3.0, 10000.0})
+"""P of G05 that set how fast contours run; from P10001 on it calls a machining cycle."""
 SMOOTHING: frozenset[float] = frozenset({5, 5.1, 5.4, 8, 64, 61.1})
 REFUSED: dict[float, str] = {
     2.2: "an involute", 3.2: "an involute", 2.3: "an exponential", 3.3: "an exponential", 2.4: "an arc in space",
@@ -313,6 +315,9 @@ class FanucReader(FanucPlanes):
         if code == 5.1 and float(values.get("Q", "-1")) not in (0.0, 1.0, 3.0):
             raise BlockError("G05.1 without Q0, Q1 or Q3" if values.get("Q") != "2" else
                              "G05.1 Q2 (a curve through the places) is not followed")
+        if code == 5 and float(values.get("P", "-1")) not in _CONTOURING:
+            raise BlockError(f"G05 P{values['P']}, which runs a cycle of the memory of the control, is not followed"
+                             if "P" in values else "G05 without P, which takes moves from another computer")
         if code in (61, 62, 63, *SMOOTHING):
             self.exact = code == 61
             self.bound(self.exact or self.limited)

@@ -147,6 +147,7 @@ class Flow:
             if not self._runs_left:
                 self.machine.log.note(f"line {at + 1}: M99 repeats the main program without end; the proof reads it "
                                       "once")
+                self.machine.log.repeats = at + 1
                 return None
             call = self._runs_left[-1]
             call[2] -= 1

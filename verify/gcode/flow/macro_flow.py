@@ -189,6 +189,7 @@ class MacroFlow:
             if call.kind == "M99" and not self.calls and "P" not in call.words:
                 self.machine.log.note(f"line {at + 1}: M99 ends the main program and repeats it without end; the proof "
                                       "reads it once")
+                self.machine.log.repeats = at + 1
                 yield at + 1, "M30"
                 return
             section, at = self._jump(call, at, section)

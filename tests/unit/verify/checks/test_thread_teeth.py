@@ -166,3 +166,47 @@ def test_a_floor_or_a_rim_near_the_tip_is_no_wall():
     assert not teeth_touch(tube(BORE), np.array([[0.5, 0.0, HIGH + 0.1]]), up, 2.0, 3.0, 0.03)[0]
     assert not teeth_touch(tube(BORE), np.array([[0.5, 0.0, -3.2]]), up, 2.0, 3.0, 0.03)[0]
     assert not len(teeth_touch(blind, np.zeros((0, 3)), np.zeros((0, 3)), 2.0, 1.0, 0.03))
+
+
+def passes(*ways):
+    """A way in and out of the bore for each helix: (low, turns, orbit, start, hand)."""
+    out = list(DOWN[:1])
+    for low, turns, orbit, start, hand in ways:
+        tips = [(x, hand * y, z) for x, y, z in helix(orbit, turns, low, start=start)]
+        x, y = orbit * math.cos(start), hand * orbit * math.sin(start)
+        out += [(0, 0, low), (x, y, low), *tips, (0, 0, tips[-1][2])]
+    return [*out, DOWN[0]]
+
+
+@pytest.mark.parametrize(("second", "off"), [
+    ((2.0, 2, ORBIT, 0.0, 1), None), ((2.0 + PITCH, 2, ORBIT, 0.0, 1), None), ((2.05, 2, ORBIT, 0.0, 1), None),
+    ((2.0 + 0.25 * PITCH, 2, ORBIT, 0.5 * math.pi, 1), None),  # begins a quarter turn on, a quarter pitch higher
+    ((2.0 + 0.5 * PITCH, 2, ORBIT, 0.0, 1), 0.4), ((2.1, 2, ORBIT, 0.0, 1), 0.1), ((2.0, 2, ORBIT, math.pi, 1), 0.4),
+    ((2.0 + 1.3 * PITCH, 2, ORBIT, 0.0, 1), 0.24), ((4.3, 3, ORBIT, 0.0, 1), 0.1), ((2.0, 2, ORBIT, 0.0, -1), 0.0)])
+@pytest.mark.parametrize("shallow", [ORBIT, ORBIT - 0.02])
+def test_a_second_pass_runs_in_the_thread_of_the_first(second, off, shallow):
+    tips = passes((2.0, 2, shallow, 0.0, 1), second)
+    depths = found(tips, pitch=PITCH)
+    assert sorted(depths.values()) == ([] if off is None else [pytest.approx(off, abs=1e-6)])
+    assert off is None or min(depths) > 120
+    assert not found(tips)  # the lead of a thread of several starts
+
+
+def test_threads_in_two_bores_and_turns_in_air_are_apart():
+    first, second = passes((2.0, 2, ORBIT, 0.0, 1))[:-1], passes((2.4, 2, ORBIT, 0.0, 1))[1:]
+    assert found([*first, (0, 0, 15), *second], pitch=PITCH)
+    beside = [(x + 40.0, y, z) for x, y, z in second]
+    assert not found([*first, (0, 0, 15), (40, 0, 15), *beside], pitch=PITCH)
+    assert not found(passes((2.0, 2, 0.2, 0.0, 1), (2.4, 2, ORBIT, 0.0, 1)), pitch=PITCH)
+
+
+def test_a_lead_in_on_an_arc_has_no_phase():
+    def with_lead(low, at=0.0):
+        k = np.arange(1, 31) / 30.0
+        lead = [(0.25 - 0.25 * math.cos(math.pi * t), -0.25 * math.sin(math.pi * t), low - 0.25 * PITCH * (1 - t))
+                for t in k]
+        tips = [(0, 0, low - 0.25 * PITCH), *lead, *helix(ORBIT, 2, low)]
+        return [*tips, (0, 0, tips[-1][2])]
+
+    assert not found([DOWN[0], *with_lead(2.0), *with_lead(2.0 + PITCH)], pitch=PITCH)
+    assert len(found([DOWN[0], *with_lead(2.0), *with_lead(2.0 + 0.5 * PITCH)], pitch=PITCH)) == 1

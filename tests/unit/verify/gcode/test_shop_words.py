@@ -217,6 +217,8 @@ def test_a_place_of_the_machine_needs_no_g0_on_these_controls():
     ("fanuc", "#1=#4014\n", "#4014 is a variable of the control"),
     ("fanuc", "G1 X1. F100. ; X7.\n", "'X7.' follows a ;"), ("fanuc", "G23 X1.\n", "coordinates in a block with G23"),
     ("fanuc", "G1 F9. G22 X1.\n", "coordinates in a block with G22"), ("fanuc", "G05.1 Q2 X0 Y0\n", "a curve through"),
+    ("fanuc", "G05 P10001\n", "a cycle of the memory"), ("fanuc", "G05 P10999 L1\n", "a cycle of the memory"),
+    ("fanuc", "G05\n", "G05 without P"),
     ("fanuc", "G05.1 Q1 X1.\n", "coordinates in a block with G5.1"), ("fanuc", "G10 L50\n", "L50 (parameters"),
     ("haas", "G47 X1. Y1. P0\n", "G47 (engraving)"), ("fanuc", "G47 X1.\n", "G47 (a tool offset)"),
     ("haas", "G83 R2. Z-5. I3. Q2. F9.\n", "two kinds of pecks"), ("haas", "G73 R2. Z-5. Q2. K6 F9.\n", "K6 of a peck"),

@@ -56,9 +56,10 @@ def test_flutes_are_open_in_a_groove_and_beside_the_blank():
     assert len(judged(["G98 G81 X14 Y10 R2 Z-9 F20"], drill(), setup=offset)[0]) == 1
 
 
-@pytest.mark.parametrize(("x", "stickout", "harm"), [(20.9, 45.0, True), (20.9, 10.0, False), (18.0, 45.0, False)])
+@pytest.mark.parametrize(("x", "stickout", "harm"), [(20.9, 45.0, True), (20.9, 10.0, False), (18.0, 45.0, False),
+                                                  (20.42, 45.0, True), (20.3, 45.0, False)])
 def test_a_slender_drill_that_cuts_with_one_side_is_a_load(x, stickout, harm):
-    """The blank ends at X20.5."""
+    """The blank ends at X20.5; the core of the drill has a radius of 0.15 mm."""
     found, _ = judged([f"G98 G81 X{x} Y10 R2 Z-4 F100"], drill(1.5, 8.0, stickout))
     assert [line for line, _ in found] == [7] * harm
 

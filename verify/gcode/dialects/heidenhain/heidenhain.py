@@ -17,6 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from verify.gcode.dialects.base import NUMBER, BlockError, Machine
 from verify.gcode.dialects.heidenhain.heidenhain_cycles import (
     AT_ONCE,
+    DRILLS,
     NOT_FOLLOWED,
     OLD,
     TOUCHES,
@@ -261,6 +262,8 @@ class HeidenhainReader(HeidenhainPaths):
         if "L" in sizes and abs(self.lengths.setdefault(number, sizes["L"]) - sizes["L"]) > 1e-6:
             raise BlockError(f"TOOL DEF {number} with the length {sizes['L']:g} mm: an earlier one gives it "
                              f"{self.lengths[number]:g} mm")
+        if "L" in sizes:
+            self.machine.log.lengths.setdefault(number, (sizes["L"], self.machine.log.line))
         return []
 
     def _numbered(self, word: str) -> int:
@@ -300,11 +303,12 @@ class HeidenhainReader(HeidenhainPaths):
                                  "of the preset table")
             self.reset_frames()
             return [self.zero(int(row), f"preset {int(row)}")]
-        if n in AT_ONCE or n in TOUCHES or n in (290, 800, 801, 880) or 1000 <= n:
-            what = NOT_FOLLOWED.get(n, "a touch probe" if n in TOUCHES or n >= 1000 else "turning")
-            raise BlockError(f"cycle {n} ({what}) is not followed")
         if n in (7, 8, 9, 10, 11, 19, 26, 32):
             raise BlockError(f"cannot read '{text[:60]}'")
+        if n in AT_ONCE or (n not in DRILLS and n not in NOT_FOLLOWED):  # others work when they are called
+            kind = "turning" if n >= 800 or n == 290 else "which may work when it is defined"
+            what = NOT_FOLLOWED.get(n, "a touch probe" if n in TOUCHES or n >= 1000 else kind)
+            raise BlockError(f"cycle {n} ({what}) is not followed")
         self.cycle = call
         return []
 

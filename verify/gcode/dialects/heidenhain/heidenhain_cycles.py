@@ -27,8 +27,8 @@ NOT_FOLLOWED = {
     292: "interpolation turning", 239: "a measurement of the load",
 }
 """Cycles that cut and are not followed, and what they do."""
-AT_ONCE = frozenset({220, 221, 224, 239})
-"""Cycles that move when they are defined."""
+AT_ONCE = frozenset({220, 221, 224, 239, 291})
+"""Cycles that work when they are defined: they move, or couple the spindle to the path."""
 TOUCHES = range(400, 500)
 """Cycles of touch probes, which move when they are defined."""
 

@@ -97,6 +97,8 @@ REFUSED = [
                                                                        "cycle 251 (a pocket)"),
     ("CYCL DEF 262 Q200=2\nCYCL CALL", "cycle 262 (thread milling)"), ("CYCL DEF 220 Q200=2",
                                                                        "cycle 220 (a circle of points)"),
+    ("CYCL DEF 291 COUPL.TURNG.INTERP. Q560=1", "cycle 291 (interpolation turning)"),
+    ("CYCL DEF 299 Q200=2", "cycle 299 (which may work when it is defined)"), ("CYCL DEF 812 Q200=2", "(turning)"),
     ("CYCL DEF 400 Q200=2", "a touch probe"), ("TCH PROBE 1.0", "a touch probe"),
     ("CYCL DEF 19.0 WORKING PLANE\nCYCL DEF 19.1 A+0 B+5", "cycle 19 (a tilted plane)"),
     ("CYCL DEF 19.1 X+0", "cycle 19 (a tilted plane)"), ("M128", "M128 turns the tool axis"),
