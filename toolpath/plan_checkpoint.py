@@ -68,16 +68,18 @@ class FinishSnapshot:
 class LayersSnapshot:
     """State of the layers of a tool.
 
-    top   : mm, height of the stock when the layers were laid out
-    swept : mm, height at which all walls were last followed
-    above : mm, height of the last layer
-    left  : count of layers to come
+    top     : mm, height of the stock when the layers were laid out
+    swept   : mm, height at which all walls were last followed
+    above   : mm, height of the last layer
+    heights : (n,) float64, mm, of the whole layers to come, descending
+    floors  : (m,) float64, mm, of the layers to come above floors
     """
 
     top: float
     swept: float
     above: float
-    left: int
+    heights: F64
+    floors: F64
 
 
 @dataclass(frozen=True, eq=False)

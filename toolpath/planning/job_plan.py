@@ -42,6 +42,7 @@ from toolpath.planning.layouts_ahead import computed_ahead
 from toolpath.planning.zone_finishing import Finish, ZonePlan, motions_of, step_of, turned
 from toolpath.planning.zone_layout import ZoneLayout, layouts_of
 from toolpath.roughing.engagement_limited_clearing import Clearing
+from toolpath.roughing.layers_over_floors import Columns, Floors, even_between, left_to_floors
 from toolpath.roughing.sized_walls import SizedWalls
 from toolpath.stock.cut_history import Depths, Walked
 from toolpath.stock.engagement import SKIN_SHARE, UNBOUNDED
@@ -60,7 +61,6 @@ ISLAND = 0.8  # of a layer: stock between rings that is left to the next one, un
 LOOSE = 2.0  # of the tolerance of leaving out points: an arc through them finds room (docs/theory/arcs.md)
 LOOSE_SHARE = 0.25  # of the allowance, at most, that arcs of the layers leave them by
 TILTED_LAYERS = 2.0  # goes in which a tilted end takes the stairs of the layers: more take longer than a layer more
-FLOORS_APART = 0.25  # of a layer: floors nearer to one above have no layer of their own
 THIN = 2.0  # scallops: thickness on a wall that a finish leaves
 
 Progress = Callable[[float], None]
@@ -303,28 +303,38 @@ class _Layers:
         self.top = top = stock.highest if snapshot is None else snapshot.top
         self.swept, self.above = (top, top) if snapshot is None else (snapshot.swept, snapshot.above)
         self.left: list[tuple[float, LayerArea]] = []
-        if top <= bottom or snapshot is not None and not snapshot.left:
+        if top <= bottom:
             return
         level = np.vstack([np.zeros((0, 3)), *(z.tips for z in zones if z.form is AreaForm.LEVEL)]) + [0.0, 0.0, low]
-        level = level[(level[:, 2] > bottom + 1e-3) & (level[:, 2] < top)]
-        ends = _ends(field, tips, level, top, bottom, step)
-        heights = [z for a, b in pairwise(ends) for z in depth_layers.layer_heights(a, b, step)]
+        floors = Floors.of(level[(level[:, 2] > bottom + 1e-3) & (level[:, 2] < top)], stock, tool.radius,
+                           left_to_floors(cut.finish or cut, tool, low, step))
+        if snapshot is None:
+            ends = even_between(top, bottom, Columns.of(tips, stock, tool.radius, cut), floors)
+            heights = self._heights(ends, under)
+            found = dict(floors.left_by([top, *heights]))
+        else:  # the stock is no longer that by which they were chosen
+            heights = snapshot.heights.tolist()
+            found = {z: t for z, t in floors.by_height if z in snapshot.floors}
+        places = _areas(field, tips, heights, step)
+        deeper = {z: places[next(k for k, h in enumerate(heights) if h < z)] for z in found}
+        own = [(z, LayerArea(_own(field, t, z), deeper[z].bare, floor=True)) for z, t in found.items()]
+        self.left = sorted([*zip(heights, places, strict=True), *own], key=itemgetter(0), reverse=True)
+
+    def _heights(self, ends: Sequence[float], under: float) -> list[float]:
+        """Heights of the whole layers, mm, descending: even between ``ends``, and what else asks for one."""
+        settings, tool, (top, bottom) = self.settings, self.field.tool, (ends[0], ends[-1])
+        heights = [z for a, b in pairwise(ends) for z in depth_layers.layer_heights(a, b, self.cut.step_down)]
         if settings.turning is not None and settings.finishing and curvature_matched.suits(tool):
-            spans = [(float(z.tips[:, 2].min()), float(z.tips[:, 2].max())) for z in zones
+            spans = [(float(z.tips[:, 2].min()), float(z.tips[:, 2].max())) for z in self.zones
                      if z.form is AreaForm.SHALLOW]
             heights = depth_layers.divided(heights, top, spans, TILTED_LAYERS * THICK * tool.diameter)
-        also = [plane - under for plane in settings.planes]
-        if also:
-            heights = sorted({*heights, *(z for z in also if bottom < z < top)}, reverse=True)
-        places = _areas(field, tips, heights, step)
-        floors = _between_layers(field, level, [top, *heights], places, FLOORS_APART * step)
-        self.left = sorted([*zip(heights, places, strict=True), *floors], key=itemgetter(0), reverse=True)
-        if snapshot is not None:
-            del self.left[:-snapshot.left]
+        also = [z for z in (plane - under for plane in settings.planes) if bottom < z < top]
+        return sorted({*heights, *also}, reverse=True) if also else heights
 
     def snapshot(self) -> LayersSnapshot:
         """State of the layers."""
-        return LayersSnapshot(self.top, self.swept, self.above, len(self.left))
+        return LayersSnapshot(self.top, self.swept, self.above, np.array([z for z, p in self.left if not p.floor]),
+                              np.array([z for z, p in self.left if p.floor]))
 
     def down_to(self, lowest: float, number: int, sized: SizedWalls, settle: Callable[[], None]) -> list[Workingstep]:
         """The layers from ``lowest`` mm up that were not cut before, as one workingstep.
@@ -473,56 +483,3 @@ def _areas(field: TipField, tips: F64, heights: Sequence[float], step: float) ->
                 met = met | dilated(reach, field.disc_radius(disc, 0.0) / lat.step)
         out.append(LayerArea(own | met, dilated(met, field.tool.radius / lat.step)))
     return out[::-1]
-
-
-def _floors(level: F64, apart: float) -> Iterator[tuple[float, F64]]:
-    """Floors less than ``apart`` mm below each other as one: height of the first, mm, and tips (k, 3), descending.
-
-    level : (n, 3) float64, mm, tips above the samples of floors, access frame
-    """
-    level = level[np.argsort(-level[:, 2], kind="stable")]
-    while len(level):
-        z = float(level[0, 2])
-        mine = level[:, 2] > z - apart
-        yield z, level[mine]
-        level = level[~mine]
-
-
-def _ends(field: TipField, tips: F64, level: F64, top: float, bottom: float, step: float) -> list[float]:
-    """Heights between which layers are even, mm, descending: the top of the stock, some floors, and the last layer.
-
-    A layer that ends on a floor saves that floor a layer of its own, but there may be one layer more. Those floors are
-    taken that make the sum of the areas of all layers least, as far as nodes near samples tell it.
-
-    tips, level : (n, 3) float64, mm, tips at all samples, and above those of floors as in ``_between_layers``
-    """
-    found = list(_floors(level, FLOORS_APART * step))
-    ends = [top, *(z for z, _ in found), bottom]
-    wide = np.array([_own(field, tips, z).sum() for z in ends[::-1]])
-    own = [int(_own(field, floor, z).sum()) for z, floor in found]
-
-    def between(upper: float, lower: float) -> float:
-        heights = np.array(depth_layers.layer_heights(upper, lower, step))
-        over = [min(h for h in [upper, *heights] if h >= z) if lower < z < upper else z for z, _ in found]
-        return float(np.interp(heights, ends[::-1], wide).sum()
-                     + sum(n for n, (z, _), h in zip(own, found, over, strict=True) if h - z > FLOORS_APART * step))
-
-    best: list[tuple[float, list[float]]] = [(0.0, [top])]
-    for z in ends[1:]:
-        best.append(min((cost + between(way[-1], z), [*way, z]) for cost, way in best))
-    return best[-1][1]
-
-
-def _between_layers(field: TipField, level: F64, heights: Sequence[float], places: Sequence[LayerArea],
-                    apart: float) -> list[tuple[float, LayerArea]]:
-    """Layers above floors on which the others leave more than ``apart`` mm, with their heights, mm, descending.
-
-    What layers leave on a floor is cut at the feed of its finish, in a slot by the whole width of the tool.
-
-    level   : (n, 3) float64, mm, tips above the samples of floors by what layers leave there, access frame
-    heights : mm, of the top of the stock and of the other layers, descending; places : of these layers
-    """
-    rising = np.array(heights[::-1])
-    above = rising[np.searchsorted(rising, level[:, 2] - 1e-3)]
-    return [(z, LayerArea(_own(field, floor, z), places[int(np.flatnonzero(np.array(heights) < z)[0]) - 1].bare, True))
-            for z, floor in _floors(level[above > level[:, 2] + apart], apart)]

@@ -30,7 +30,7 @@ USUAL_TOLERANCE, TOLERANCE_RANGE = 1e-3, (1e-5, 0.05)
 VOLUME_ROOM = 2.0
 # Boxes that hold the other solids of a file: of all, of each, and faces of a solid from which on it is one box. The
 # mesh that they are found on: chord as a share of the diagonal, and angle (rad).
-MOST_BOXES, BOXES_EACH, MOST_FACES = 120, 40, 500
+MAX_BOXES, BOXES_EACH, MAX_FACES = 120, 40, 500
 COVER_CHORD, COVER_ANGLE = 2e-3, 0.3
 
 
@@ -89,14 +89,14 @@ def load_part(path: str | Path, *, placement: SetupFrame | None = None, solid: i
     return Part(mesh=moved, faces=faces, edges=tuple(_moved(e, matrix) for e in edges), volume=volume,
                 bounds=moved.bounds, unit=step.unit, chord=chord, angle=angle, deviation=mesh.deviation,
                 warnings=tuple(dict.fromkeys(warnings)), sha256=step.text.sha256, uv=mesh.uv,
-                others=tuple(_other(n, b.name, _placed(b.shape, matrix), MOST_BOXES // len(loaded.others))
+                others=tuple(_other(n, b.name, _placed(b.shape, matrix), MAX_BOXES // len(loaded.others))
                              for n, b in loaded.others))
 
 
 def _other(number: int, name: str, shape: Shape, most: int) -> OtherSolid:
     """Another solid of the file, in the setup frame, held by at most ``most`` boxes."""
     bounds, faces = box_of(shape), faces_of(shape)
-    if most < 2 or len(faces) > MOST_FACES:
+    if most < 2 or len(faces) > MAX_FACES:
         return OtherSolid(number, name, bounds)
     chord = COVER_CHORD * float(np.linalg.norm(bounds[1] - bounds[0]))
     try:
