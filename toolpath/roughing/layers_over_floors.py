@@ -147,7 +147,7 @@ class Floors:
         return np.where((z > rising[0]) & (z < rising[-1]), np.maximum(np.minimum(above, self.top) - z, 0.0), 0.0)
 
     def left_by(self, heights: Sequence[float]) -> list[tuple[float, F64]]:
-        """Those of ``by_height`` that need a layer of their own: height, mm, and tips (k, 3) float64, mm.
+        """Those of ``by_height`` that need a layer of their own: height and tips (k, 3) float64, mm, access frame.
 
         heights : mm, as in ``left``
         """
