@@ -15,7 +15,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(600), pytest.mark.network]
 
 
 def test_a_job_is_seen_on_bad_days(part, tmp_path):  # noqa: F811
-    assert call(part, tmp_path).exit_code == 0
+    assert call(part, tmp_path, machine={"arcs": False}).exit_code == 0  # the tool is followed along straight lines
     with shown(tmp_path / "out") as url:
         driven("harm.mjs", "folder", url, tmp_path)
 

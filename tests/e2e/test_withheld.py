@@ -31,8 +31,8 @@ def part(tmp_path_factory) -> Path:
     return write_step(shape, tmp_path_factory.mktemp("step") / "step.step")
 
 
-def call(part, folder, *more):
-    (folder / "setup.json").write_text(json.dumps(SETUP))
+def call(part, folder, *more, **changes):
+    (folder / "setup.json").write_text(json.dumps({**SETUP, **changes}))
     return CliRunner().invoke(app, ["plan", str(part), "--setup", str(folder / "setup.json"), "--out",
                                     str(folder / "out"), *more])
 
