@@ -2,7 +2,7 @@
 
 Layers are even between the top of the stock and the lowest tip. What they leave on a floor in between is cut at the
 feed of its finish, in a slot by the whole width of the tool. So some floors end the even layers above them, and the
-others have a layer of their own. Which, is decided by the area that all layers together go over.
+others have a layer of their own, whichever takes all layers together less time in the stock.
 
 Places are in mm, access frame.
 """
@@ -33,16 +33,23 @@ RAISED = (0.0, 0.5, 0.98)  # of what is left to a floor, how far above it layers
 def left_to_floors(fine: CutData, tool: ToolBody, low: float, step: float) -> float:
     """Depth, mm, that the finish of a floor takes by the whole width of the tool without bending it too far.
 
+    It is ``LEFT`` of a layer at least, and where nothing tells how far the tool bends.
+
     fine : of the finish; low : mm, what layers leave, which its feed is made for; step : mm, of the deepest layer
     """
     flat = 1.6 * (tool.radius - tool.corner_radius)
-    feed, least, most = fine.under(low, flat).feed, LEFT * step, step
-    if fine.bending is None or fine.bending.under(feed, most, tool.diameter).share >= 1.0:
+    bending, feed, least, most = fine.bending, fine.under(low, flat).feed, LEFT * step, step
+    if bending is None:
+        return least
+
+    def bears(depth: float) -> bool:  # also where the setup gives the feed, which is never reduced
+        return bending.deflection(feed, depth, tool.diameter) <= bending.limit
+
+    if bears(most):
         return most
     while most - least > 0.01 * step:
         middle = 0.5 * (least + most)
-        bears = fine.bending.under(feed, middle, tool.diameter).share >= 1.0
-        least, most = (middle, most) if bears else (least, middle)
+        least, most = (middle, most) if bears(middle) else (least, middle)
     return least
 
 

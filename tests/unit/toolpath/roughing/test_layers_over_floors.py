@@ -1,12 +1,25 @@
 """Heights of layers over floors, against all choices of floors priced cell by cell."""
 
+from dataclasses import replace
 from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
 
-from toolpath.roughing.layers_over_floors import LAYER, RAISED, SLOWER, Columns, Floors, even_between
+from geometry.tool_body import ToolBody
+from toolpath.plan_settings import CutData
+from toolpath.roughing.layers_over_floors import (
+    LAYER,
+    LEFT,
+    RAISED,
+    SLOWER,
+    Columns,
+    Floors,
+    even_between,
+    left_to_floors,
+)
 from toolpath.strategies.depth_layers import STOCK_WORTH, layer_heights
+from toolpath.tool_deflection import DeflectionModel
 
 TOP, BOTTOM = 10.0, 0.0
 
@@ -62,3 +75,24 @@ def test_a_floor_with_little_stock_on_it_needs_no_layer():
     assert floors.left([TOP, 6.0, 4.0, BOTTOM])[0] == pytest.approx(0.2)
     assert floors.left_by([TOP, 6.0, 4.0, BOTTOM]) == []
     assert floors.left([TOP, 5.0, BOTTOM])[0] == 0.0
+
+
+BODY = ToolBody("T1", 1, 4.0, 0.0, 8.0, 4.0, 8.0, 4.0, 20.0)
+
+
+@pytest.mark.parametrize("fixed", [False, True])
+@pytest.mark.parametrize("factor", [1e-3, 0.6, 10.0])
+def test_a_floor_keeps_what_its_finish_bears(factor, fixed):
+    """Also where the setup gives the feed, which is not reduced."""
+    bar = DeflectionModel(BODY, 1e-4, 1500.0, 0.25, 1.0, 2, 5000.0, fixed=fixed)
+    fine = CutData(5000.0, 100.0, 50.0, 500.0, 1.0)
+    bar = replace(bar, limit=factor * bar.deflection(100.0, 1.0, 4.0))
+    left = left_to_floors(replace(fine, bending=bar), BODY, 1e-3, 1.0)
+    feed = replace(fine, bending=bar).under(1e-3, 3.2).feed
+    depths = np.linspace(0.0, 1.0, 1001)
+    borne = max(d for d in depths if d == 0.0 or bar.deflection(feed, d, 4.0) <= bar.limit)
+    assert left == pytest.approx(min(max(borne, LEFT), 1.0), abs=0.011)
+
+
+def test_a_floor_keeps_little_where_nothing_tells_how_far_the_tool_bends():
+    assert left_to_floors(CutData(5000.0, 100.0, 50.0, 500.0, 1.0), BODY, 0.05, 2.0) == 2.0 * LEFT
