@@ -14,6 +14,7 @@ from geometry.mesh_queries.keyed_nearest import KeyedPoints
 # Least cosine between the normals of facet and surface. Below it the facet is a sliver or folded, or the surface is
 # singular.
 BELIEVED_DOT = 0.5
+PLANE = 1e-12  # components of normals that differ by no more are those of one plane
 # Middles of the sides of triangles nearer than this are one, mm: such a side lies inside a face.
 SAME_SIDE = 1e-5
 
@@ -254,14 +255,19 @@ def with_surface_normals(samples: SurfaceSamples, mesh: TriangleMesh) -> Surface
     """
     if mesh.corner_normals is None or not len(samples):
         return samples
-    t = mesh.triangles[samples.triangle]
-    share = _barycentric(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0], samples.points - t[:, 0])
-    normals = np.einsum("ij,ijk->ik", share, mesh.corner_normals[samples.triangle])
+    plane = np.asarray((np.abs(mesh.corner_normals - mesh.normals[:, None]) <= PLANE).all(axis=(1, 2)))
+    rows = np.flatnonzero(~plane[samples.triangle])
+    triangle = samples.triangle[rows]
+    t = mesh.triangles[triangle]
+    share = _barycentric(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0], samples.points[rows] - t[:, 0])
+    normals = np.einsum("ij,ijk->ik", share, mesh.corner_normals[triangle])
     length = np.linalg.norm(normals, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         normals /= length[:, None]
-        good = np.einsum("ij,ij->i", normals, samples.normals) > BELIEVED_DOT
-    return replace(samples, normals=np.ascontiguousarray(np.where(good[:, None], normals, samples.normals)))
+        good = np.einsum("ij,ij->i", normals, samples.normals[rows]) > BELIEVED_DOT
+    out = samples.normals.copy()
+    out[rows[good]] = normals[good]
+    return replace(samples, normals=out)
 
 
 def _barycentric(u: F64, v: F64, w: F64) -> F64:

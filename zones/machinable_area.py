@@ -26,6 +26,9 @@ class AreaForm(StrEnum):
     STEEP = "steep"
 
 
+FORMS = (AreaForm.LEVEL, AreaForm.SHALLOW, AreaForm.STEEP)
+
+
 def machinable_faces(samples: SurfaceSamples, seat: Collection[int], wanted: set[int] | None, excluded: set[int],
                      directions: ArrayLike = UP) -> set[int]:
     """Numbers of the faces of the machinable area Ma [Arivazhagan2020].
@@ -53,7 +56,12 @@ def forms_of(normals: F64) -> NDArray[np.object_]:
 
     normals : (n, 3) float64, dimensionless, unit normals in the access frame, out of the material
     """
-    out = np.full(len(normals), AreaForm.SHALLOW, dtype=object)
-    out[normals[:, 2] > LEVEL] = AreaForm.LEVEL
-    out[normals[:, 2] < STEEP] = AreaForm.STEEP
-    return out
+    return np.array(FORMS, dtype=object)[form_codes(normals)]
+
+
+def form_codes(normals: F64) -> NDArray[np.int8]:
+    """Form of each sample, (n,) int8, index: its place in ``FORMS``.
+
+    normals : (n, 3) float64, dimensionless, access frame, as those of ``forms_of``
+    """
+    return np.where(normals[:, 2] > LEVEL, 0, np.where(normals[:, 2] < STEEP, 2, 1)).astype(np.int8)

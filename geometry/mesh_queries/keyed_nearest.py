@@ -18,11 +18,13 @@ class KeyedPoints:
 
     key    : (n,) int64, index, any values
     points : (n, d) float64, mm, in one frame
+    within : (k, d) float64, mm, points as far apart as what is asked about; None: ``points`` themselves
     """
 
-    def __init__(self, key: NDArray[np.int64], points: F64) -> None:
+    def __init__(self, key: NDArray[np.int64], points: F64, within: F64 | None = None) -> None:
         self.keys, place = np.unique(key, return_inverse=True)
-        low, high = limits_of(points) if len(points) else (np.zeros(1), np.zeros(1))
+        within = points if within is None else within
+        low, high = limits_of(within) if len(within) else (np.zeros(1), np.zeros(1))
         span = float(np.linalg.norm(high - low))
         self.step = APART * span + 1.0
         self.reach = 0.5 * self.step
@@ -32,7 +34,7 @@ class KeyedPoints:
         """Rows of the nearest points of the same key.
 
         key    : (m,) int64, index
-        points : (m, d) float64, mm, same frame, not farther from the indexed points than twice their extent
+        points : (m, d) float64, mm, same frame, not farther from the indexed points than twice the extent
         Returns (m, k) int64, index of the points, nearest first; -1 where the key has fewer.
         """
         out = np.full((len(points), k), -1, np.int64)

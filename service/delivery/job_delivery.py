@@ -90,7 +90,7 @@ def deliver_job(job: ProvedPlan, cautions: Sequence[JobCaution], out: Path, mesh
         deviation = pool.submit(deviation_map, ready, job.frame, job.samples, job.proof, job.conditions, report,
                                 out / MAP_NAME)
         page = plan_view(ready, job.frame, job.scored, job.zone, reported.uncut, reported.remainder, job.proof,
-                         programs, job.conditions, report)
+                         programs, job.read(), job.conditions, report)
         if page:
             files[PREVIEW_NAME] = ("preview", "", None, _preview(ready, page[VIEW_NAME][3], report, out / PREVIEW_NAME))
         files[MAP_NAME] = ("deviation", "", None, deviation.result())
@@ -143,9 +143,9 @@ def _report(job: ProvedPlan, cautions: Sequence[JobCaution], known: ComputedAhea
 
 def _differences(job: ProvedPlan, delivered: Sequence[WrittenProgram]) -> list[str]:
     """Compare the programs as they are delivered, of all controls, with those that are proved; returns notes."""
-    return [note for p, f in zip(job.written, delivered, strict=True)
+    return [note for p, f, read in zip(job.written, delivered, job.read(), strict=True)
             for note in carried(p.given(), [f.given(), *f.twins()], job.frame.part, job.ready.inputs.bodies,
-                                job.conditions)]
+                                job.conditions, known=read)]
 
 
 def _program_files(written: Sequence[WrittenProgram]) -> Files:

@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.child_process import give_back_memory
+from geometry.part import Part
 from geometry.sampling import SurfaceSamples
+from geometry.tool_body import ToolBody
 from service.delivery.written_program import WrittenProgram
 from service.stages.access_plan import AccessPlan, ProofFrame
 from service.stages.access_settings import plan_settings, planning_stock
@@ -33,14 +35,30 @@ from toolpath.plan_checkpoint import CheckpointKeeper
 from toolpath.planning.job_plan import Plan
 from toolpath.planning.zone_layout import ZoneLayout, layouts_of
 from toolpath.stock.stock_map import StockMap
+from verify.checks.program_sequence import read_each
 from verify.model import NcProgram, Proof, ProofSetup, ScoredSamples
-from verify.prove import prove
+from verify.program.program import Program
+from verify.progress import Report, StageProgress, silent
+from verify.prove import READ, prove
 from zones.reach.access_view import View
 
 Progress = Callable[[str, float], None]
 Planner = Callable[..., Plan]
 PREPARED, PROVED = 0.28, 0.96  # shares of the work done
 FIRST_SHARE, PLAN_SHARE = 0.9, 0.7  # of what is left to a proof: of a plan and its proof; of these: of the plan
+
+
+class Reading:
+    """Programs that are read when they are first asked for; ``make`` reads them and reports the share done."""
+
+    def __init__(self, make: Callable[[Report], list[Program]]) -> None:
+        self._make, self._read = make, list[Program]()
+
+    def __call__(self, report: Report = silent) -> list[Program]:
+        """The programs; report : called with the share read, 0 to 1."""
+        if not self._read:
+            self._read = self._make(report)
+        return self._read
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +72,7 @@ class ProvedPlan:
     conditions : ProofSetup, what the proof holds the programs to
     plan       : of all accesses together
     written    : the programs, as they were proved
+    read       : the same as the proof has read them
     zone       : (n,) int32, index: zone that answers for each sample, from 1; 0 where none does or the plan gave up
     given_up   : (n,) bool, samples that the plan gave up
     proof      : in the frame of the proof
@@ -67,6 +86,7 @@ class ProvedPlan:
     conditions: ProofSetup
     plan: Plan
     written: tuple[WrittenProgram, ...]
+    read: Reading
     zone: NDArray[np.int32]
     given_up: NDArray[np.bool_]
     proof: Proof
@@ -116,17 +136,25 @@ def plan_and_prove(resumed: Resumed, scored: Score, trimmed: Mapping[str, Sequen
         programs = [p.given() for p in written]
         if beside is not None:
             beside(written)
+        read = Reading(partial(read_each, programs, frame.part, ready.inputs.bodies, conditions, 0))
         proof = resumed.proof(programs, zone, partial(
-            prove, programs, frame.part, ready.inputs.bodies, conditions, ScoredSamples(samples, zone),
+            _proof, read, programs, frame.part, ready.inputs.bodies, conditions, ScoredSamples(samples, zone),
             [z.id for z in ready.zones], span.proving))
         next_feedback = learned(feedback, Attempt(access_plans, written, ready.zones, scored.zone, zone, frame, proof))
         finding_counts.append(sum(proof.counts.values()))
         if next_feedback is None or not worth_another(finding_counts, MAX_PLANS):
-            return ProvedPlan(ready, scored, frame, samples, conditions, plan, tuple(written), zone, given_up, proof,
-                              feedback.notes)
+            return ProvedPlan(ready, scored, frame, samples, conditions, plan, tuple(written), read, zone, given_up,
+                              proof, feedback.notes)
         # an access begins with what those before it leave: plans stay up to the first access with new feedback
         access_plans = list(takewhile(partial(_unchanged, feedback, next_feedback), access_plans))
         feedback, begun = next_feedback, ended
+
+
+def _proof(read: Reading, programs: Sequence[NcProgram], part: Part, tools: Sequence[ToolBody], conditions: ProofSetup,
+           scored: ScoredSamples, zones: Sequence[str], report: Report) -> Proof:
+    """The proof of programs that are read first, as ``verify.prove.prove``."""
+    known = read(StageProgress(report).span(0.0, READ))
+    return prove(programs, part, tools, conditions, scored, zones, report, read=known)
 
 
 def _unchanged(feedback: ProofFeedback, next_feedback: ProofFeedback, access_plan: AccessPlan) -> bool:

@@ -21,7 +21,7 @@ from service.stages.preparation import Prepared, machinable_triangles
 from service.stages.sample_spacing import coarse_sets, coarse_spacing, split_where_zones_meet
 from toolpath.passes.pass_family import FinishTarget
 from toolpath.planning.job_plan import Plan
-from zones.machinable_area import forms_of
+from zones.machinable_area import FORMS, form_codes
 from zones.plan_view.regions import Labels
 from zones.reach.access_view import View, turned_samples
 from zones.reach.tip_field import touchable
@@ -30,6 +30,7 @@ from zones.zoning.zones import ZoneArea
 PROOF_DENSITY = 100.0  # samples a mm²
 PROOF_SEED = 20_011
 NEIGHBOURS = 4
+MIXED = -1  # in place of a zone: several zones, or some and none
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +100,7 @@ def score(ready: Prepared) -> Score:
         owner = np.zeros(len(ready.samples), np.int32)
         for k, z in mine:
             owner[z.samples] = k
-        wanted = _neighbours(view, owner, here, labels)
+        wanted = _neighbours(view, owner, here)
         names = labels.names
         for k, z in mine:
             rows = np.flatnonzero((wanted == k) & (zone == 0))
@@ -141,15 +142,24 @@ def _laid(ready: Prepared, triangles: NDArray[np.int64], directions: NDArray[np.
                                 part.mesh)
 
 
-def _neighbours(view: View, owner: NDArray[np.int32], dense: SurfaceSamples, labels: Labels) -> NDArray[np.int32]:
+def _neighbours(view: View, owner: NDArray[np.int32], dense: SurfaceSamples) -> NDArray[np.int32]:
     """Zone of the nearest planning sample of the same face and form that has a zone.
 
-    owner         : (m,) int32, index: zone of the planning samples, from 1; 0 for none
-    dense, labels : in the frame of the view
+    owner : (m,) int32, index: zone of the planning samples, from 1; 0 for none
+    dense : in the frame of the view
     """
-    codes = {"level": 0, "shallow": 1, "steep": 2}
-    key = view.samples.face.astype(np.int64) * 3 + np.array([codes[f] for f in forms_of(view.samples.normals)])
-    wanted = dense.face.astype(np.int64) * 3 + np.array([codes[f] for f in forms_of(dense.normals)])
-    near = KeyedPoints(key, view.samples.points).nearest(wanted, dense.points, NEIGHBOURS)
-    owners = np.where(near >= 0, owner[near], 0)
-    return np.asarray(owners[np.arange(len(dense)), np.argmax(owners > 0, axis=1)], np.int32)
+    key, wanted = (s.face.astype(np.int64) * len(FORMS) + form_codes(s.normals) for s in (view.samples, dense))
+    size = 1 + int(max(key.max(initial=0), wanted.max(initial=0)))
+    least, most = np.full(size, len(owner) + 1, np.int32), np.zeros(size, np.int32)
+    np.minimum.at(least, key, owner)
+    np.maximum.at(most, key, owner)
+    # where all samples of a key have one zone, the nearest has it too
+    table = np.where(least < most, MIXED, most)
+    out, among = table[wanted], table[key] == MIXED
+    mixed = out == MIXED
+    if mixed.any():
+        points, own = view.samples.points, owner[among]
+        near = KeyedPoints(key[among], points[among], points).nearest(wanted[mixed], dense.points[mixed], NEIGHBOURS)
+        owners = np.where(near >= 0, own[near], 0)
+        out[mixed] = owners[np.arange(len(owners)), np.argmax(owners > 0, axis=1)]
+    return out

@@ -104,8 +104,12 @@ def split_where_zones_meet(samples: SurfaceSamples, planning: SurfaceSamples, zo
         if not len(there):
             split[rows] = True
             continue
-        near = cKDTree(planning.points[there]).query(samples.points[rows], k=min(NEIGHBOURS, len(there)))[1]
-        of = owner[there][near.reshape(len(rows), -1)]
+        owners = owner[there]
+        if (owners == owners[0]).all():
+            split[rows] = not fits[owners[0]]
+            continue
+        near = cKDTree(planning.points[there]).query(samples.points[rows], k=min(NEIGHBOURS, len(there)), workers=2)[1]
+        of = owners[near.reshape(len(rows), -1)]
         split[rows] = (of != of[:, :1]).any(axis=1) | ~fits[of[:, 0]]
     if not split.any():
         return samples

@@ -42,12 +42,12 @@ I64 = NDArray[np.int64]
 
 
 def plan_view(ready: Prepared, frame: ProofFrame, scored: Score, zone: NDArray[np.int32], uncut: NDArray[np.bool_],
-              remainder: Sequence[RemainderEntry], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
-              report: Mapping[str, Any]) -> Files:
+              remainder: Sequence[RemainderEntry], proof: Proof, programs: Sequence[NcProgram], read: Sequence[Program],
+              setup: ProofSetup, report: Mapping[str, Any]) -> Files:
     """The view file of a planned job, as ``service.delivery.result_files`` takes it.
 
     scored, proof, setup : of the last plan, the proof in ``frame``
-    programs : texts of the last plan
+    programs, read : of the last plan, as texts and as the proof has read them
     zone     : (n,) int32, index: zone that answers for each sample, from 1; 0 for none
     uncut    : (n,) bool, samples that stay uncut
     remainder : the same by region and reason, as ``service.report.report.job_report`` returns it
@@ -56,20 +56,21 @@ def plan_view(ready: Prepared, frame: ProofFrame, scored: Score, zone: NDArray[n
     The view of an unproved job shows no program.
     """
     return _or_none(report, f"{VIEW_NAME}, and preview.png, which is drawn from it,",
-                    lambda: _plan_view(ready, frame, scored, zone, uncut, remainder, proof, programs, setup, report))
+                    lambda: _plan_view(ready, frame, scored, zone, uncut, remainder, proof, programs, read, setup,
+                                       report))
 
 
 def _plan_view(ready: Prepared, frame: ProofFrame, scored: Score, zone: NDArray[np.int32], uncut: NDArray[np.bool_],
-               remainder: Sequence[RemainderEntry], proof: Proof, programs: Sequence[NcProgram], setup: ProofSetup,
-               report: Mapping[str, Any]) -> Files:
+               remainder: Sequence[RemainderEntry], proof: Proof, programs: Sequence[NcProgram],
+               read: Sequence[Program], setup: ProofSetup, report: Mapping[str, Any]) -> Files:
     zones, entries = report["zones"], report["remainder"]
     label = np.where(zone > 0, zone.astype(np.int64) - 1, len(zones) + len(entries))
     label[uncut] = len(zones) + _entries(scored.samples.subset(uncut), remainder, len(entries))
     names = [{"zone": z["id"]} for z in zones] + [{"remainder": k} for k in range(len(entries))] + [{"other": True}]
-    read = read_all(programs, frame.part, ready.inputs.bodies, setup, 0, lambda _share: None)
-    track = track_of(read, programs, frame.rotation, report["steps"])
+    framed = read_all(programs, frame.part, ready.inputs.bodies, setup, 0, lambda _share: None, read)
+    track = track_of(framed, programs, frame.rotation, report["steps"])
     return _file(ready, ready.decomposition, frame.into(scored.samples, ready.views[0]), frame, label, names, proof,
-                 setup, track, read, report, open_=report["state"] == "proved")
+                 setup, track, framed, report, open_=report["state"] == "proved")
 
 
 def verification_view(job: JobPart, frame: ProofFrame, samples: SurfaceSamples, proof: Proof,

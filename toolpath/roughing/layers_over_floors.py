@@ -28,6 +28,7 @@ FEW = 8  # floors: of no more, heights above them are tried too
 LAYER = 0.2  # of all cells: ways along walls, ways in and links of a layer, whatever its area
 SLOWER = 0.35  # of a layer: what it costs to leave a floor as much as its finish takes
 RAISED = (0.0, 0.5, 0.98)  # of what is left to a floor, how far above it layers may end
+COLUMNS = 2**31  # in a row of cells, more than there can be
 
 
 def left_to_floors(fine: CutData, tool: ToolBody, low: float, step: float) -> float:
@@ -59,8 +60,9 @@ def _tops(stock: StockMap, places: F64) -> F64:
 
 
 def _cells(places: F64, wide: float) -> NDArray[np.int64]:
-    """(n, 2) int64: cells of the plan view, wide mm, that places (n, 3), mm, are in."""
-    return np.floor(places[:, :2] / wide).astype(np.int64)
+    """(n,) int64, index: cells of the plan view, wide mm, that places (n, 3), mm, are in."""
+    row, column = np.floor(places[:, :2].T / wide).astype(np.int64)
+    return row * COLUMNS + column
 
 
 @dataclass(frozen=True)
@@ -83,8 +85,7 @@ class Columns:
 
         tips : (n, 3) float64, mm, access frame, at samples; wide : mm, side of a cell; cut : CutData of the layers
         """
-        _, of = np.unique(_cells(tips, wide), axis=0, return_inverse=True)
-        of = of.reshape(-1)
+        _, of = np.unique(_cells(tips, wide), return_inverse=True)
         low, high = np.full(of.max(initial=-1) + 1, np.inf), np.full(of.max(initial=-1) + 1, -np.inf)
         np.minimum.at(low, of, tips[:, 2])
         np.maximum.at(high, of, _tops(stock, tips))
@@ -137,7 +138,7 @@ class Floors:
             floors.append((float(level[0, 2]), level[mine]))
             level = level[~mine]
         return cls(tuple(floors), np.array([_tops(stock, t).max() for _, t in floors]),
-                   np.array([len(np.unique(_cells(t, wide), axis=0)) for _, t in floors], np.int64), apart)
+                   np.array([len(np.unique(_cells(t, wide))) for _, t in floors], np.int64), apart)
 
     @property
     def heights(self) -> F64:

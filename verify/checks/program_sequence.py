@@ -93,20 +93,30 @@ def read_all(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], s
 
     programs, spindle_tool : as ``verify.prove.prove`` takes them; it also names the errors
     report   : called with the share read, 0 to 1
-    known    : the same programs, already read by ``verify.program_reading.read_one``; None: they are read here
+    known    : the same programs, as ``read_each`` reads them; None: they are read here
     """
     given = [p if isinstance(p, NcProgram) else NcProgram(*p) for p in programs]
-    stages, total, done = StageProgress(report), max(sum(len(p.text) for p in given), 1), 0
-    read = []
-    for k, nc in enumerate(given):
+    read = read_each(given, part, tools, setup, spindle_tool, report) if known is None else known
+    framed = []
+    for nc, program in zip(given, read, strict=True):
         own, bounds = _own(nc, part, setup)
         top = top_of_all(bounds, own)
+        framed.append(FramedProgram(from_above(program, top + setup.clearance_rapid), nc.turn, own, bounds))
+    return framed
+
+
+def read_each(programs: Sequence[NcProgram], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
+              spindle_tool: int, report: Report) -> list[Program]:
+    """Read programs, each in its own frame, as ``read_all`` takes them from who has read them before."""
+    stages, total, done = StageProgress(report), max(sum(len(p.text) for p in programs), 1), 0
+    read = []
+    for nc in programs:
+        own, _ = _own(nc, part, setup)
         share = stages.span(done / total, (done + len(nc.text)) / total)
-        program = known[k] if known is not None else read_one(
+        read.append(read_one(
             nc, tools, work_offset=own.work_offset, gouge_tolerance=setup.gouge_tolerance, kinematics=setup.kinematics,
             gauge_length=setup.gauge_length, spindle_tool=spindle_tool, report=share, change=own.change_position,
-            gauge_given=setup.gauge_given)
-        read.append(FramedProgram(from_above(program, top + setup.clearance_rapid), nc.turn, own, bounds))
+            gauge_given=setup.gauge_given))
         done += len(nc.text)
     return read
 

@@ -219,13 +219,14 @@ def _axes(p: Program, at_start: bool) -> F64:
 
 
 def carried(proved: NcProgram, twins: Sequence[NcProgram], part: Part, tools: Sequence[ToolBody], setup: ProofSetup,
-            report: Report = silent) -> list[str]:
+            report: Report = silent, known: Program | None = None) -> list[str]:
     """Carry the proof of a program over to equivalent programs.
 
     proved  : a program without a finding
     twins   : the other programs, in the same frame; one may be the same text with other comments
     part, tools, setup : of the proof, as ``verify.prove.prove`` takes them
     report  : called with the share done, 0 to 1
+    known   : the proved program as the proof has read it; None: it is read here
 
     Returns the notes of the other readings.
 
@@ -237,7 +238,7 @@ def carried(proved: NcProgram, twins: Sequence[NcProgram], part: Part, tools: Se
     if not twins:
         return []
     stages, share, notes = StageProgress(report), 1.0 / (len(twins) + 1), []
-    (first,) = read_all([proved], part, tools, setup, 0, stages.span(0.0, share))
+    (first,) = read_all([proved], part, tools, setup, 0, stages.span(0.0, share), None if known is None else [known])
     for k, twin in enumerate(twins, 1):
         try:
             (other,) = read_all([twin], part, tools, setup, 0, stages.span(k * share, (k + 1) * share))

@@ -245,8 +245,10 @@ class BlockMotion(FrameWords):
         length = sum(math.dist(a, b) for a, b in itertools.pairwise([start.tolist(), *points]))
         rate, minutes = self._timing(feed, length, turn)
         was, n = s.turn, len(points)
+        if turn is None:
+            return self._chords(points, rate, minutes / n)
         for k, p in enumerate(points, 1):
-            self._line_to(p, FEED, rate, None if turn is None else between(was, turn, k / n), minutes / n)
+            self._line_to(p, FEED, rate, between(was, turn, k / n), minutes / n)
         return None
 
     def _one_place(self, start: F64, end: F64, centre: F64) -> None:

@@ -7,6 +7,7 @@ place of the tool.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -311,6 +312,17 @@ class ContourMotion(Origins):
         unknown = frame is not None and any(map(math.isnan, target))
         self._stated = (frame, list(target)) if unknown and frame is not None else None
         return self._straight(target if frame is None else frame.out(target), kind, feed, turn, minutes)
+
+    def _chords(self, points: Sequence[list[float]], feed: float, minutes: float) -> None:
+        """Write the chords of an arc to ``points``, (3,) mm each, as ``_line_to`` writes each of them."""
+        self._line_to(points[0], FEED, feed, None, minutes)
+        if self.actual is not None or self._frame() is not None or any(map(math.isnan, points[-1])):
+            for p in points[1:]:
+                self._line_to(p, FEED, feed, None, minutes)
+            return
+        for was, p in itertools.pairwise(points):
+            self._write(was, p, FEED, feed, 0, None, minutes)
+        self.s.position = points[-1]
 
     def _hold(self, target: list[float], kind: int, feed: float, turn: list[float] | None, minutes: float,
               frame: Frame | None) -> None:
