@@ -72,7 +72,8 @@ class LayersSnapshot:
     swept   : mm, height at which all walls were last followed
     above   : mm, height of the last layer
     heights : (n,) float64, mm, of the whole layers to come, descending
-    floors  : (m,) float64, mm, of the layers to come above floors
+    floors  : (m,) float64, mm, of the layers to come above floors, and of one that takes the last of loose pieces
+    loose   : (ny, nx) bool on the lattice, places of pieces that layers cut away, for they would come loose
     """
 
     top: float
@@ -80,6 +81,7 @@ class LayersSnapshot:
     above: float
     heights: F64
     floors: F64
+    loose: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

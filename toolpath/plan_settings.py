@@ -154,6 +154,7 @@ class PlanSettings:
     planes          : heights of contact, descending: all above one is finished before any tool goes below it
                       (``toolpath.planning.depth_bands``)
     semi_finishing  : cuts between the layers too, so that they leave even stock
+    underside       : lowest height of the blank: what is cut down to it all round comes loose
     """
 
     scallop_height: float
@@ -174,6 +175,7 @@ class PlanSettings:
     semi_finishing: bool = False
     leaned: ToolLean | None = None
     left_alone: LeftAlone | None = None
+    underside: float = -math.inf
 
     @property
     def budget(self) -> ScallopBudget:

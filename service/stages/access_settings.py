@@ -88,7 +88,8 @@ def plan_settings(ready: Prepared, view: View, stock: StockMap) -> PlanSettings:
                         floor, ramp, ops.roughing, ops.finishing, CutDirection(ops.cut_direction),
                         Pattern(ops.pattern), turning_of(ready, view), rates=inputs.rates,
                         semi_finishing=ops.semi_finishing, leaned=leaned(ops.lean),
-                        left_alone=_places_left_alone(ready, view) if ops.roughing else None)
+                        left_alone=_places_left_alone(ready, view) if ops.roughing else None,
+                        underside=float(ready.blank.corners(view.rotation)[0, 2]))
 
 
 def _places_left_alone(ready: Prepared, view: View) -> LeftAlone | None:

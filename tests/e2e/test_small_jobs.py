@@ -182,3 +182,14 @@ def test_a_bull_nose_finishes_rounds_that_go_over_into_a_level_plane(tmp_path):
     assert got.exit_code == 0 and report["state"] == "proved" and report["coverage"] == 1.0
     tried = [r for z in report["zones"] for r in z["rejected"] if r.get("strategy") == "isoparametric"]
     assert any("longer" in r["reason"] for r in tried) or any(z["strategy"] == "isoparametric" for z in report["zones"])
+
+
+@pytest.mark.slow
+def test_the_middle_of_a_hole_is_cut_away_before_it_comes_loose(tmp_path):
+    part = write_step(cq.Workplane().box(24, 24, 3, centered=(True, True, False)).faces(">Z").workplane().hole(18.0),
+                      tmp_path / "hole.step")
+    box = {"kind": "box", "box_mm": [[-12, -12, 0], [12, 12, 3]], "uncertainty_mm": 0.0}
+    got = run("plan", part, tmp_path, SETUP | {"stock": box}, "--out", str(tmp_path / "out"))
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert got.exit_code == 0 and report["state"] == "proved", got.stderr
+    assert "loose_stock" not in {a["what"] for a in report["proof"]["assumed"]}

@@ -43,6 +43,7 @@ from toolpath.planning.zone_finishing import Finish, ZonePlan, motions_of, step_
 from toolpath.planning.zone_layout import ZoneLayout, layouts_of
 from toolpath.roughing.engagement_limited_clearing import Clearing
 from toolpath.roughing.layers_over_floors import Columns, Floors, even_between, left_to_floors
+from toolpath.roughing.loose_pieces import loose_pieces
 from toolpath.roughing.sized_walls import SizedWalls
 from toolpath.stock.cut_history import Depths, Walked
 from toolpath.stock.engagement import SKIN_SHARE, UNBOUNDED
@@ -61,6 +62,7 @@ ISLAND = 0.8  # of a layer: stock between rings that is left to the next one, un
 LOOSE = 2.0  # of the tolerance of leaving out points: an arc through them finds room (docs/theory/arcs.md)
 LOOSE_SHARE = 0.25  # of the allowance, at most, that arcs of the layers leave them by
 TILTED_LAYERS = 2.0  # goes in which a tilted end takes the stairs of the layers: more take longer than a layer more
+THROUGH = 1e-3  # mm: as near as that to the underside of the blank a tool is through
 THIN = 2.0  # scallops: thickness on a wall that a finish leaves
 
 Progress = Callable[[float], None]
@@ -303,6 +305,7 @@ class _Layers:
         self.top = top = stock.highest if snapshot is None else snapshot.top
         self.swept, self.above = (top, top) if snapshot is None else (snapshot.swept, snapshot.above)
         self.left: list[tuple[float, LayerArea]] = []
+        self.loose = lat.mask(np.zeros((0, 2)))
         if top <= bottom:
             return
         level = np.vstack([np.zeros((0, 3)), *(z.tips for z in zones if z.form is AreaForm.LEVEL)]) + [0.0, 0.0, low]
@@ -316,8 +319,16 @@ class _Layers:
             heights = snapshot.heights.tolist()
             found = {z: t for z, t in floors.by_height if z in snapshot.floors}
         places = _areas(field, tips, heights, step)
+        through = float(tips[:, 2].min())
+        if snapshot is not None:
+            self.loose = snapshot.loose
+        elif through <= settings.underside + THROUGH:
+            self.loose = loose_pieces(field, stock, heights[-1], places[-1].area)
+        places = [p._replace(area=p.area | self.loose) for p in places]
         deeper = {z: places[next(k for k, h in enumerate(heights) if h < z)] for z in found}
         own = [(z, LayerArea(_own(field, t, z), deeper[z].bare, floor=True)) for z, t in found.items()]
+        if self.loose.any() and (snapshot is None or through in snapshot.floors):  # else a skin stays under them
+            own.append((through, LayerArea(self.loose, floor=True)))
         self.left = sorted([*zip(heights, places, strict=True), *own], key=itemgetter(0), reverse=True)
 
     def _heights(self, ends: Sequence[float], under: float) -> list[float]:
@@ -334,7 +345,7 @@ class _Layers:
     def snapshot(self) -> LayersSnapshot:
         """State of the layers."""
         return LayersSnapshot(self.top, self.swept, self.above, np.array([z for z, p in self.left if not p.floor]),
-                              np.array([z for z, p in self.left if p.floor]))
+                              np.array([z for z, p in self.left if p.floor]), self.loose)
 
     def down_to(self, lowest: float, number: int, sized: SizedWalls, settle: Callable[[], None]) -> list[Workingstep]:
         """The layers from ``lowest`` mm up that were not cut before, as one workingstep.
