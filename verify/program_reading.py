@@ -16,7 +16,7 @@ from verify.program.arc_chords import CHORD
 from verify.progress import Report, silent
 from verify.stepnc.part21 import is_exchange_file
 
-_END = re.compile(r"M0*(?:2|30)(?![0-9.])", re.IGNORECASE)
+_END = re.compile(r"M0*(?:2|30)(?![0-9.])|^\s*%\s*$", re.IGNORECASE)
 MAX_ENDS = 8  # ends within one text that are read through
 BLEND = 0.001  # mm, deviation that G64 may allow; the error bound includes it
 BLEND_SHARE = 0.1  # of the gouge tolerance: allowed instead where that is more

@@ -114,22 +114,22 @@ def machine_move_too_far(rng: Rng) -> Case:
 
 
 def stray_end(rng: Rng) -> Case:
-    """M2 before the last rows: what only they cut is left."""
+    """M2, or a bare %, before the last rows: what only they cut is left."""
     part = choice(rng, "step", "slot", "boss")
     s = PARTS[part].program()
-    cut = len(s.ops) - int(rng.integers(4, 10))
-    s.ops.insert(cut, Op("raw", text="M2"))
+    cut, word = len(s.ops) - int(rng.integers(4, 10)), choice(rng, "M2", "%")
+    s.ops.insert(cut, Op("raw", text=word))
     s.ops.insert(cut, Op("rapid", z=SAFE))
-    return made("stray end", part, s, ("stock_left",), None)
+    return made("stray end", part, s, ("stock_left",), None, what=word)
 
 
 def stray_early_end(rng: Rng) -> Case:
-    """M2 right after the top is faced; levels under it are only cut behind that."""
-    part = choice(rng, "step", "slot", "boss", "rib")
+    """M2, or a bare %, right after the top is faced; levels under it are only cut behind that."""
+    part, word = choice(rng, "step", "slot", "boss", "rib"), choice(rng, "M2", "%")
     s = PARTS[part].program()
     first = next(k for k, op in enumerate(s.ops) if k > 5 and op.kind == "rapid" and op.z == SAFE)
-    s.ops.insert(first + 1, Op("raw", text="M2"))
-    return made("stray early end", part, s, ("stock_left",), None)
+    s.ops.insert(first + 1, Op("raw", text=word))
+    return made("stray early end", part, s, ("stock_left",), None, what=word)
 
 
 def fanuc_dogleg(rng: Rng) -> Case:

@@ -47,6 +47,7 @@ _CLOSES = re.compile(r"%$|(?:\d+\s+)?END PGM\b")  # what may stand behind the en
 _RETURNS = re.compile(r"\bM99\b|\b(?:M17|RET|ENDPROC)\b|\bLBL 0\b|\bENDSUB\b", re.IGNORECASE)
 # what begins another program or a part of one
 _OPENS = re.compile(r"[O:]\s*[0-9<]|%_N_|PROC\b|LBL\b|\d+\s+(?:BEGIN|LBL)\b", re.IGNORECASE)
+CLOSED = 2  # lines with a bare %: the second one ends the file
 REPORT_LINES = 4096  # lines between two reports of progress
 
 
@@ -69,12 +70,12 @@ class Reader(BlockMotion):
             self.control.names = self.names
         begin, seen = self._copy(), bytearray(len(lines) + 2)
         percents = self._scan(_reported(self._blocks(text, lines), len(lines), report), seen)
-        cut_off = self._name_unread(lines, seen) if self.s.ended else 0
+        cut_off = self._name_unread(lines, seen) if self.s.ended or percents == CLOSED else 0
         compensated = self.s.side != 0 and not self.ends_contour
         self._finish()
         self.stop("end of the program")
         self.pause("end of the program", self.s.tool)
-        if not self.s.ended and percents < 2 and not log.errors:
+        if not self.s.ended and percents < CLOSED and not log.errors:
             log.error(f"{log.name} does not end with M2, M30 or a closing %: it may be incomplete", len(lines))
         log.raise_errors()
         if self.s.relative and self.incremental_after_cuts and self.incremental_moved:
@@ -277,7 +278,7 @@ class Reader(BlockMotion):
                 percents += 1
                 if percents == 1 and begun:
                     log.error("a % within a program that does not begin with one")
-                if percents == 2:
+                if percents == CLOSED:
                     break
                 continue
             if text:

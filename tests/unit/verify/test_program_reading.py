@@ -31,6 +31,16 @@ def test_nothing_follows_or_what_follows_cannot_be_read(text, dialect):
     assert both(text, dialect)[1] is None
 
 
+@pytest.mark.parametrize("dialect", ["linuxcnc", "fanuc", "haas"])
+@pytest.mark.parametrize("end", ["M30\n%\n", "M30\n"])
+def test_a_program_is_read_on_through_a_percent_sign_in_its_middle(dialect, end):
+    nc = NcProgram("p", "%\n" + HEAD + "X1.\n%\nX5.\nX9.\n" + end, dialect=dialect)
+    read = read_one(nc, (TOOL,))
+    assert read.cut_off == 9 and any("line 9 ends the program; 3 lines from 10 to 12" in n for n in read.notes)
+    whole = read_on(nc, read, lambda program: read_one(program, (TOOL,)))
+    assert whole.end[-1, 0] == 9.0 and (whole.end[:len(read)] == read.end).all()
+
+
 def test_another_program_of_the_file_is_told_and_not_read_on():
     read, whole = both("X5.\nM30\nO2000\nG0 X9.\nM30\n%\n", "fanuc")
     assert read.cut_off == 0 and whole is None
