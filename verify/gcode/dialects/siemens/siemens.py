@@ -280,8 +280,8 @@ class SiemensReader(SiemensCalls):
         return self._edge(n, line)
 
     def _held(self, letter: str, number: float, line: Line) -> float:
-        """The number of an F or S word; a speed is held to that of G26, but for words that are no speed."""
-        return number if letter == "F" or {4, 25, 26} & set(line.codes) else min(number, self.top_speed)
+        """The number of an F or S word; a speed is held within G25 and G26, but for words that are no speed."""
+        return number if letter == "F" or {4, 25, 26} & set(line.codes) else self.held_speed(number)
 
     def _place(self, letter: str, number: float, kind: str, line: Line) -> None:
         if letter in line.places:

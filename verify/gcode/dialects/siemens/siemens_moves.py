@@ -56,7 +56,7 @@ class SiemensMoves(SiemensCorners):
         self.tolerance: float | None = None
         self.rounding: float | None = None
         self.follows = ""
-        self.top_speed = math.inf  # 1/min, of G26 S
+        self.least_speed, self.top_speed = 0.0, math.inf  # 1/min, of G25 S and G26 S
         self.cycle: DrillingCall | None = None
         self.end = [math.nan] * 3
 
@@ -258,6 +258,10 @@ class SiemensMoves(SiemensCorners):
         radius = 0.5 * abs(end - start) / math.sin(0.5 * angle)
         line.values["CR"] = radius if angle <= math.pi else -radius
 
+    def held_speed(self, speed: float) -> float:
+        """A speed of the spindle within G25 and G26, 1/min; one of 0 stays."""
+        return min(max(speed, self.least_speed), self.top_speed) if speed > 0.0 else speed
+
     def _special(self, line: Line) -> list[str] | None:
         """Blocks whose coordinates mean something else; None for all others."""
         codes = set(line.codes)
@@ -266,9 +270,11 @@ class SiemensMoves(SiemensCorners):
             return self._dwell(line)
         head = [" ".join([*line.out, *self._rates(line)])] if line.out else []
         if codes & {25, 26}:
-            if 26 in codes and "S" in line.values:
-                self.top_speed = line.values["S"]
-                head += [f"S{digits(self.top_speed)}"] if self.machine.s.speed > self.top_speed else []
+            if "S" in line.values:
+                self.least_speed, self.top_speed = ((self.least_speed, line.values["S"]) if 26 in codes
+                                                    else (line.values["S"], self.top_speed))
+                now = self.machine.s.speed
+                head += [f"S{digits(held)}"] if (held := self.held_speed(now)) != now and now > 0.0 else []
             return head
         if pole := codes & {110, 111, 112}:
             if line.values.keys() & {"AP", "RP"}:
