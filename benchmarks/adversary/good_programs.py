@@ -103,6 +103,18 @@ def home_from_work(rng: Rng) -> Case:
     return made("home from work", part, s, setup=_machine(dialect), dialect=dialect, what=dialect)
 
 
+def home_between(rng: Rng) -> Case:
+    """Home in Z between two levels, with the length counted again where the control drops it, and a limited speed."""
+    dialect, part = choice(rng, "fanuc", "haas", "linuxcnc", "siemens"), choice(rng, "step", "slot", "boss", "rib")
+    s = PARTS[part].program()
+    lift = next(k for k, op in enumerate(s.ops) if k > 5 and op.kind == "rapid" and op.z == SAFE)
+    lines = {"linuxcnc": ["G91 G28 Z0", "G90"], "siemens": ["SUPA G0 Z0 D0", "D1", "G25 S500"],
+             "fanuc": [choice(rng, "G91 G28 Z0.", "G53 G0 Z0."), "G90", f"G0 G43 H1 Z{SAFE:g}."],
+             "haas": ["G91 G28 Z0.", "G90", f"G0 G43 H1 Z{SAFE:g}."]}[dialect]
+    s.ops[lift + 1:lift + 1] = [Op("raw", text=line) for line in lines]
+    return made("home between", part, s, setup=_machine(dialect), dialect=dialect, what=dialect)
+
+
 def no_length_moves(rng: Rng) -> Case:
     """Moves to where the tool stands, feeds and rapids, anywhere."""
     part = choice(rng, *PARTS)
@@ -348,6 +360,7 @@ def allowance_kept(rng: Rng) -> Case:
 
 MECHANISMS = {"any dialect": in_any_dialect, "spring pass": spring_pass, "spring wall": spring_wall,
               "lift with rounding": lift_with_rounding, "dwell": dwell, "home from work": home_from_work,
+              "home between": home_between,
               "moves of no length": no_length_moves, "helix entry": helix_entry, "other order": other_order,
               "within tolerance": within_tolerance, "everything stated": everything_stated,
               "ways of writing": both_m_words, "incremental row": incremental, "modal words": modal_words,

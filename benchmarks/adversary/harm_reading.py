@@ -353,6 +353,46 @@ def lengths_that_contradict(rng: Rng) -> Case:
                 what=f"{off} off")
 
 
+def _after_a_level(s: Script, *lines: str) -> Op:
+    """Put lines behind the first lift to the safe height; the next rapid in Z."""
+    lift = next(k for k, op in enumerate(s.ops) if k > 5 and op.kind == "rapid" and op.z == SAFE)
+    down = next(op for op in s.ops[lift + 1:] if op.z is not None)
+    s.ops[lift + 1:lift + 1] = _raw_change(Script(), *lines)
+    return down
+
+
+def length_dropped(rng: Rng) -> Case:
+    """A way home in Z drops the length offset, and Z comes down without G43."""
+    part, dialect = choice(rng, "step", "slot", "boss", "rib"), choice(rng, "fanuc", "haas")
+    way = choice(rng, "G91 G28 Z0.", "G28 G91 Z0.", *(["G53 G0 Z0.", "G91 G30 Z0."] if dialect == "fanuc" else []))
+    s = PARTS[part].program()
+    down = _after_a_level(s, way, "G90")
+    return made("length dropped", part, s, ("program",), [down], None, {"machine": {"dialects": [dialect]}}, dialect,
+                word="drops it", what=f"{dialect} {way}")
+
+
+def pallet_changed(rng: Rng) -> Case:
+    """LinuxCNC changes the pallet before the program has ended: the next levels meet another blank."""
+    part = choice(rng, "step", "slot", "boss", "rib")
+    s = PARTS[part].program()
+    _after_a_level(s, "M60")
+    return made("pallet changed", part, s, ("program",), None, word="M60")
+
+
+def speed_raised(rng: Rng) -> Case:
+    """A least speed of Siemens over what the tool or the machine may turn."""
+    part, least, before = choice(rng, "step", "slot", "boss", "rib"), int(rng.integers(9000, 30000)), rng.random() < 0.5
+    s = PARTS[part].program()
+    if before:
+        s.ops.insert(0, Op("raw", text=f"G25 S{least}"))
+    else:
+        _after_a_level(s, f"G25 S{least}")
+    machine: dict[str, Any] = {"dialects": ["siemens"]}
+    limited = {"machine": {**machine, "max_rpm": 8000}} if rng.random() < 0.5 else {
+        "machine": machine, "tools": [{**FLAT, "max_rpm": 8000}, BALL]}
+    return made("speed raised", part, s, ("limit",), None, None, limited, "siemens", what=str(least))
+
+
 MECHANISMS = {"wrong length offset": wrong_length_offset, "no length offset": no_length_offset,
               "no spindle": no_spindle, "stale length in rapid": stale_length_in_rapid, "shift by G92": shift_by_g92,
               "G92 before G52": fanuc_g92_g52, "no path tolerance": no_path_mode,
@@ -364,4 +404,5 @@ MECHANISMS = {"wrong length offset": wrong_length_offset, "no length offset": no
               "surface speed": surface_speed, "ends in the part": below_at_end, "bends too far": bends_too_far,
               "steep climb": steep_climb, "stands behind taps": stands_behind_taps,
               "other feed by a word": other_feed_by_a_word, "left at M99": left_at_m99,
-              "left in a table": left_in_a_table, "lengths contradict": lengths_that_contradict}
+              "left in a table": left_in_a_table, "lengths contradict": lengths_that_contradict,
+              "length dropped": length_dropped, "pallet changed": pallet_changed, "speed raised": speed_raised}

@@ -196,8 +196,11 @@ class BlockMotion(FrameWords):
         s, remark = self.s, self.log.remark
         if s.tool == 0:
             remark("no_tool", "a feed move without a tool in the spindle (no T and M6 before it)")
+        if self.pallet:
+            remark("pallet", f"a feed move behind M60 of line {self.pallet}, which changes the pallet: another blank "
+                   "is there then; a pause is M0")
         if s.offset is None:
-            remark("offset_off", f"a feed move with the length offset off (no G43 H{s.tool})", s.tool)
+            remark("offset_off", f"a feed move with the length offset off ({self._no_length()})", s.tool)
         elif s.offset != s.tool:
             remark("offset_stale", f"a feed move with length offset H{s.offset} and tool T{s.tool}", (s.offset, s.tool))
         if not s.turning:

@@ -22,7 +22,7 @@ COMPENSATES: frozenset[float] = frozenset({40, 41, 42, 41.1, 42.1})
 TURNS: frozenset[float] = frozenset({68, 51, 51.1, 50.1})
 """Words that turn, scale or mirror the programmed coordinates and take coordinates themselves."""
 IDLE: frozenset[float] = frozenset({8, 97})
-IDLE_M = frozenset({19, 48, 49, 50, 51, 52, 53, 60, 62, 63, 64, 65, 66, 67, 68})
+IDLE_M = frozenset({19, 48, 49, 50, 51, 52, 53, 62, 63, 64, 65, 66, 67, 68})
 """G and M words of LinuxCNC that move nothing: radius mode, speeds, overrides, orientation, inputs and outputs."""
 FURTHER: frozenset[float] = TURNS | {76}
 """Words that LinuxCNC does not have, or has with another meaning; a dialect names those that it has."""
@@ -51,7 +51,7 @@ _WORD = re.compile(rf"([A-Z@^])({NUMBER})")
 _COMMENT = re.compile(r"\([^()]*\)")
 _SCRIPT = re.compile(r"[;(]\s*PY\s*,", re.IGNORECASE)
 _FOREIGN = re.compile(r"[^\t -~]")
-_M_CODES = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 61}) | SAVES
+_M_CODES = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 60, 61}) | SAVES
 _ROTARY = "ABC"
 _TCP_G, _TCP_M = 43.4, frozenset({428, 429})  # tool centre point control: Fanuc's word, LinuxCNC's switch
 _WHOLE = "THLM"
@@ -64,7 +64,7 @@ _G_GROUPS: tuple[frozenset[float], ...] = (
     frozenset({98, 99}), frozenset(WORK_OFFSETS), frozenset({61, 61.1, 64}), COMPENSATES, frozenset({15}),
     frozenset({50}), frozenset({69}), IDLE,
 )
-_M_GROUPS: tuple[frozenset[float], ...] = (frozenset({0, 1, 2, 30}), frozenset({6, 61}), frozenset({3, 4, 5}),
+_M_GROUPS: tuple[frozenset[float], ...] = (frozenset({0, 1, 2, 30, 60}), frozenset({6, 61}), frozenset({3, 4, 5}),
                                            frozenset({7, 8, 9}), _TCP_M, SAVES)
 _G_CODES = frozenset().union(*_G_GROUPS) - {_TCP_G} - FURTHER
 _HINTS = {

@@ -341,6 +341,8 @@ class ContourMotion(Origins):
         was, level = s.position, target[2] == target[2] and s.position[2] != target[2]
         if kind == RAPID and s.offset is None and s.tool > 0 and level:
             target = self._without_length(was, target)
+        elif s.offset is not None and level and self.control is not None and self.control.dropped:
+            self._remark_length()
         s.position = target
         if kind == RAPID and s.offset not in (None, s.tool) and s.tool > 0 and level and not target[2] > was[2]:
             self.log.remark("rapid_stale", f"Z comes down in a rapid with length offset H{s.offset} and tool T{s.tool}",
@@ -368,11 +370,19 @@ class ContourMotion(Origins):
         """
         s, hangs = self.s, self.hangs.get(self.s.tool)
         if hangs is None or s.relative or s.tilted or s.frame is not None or not target[2] - hangs >= was[2]:
-            self.log.remark("rapid_offset", f"Z moves with the length offset off (no G43 H{s.tool})", s.tool)
+            self._remark_length()
             return target
         self.log.note(f"line {self.log.line}: the length offset is off, so the spindle face goes to Z{target[2]:.6g} "
                       f"and the tip of T{s.tool} to Z{target[2] - hangs:.6g}")
         return [target[0], target[1], target[2] - hangs]
+
+    def _no_length(self) -> str:
+        """Why the length offset is off, in words."""
+        dropped = self.control.dropped if self.control is not None else ""
+        return f"no G43 H{self.s.tool}" + (f" behind {dropped}, which drops it" if dropped else "")
+
+    def _remark_length(self) -> None:
+        self.log.remark("rapid_offset", f"Z moves with the length offset off ({self._no_length()})", self.s.tool)
 
     def _leave(self, named: Sequence[bool]) -> None:
         """As in ``Rotary``; the place of the tool is unknown along the same axes."""

@@ -32,6 +32,7 @@ class Modes(ToolChanges):
     register     : number of the latest H word, None before the first
     assumed      : words that the program does not state before its first move
     ends_contour : whether a G40 stands before the first move
+    pallet       : line of the latest change of pallets, 0 before the first
     """
 
     fits = True
@@ -52,6 +53,7 @@ class Modes(ToolChanges):
         self.register: int | None = spindle_tool or None
         self.assumed: tuple[str, ...] = ()
         self.ends_contour = False
+        self.pallet = 0
 
     def _set_modes(self, block: Block) -> None:
         s, values, scale = self.s, block.values, self.s.scale
@@ -128,6 +130,8 @@ class Modes(ToolChanges):
         for m in (0, 1):
             if m in ms:
                 self.pause(f"M{m}", s.tool)
+        if 60 in ms:
+            self.pallet = self.log.line
         if 61 in ms:
             self._settled("M61")
             number = int(values["Q"])

@@ -294,7 +294,8 @@ class Reader(BlockMotion):
         s = self.s
         return (not s.relative and s.scale == 1.0 and s.feed_mode == 94 and s.turning and s.tool > 0
                 and s.offset == s.tool and s.work_offset == self.work_offset and (s.tcp or not s.tilted)
-                and not any(s.origin) and self.actual is None and self._frame() is None and not self.turned
+                and not any(s.origin) and not self.pallet and self.actual is None and self._frame() is None
+                and not self.turned
                 and not any(math.isnan(v) for v in s.position))
 
     def _block(self, text: str) -> None:

@@ -67,6 +67,7 @@ class DialectReader:
     names   : T numbers by the names (ids) of the tools of the setup
     shrinking_pecks : whether I, J, K of G73 and G83 are the first peck, by how much each is shorter, and the shortest
     own_speed : whether a word has made each axis go at its own speed in a rapid
+    dropped : word that has dropped the length offset, other than G49; '' for none
     looks_ahead : most blocks without a move in the plane between two moves of a compensated contour through which the
               control finds the second one
     """
@@ -90,6 +91,7 @@ class DialectReader:
         self.assumed: list[Assumed] = []
         self.unbounded = False
         self._free = False
+        self.dropped = ""
         self.frame: Frame | None = None
         self.zero_names: dict[str, str] = {}
         self.names: Mapping[str, int] = {}

@@ -97,6 +97,7 @@ class FanucReader(FanucPlanes):
         self.hole = False
         self.exact = self.limited = False
         self.synchronous = self.taps = False
+        self.drops = ""
 
     def order(self, lines: Sequence[str], machine: Machine) -> Iterator[tuple[int, str]]:
         """As in the base class; ``verify.gcode.flow.macro_flow`` follows subprograms, macros, jumps and variables."""
@@ -124,6 +125,8 @@ class FanucReader(FanucPlanes):
         BlockError
             The line cannot be read, or could be read in two ways.
         """
+        if self.drops:  # by the line before
+            self.dropped, self.drops = self.drops, ""
         if not self.polar and not self.taps and _PLAIN.fullmatch(raw):
             return [raw]
         text = self._bare(raw)
@@ -174,7 +177,7 @@ class FanucReader(FanucPlanes):
         block = " ".join(out)
         if deleted and not _CHANGES.search(block):
             deleted = False
-        return [*before, *([f"/{block}" if deleted else block] if block else []), *self._after(codes)]
+        return [*before, *([f"/{block}" if deleted else block] if block else []), *self._after(codes, values)]
 
     def _without_data(self, words: list[tuple[str, str]], codes: list[float], device: bool) -> list[tuple[str, str]]:
         """The words of a block without those that are data of a word that moves nothing.
@@ -231,6 +234,8 @@ class FanucReader(FanucPlanes):
                 self.hole = False
             elif 73 <= code <= 89:
                 self.hole = True
+            elif code in (43, 43.4, 43.5, 49):
+                self.dropped = ""
 
     def _bare(self, raw: str) -> str:
         """The line without comments and blanks."""
@@ -335,8 +340,16 @@ class FanucReader(FanucPlanes):
             raise BlockError(f"G10 L{values['L']} ({what}): it is not followed")
         return [f"G{code:g}"]
 
-    def _after(self, codes: list[float]) -> list[str]:
-        """Blocks that follow a block with these G words."""
+    def _after(self, codes: list[float], values: Mapping[str, str]) -> list[str]:
+        """Blocks that follow a block with these G words and values.
+
+        A move in Z to a fixed place of the machine drops the length offset, though G43 stays in force. Only G43 with H
+        brings it back where bit 6 of parameter 5001 is 0 (operator's manual B-63844EN/02, 14.1.2).
+        """
+        away = next((word for word in (28, 30, 53) if word in codes), None)
+        if away is not None and not self.machine.s.tcp_word and (
+                "Z" in values or (away != 53 and values.keys().isdisjoint(_AXES))):
+            self.drops = f"G{away:g}"
         return []
 
 

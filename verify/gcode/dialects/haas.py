@@ -11,6 +11,7 @@ retract. G103 limits how far the control reads ahead, and G102 sends places of a
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 from verify.gcode.dialects.base import BlockError
 from verify.gcode.dialects.fanuc import REFUSED, FanucReader
@@ -104,5 +105,8 @@ class HaasReader(FanucReader):
         stops = any(a == "M" and float(b) in (0.0, 1.0) for a, b in words)
         return [*super()._translated(words, codes, deleted), *(["M5", "M9"] if stops else [])]
 
-    def _after(self, codes: list[float]) -> list[str]:
-        return ["G49"] if 28 in codes and 43 not in codes else []
+    def _after(self, codes: list[float], values: Mapping[str, str]) -> list[str]:
+        if 28 not in codes or 43 in codes:
+            return []
+        self.dropped = "G28"
+        return ["G49"]

@@ -159,6 +159,12 @@ def test_what_a_machine_might_do_otherwise_is_named_on_its_line(body, line, word
     assert [r for r in read(body).remarks if r.line == line and all(w in r.message for w in words)], read(body).remarks
 
 
+def test_a_cut_behind_a_change_of_pallets_is_told():
+    told = [r for r in read("G1 X1 F100\nM60\nG0 Z9\nG1 X2\nX3\n").remarks if "pallet" in r.message]
+    assert [r.line for r in told] == [10] and "M60 of line 8" in told[0].message
+    assert not [r for r in read("G1 X1 F100\nG53 G0 Z0\nM60\n").remarks if "pallet" in r.message]
+
+
 @pytest.mark.parametrize("body", ["G53 G0 X0 Y0 Z0\n", "G53 G0 X5\n", "G28\n"])
 def test_x_and_y_go_to_places_of_the_machine_from_a_known_height(body):
     assert [(s.line, s.tip[2], s.room) for s in read(body).stops if "fixed place" in s.event] == [(7, 10.0, True)]

@@ -191,8 +191,23 @@ def test_without_a_length_the_spindle_face_goes_to_the_height(dialect):
 
 
 def test_a_place_of_the_machine_needs_no_g0_on_these_controls():
-    p = read("G1 X1. F100.\nG53 Z0.\nG0 X5.\nZ5.\n")
+    p = read("G1 X1. F100.\nG53 Z0.\nG0 X5.\nG43 H1 Z5.\n")
     assert p.remarks == () and p.end[-1].tolist() == [5, 0, 5]
+
+
+@pytest.mark.parametrize(("dialect", "way", "kept"), [
+    ("fanuc", "G91 G28 Z0.\nG90\n", False), ("fanuc", "G28 G91 Z0.\nG90\n", False), ("fanuc", "G53 G0 Z0.\n", False),
+    ("fanuc", "G91 G30 Z0.\nG90\n", False), ("fanuc", "G91 G28 Z0.\nG90\nG28 X0.\n", False),
+    ("fanuc", "G0 Z50.\nG91 G28 X0. Y0.\nG90\n", True), ("fanuc", "G0 Z50.\nG53 G0 X0. Y0.\n", True),
+    ("haas", "G91 G28 Z0.\nG90\n", False), ("haas", "G53 G0 Z0.\n", True)])
+def test_a_way_home_in_z_drops_the_length_until_g43_with_h(dialect, way, kept):
+    """Operator's manuals: Fanuc 0i-MB 14.1.2 (G28, G30 and G53 in the axis of the length), Haas (G28)."""
+    body = "G1 X1. F100.\n" + way
+    for after in ("G0 X5. Y5.\nZ5.\n", "G0 X5. Y5.\nG1 Z5. F100.\n"):
+        told = [r.message for r in read(body + after, dialect).remarks]
+        assert any("length offset off (no G43 H1 behind G" in m for m in told) != kept, told
+    for after in ("G0 X5. Y5.\nG43 H1 Z5.\nZ4.\n", "G43 H1\nG0 X5. Y5.\nZ5.\n", "G0 X5. Y5.\n"):
+        assert not any("length" in r.message for r in read(body + after, dialect).remarks)
 
 
 @pytest.mark.parametrize(("dialect", "body", "words"), [
