@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.adversary.adversary_case import SAFE, Case, Op, Script, made
-from benchmarks.adversary.adversary_parts import BALL, FLAT, HALF
-from benchmarks.adversary.harm_surface import base
+from benchmarks.adversary.adversary_parts import BALL, FLAT, HALF, PARTS
+from benchmarks.adversary.harm_surface import base, choice
 
 Rng = np.random.Generator
 TOP, BOTTOM, SPEED = 10.0, 1.0, 1500
@@ -120,5 +120,15 @@ def tap_fed_out(rng: Rng) -> Case:
                 word="fed out", what=f"{diameter} x {pitch}")
 
 
+def thread_mill_on_walls(rng: Rng) -> Case:
+    """A thread mill where an end mill is meant: its teeth leave grooves in every wall that it runs along."""
+    part = choice(rng, "boss", "pocket", "step", "slot", "rib")
+    stated = {"pitch_mm": float(choice(rng, "0.5", "0.8", "1.0"))} if rng.random() < 0.5 else {}
+    tools = [{**FLAT, "kind": "thread_mill", **stated}, BALL]
+    return made("thread mill on walls", part, PARTS[part].program(), ("program",), None, None, {"tools": tools},
+                word="without the rise of a thread", what=str(stated))
+
+
 MECHANISMS = {"flutes shut in": flutes_shut_in, "one lip": one_lip, "drill too fast": drill_too_fast,
-              "drill buckles": drill_buckles, "narrow tap hole": narrow_tap_hole, "tap fed out": tap_fed_out}
+              "drill buckles": drill_buckles, "narrow tap hole": narrow_tap_hole, "tap fed out": tap_fed_out,
+              "thread mill on walls": thread_mill_on_walls}

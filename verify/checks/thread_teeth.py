@@ -41,6 +41,7 @@ SHARP = math.radians(75.0)  # a corner that is no part of a helix
 HEIGHTS = 0.25  # radii between the places on the axis from which a wall is looked for
 PLACES = 256  # at most, along one axis and along one move
 ROUND = 32  # directions in which a wall is looked for where a floor is nearer
+GROOVE = 0.75  # of a turn, without the rise of a thread, along a wall
 HELIX = 256  # moves on helices that are looked at for the pitch
 FULL = 2.0 * math.pi
 SAME = 1e-6  # mm
@@ -97,8 +98,9 @@ def drawn_thread_mills(moves: Moves, cut: NDArray[np.bool_], tools: Sequence[Too
     cut : (m,) bool, whether each move removes stock; slack : mm, farther from the part a tooth does not touch it
     pitches : mm by T number, as the tools state them
 
-    A thread mill whose helices have another pitch than it states is a finding too. The depth of a finding is the way
-    along the axis in the wall, or the pitch of the helices, mm.
+    A thread mill whose helices have another pitch than it states is a finding too, and one that runs along a wall
+    without the rise of a thread. The depth of a finding is the way along the axis in the wall, the pitch of the
+    helices, or the way along the wall, mm.
 
     Notes
     -----
@@ -123,6 +125,10 @@ def drawn_thread_mills(moves: Moves, cut: NDArray[np.bool_], tools: Sequence[Too
                     found.extend(one_a_line(rows[[at]], np.full(len(moves), measured), moves.start, source,
                                             partial(_off_pitch, tool.number, pitch, measured)))
                 found.extend(_off_phase(whole, rows, cut, tool, pitches, touches, moves, source))
+                level = np.zeros(len(moves))
+                level[rows] = _grooves(whole, tool.radius, pitch, touches)
+                found.extend(one_a_line(np.flatnonzero(level), level, moves.start, source,
+                                        partial(_groove_words, tool.number, level)))
                 way, of = whole.parted(pitch)
                 torn = _ToothWay(way, cut[rows][of], tool, (over.min(), over.max()), touches, pitch).torn()
                 np.maximum.at(depth, rows[of], torn)
@@ -157,6 +163,11 @@ def _off_phase(way: _Way, rows: NDArray[np.intp], cut: NDArray[np.bool_], tool: 
         f"T{tool.number} mills a thread {depth[m]:.3f} mm out of phase with the thread that it has milled there: its "
         "teeth cut the crests off" if depth[m] else
         f"T{tool.number} mills a thread of the other hand over the thread that it has milled there"))
+
+
+def _groove_words(number: int, way: F64, m: int) -> str:
+    return (f"T{number} is a thread mill and goes {way[m]:.3f} mm along a wall without the rise of a thread: its teeth "
+            "leave grooves there")
 
 
 def _words(number: int, depth: F64, m: int) -> str:
@@ -311,6 +322,38 @@ class _ToothWay:
         return out
 
 
+def _grooves(way: _Way, radius: float, pitch: float, touches: Callable[[F64], NDArray[np.bool_]]) -> F64:
+    """(m,) float64, mm along a wall without the rise of a thread, at the moves with which it becomes too much; else 0.
+
+    radius, pitch : mm, of the teeth; touches : as in ``_ToothWay``
+
+    Leads in and out touch the wall on a part of their way. More than a radius, or than ``GROOVE``, is a groove. Rise
+    and turn are those of half a radius of way, as the corners of fine chords are rounded.
+    """
+    out, turned = np.zeros(len(way.feed)), np.zeros(len(way.feed))
+    level = np.zeros(len(way.feed), np.bool_)
+    goes = way.feed & (way.aside > SAME)
+    for first, last in zip(*_runs(goes, _smooth(way, goes)), strict=True):
+        inner = way.corner[first:last - 1]
+        turned[first:last] = 0.5 * (np.r_[inner, 0.0] + np.r_[0.0, inner])
+        at, high, angle = (np.r_[0.0, np.cumsum(v[first:last])] for v in (way.aside, way.rise, turned))
+        ends = [0.5 * (at[1:] + at[:-1]) + side * HEIGHTS * radius for side in (-1.0, 1.0)]
+        rise, turn = (np.abs(np.interp(ends[1], at, v) - np.interp(ends[0], at, v)) for v in (high, angle))
+        level[first:last] = rise <= np.maximum(0.5 * pitch * turn / FULL, SAME)
+    counts = np.where(level, np.ceil(way.aside / (HEIGHTS * radius)), 0.0).clip(0, PLACES).astype(np.int64)
+    of = np.repeat(np.arange(len(level)), counts)
+    share = (np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts) + 0.5) / np.repeat(counts, counts)
+    beside = touches(way.start[of] + share[:, None] * (way.end[of] - way.start[of]))
+    shares = np.bincount(of[beside], minlength=len(level)) / np.maximum(counts, 1)
+    along = shares > 0.0
+    for first, last in zip(*_runs(along, along[1:] & along[:-1] & way.joined[1:]), strict=True):
+        length, turn = ((shares * v)[first:last] for v in (way.aside, turned))
+        over = (np.cumsum(length) > radius) | (np.abs(np.cumsum(turn)) > GROOVE * FULL)
+        if over.any():
+            out[first + int(np.argmax(over))] = float(length.sum())
+    return out
+
+
 def _touches(tree: TriangleTree, axis: F64, tool: ToolBody, slack: float, tips: F64) -> NDArray[np.bool_]:
     """``teeth_touch`` of a tool whose axis is ``axis`` (3,)."""
     return teeth_touch(tree, tips, np.tile(axis, (len(tips), 1)), tool.radius, tool.flute_length, slack)
@@ -351,10 +394,14 @@ def _pitch_of(way: _Way, cut: NDArray[np.bool_], diameter: float,
 def _helices(way: _Way) -> Iterator[tuple[int, int]]:
     """First and one past the last of each run of moves that turns by half a turn or more without a sharp corner."""
     corner, goes = way.corner, way.feed & (way.aside > SAME)
-    linked = goes[1:] & goes[:-1] & way.joined[1:] & (np.abs(corner) < SHARP)
-    for first, last in zip(*_runs(goes, linked), strict=True):
+    for first, last in zip(*_runs(goes, _smooth(way, goes)), strict=True):
         if last - first >= 3 and abs(corner[first:last - 1].sum()) >= 0.5 * FULL:
             yield first, last
+
+
+def _smooth(way: _Way, goes: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(m - 1,) bool: moves that go (m,), joined to the next one without a sharp corner."""
+    return np.asarray(goes[1:] & goes[:-1] & way.joined[1:] & (np.abs(way.corner) < SHARP))
 
 
 def _runs(goes: NDArray[np.bool_], linked: NDArray[np.bool_]) -> tuple[list[int], list[int]]:

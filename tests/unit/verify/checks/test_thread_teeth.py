@@ -210,3 +210,42 @@ def test_a_lead_in_on_an_arc_has_no_phase():
 
     assert not found([DOWN[0], *with_lead(2.0), *with_lead(2.0 + PITCH)], pitch=PITCH)
     assert len(found([DOWN[0], *with_lead(2.0), *with_lead(2.0 + 0.5 * PITCH)], pitch=PITCH)) == 1
+
+
+def plane(x, long=20.0):
+    """An upright wall at ``x``, from y -long / 2 to long / 2 and z 0 to ``HIGH``."""
+    points = np.array([[x, y, z] for y in (-0.5 * long, 0.5 * long) for z in (0.0, HIGH)])
+    return TriangleTree(TriangleMesh(points, np.array([[0, 1, 2], [1, 3, 2]], np.int32), np.ones(2, np.int32)))
+
+
+@pytest.mark.parametrize("pitch", [None, PITCH])
+@pytest.mark.parametrize("pieces", [60, 20])
+@pytest.mark.parametrize("rise", [0.0, 0.3 * PITCH, -0.3 * PITCH])
+def test_a_turn_without_the_rise_of_a_thread_is_a_groove(rise, pieces, pitch):
+    tips = [*IN, *helix(ORBIT, 1.0, 2.0, rise, pieces=pieces), (0, 0, 2.0 + rise), (0, 0, 15)]
+    way = found(tips, pitch=PITCH if rise else pitch)
+    assert min(way) > 2 and max(way.values()) > 0.7 * 2.0 * math.pi * ORBIT
+
+
+@pytest.mark.parametrize("turns", [0.25, 0.5, 0.6])
+def test_a_lead_along_the_wall_is_no_groove(turns):
+    way = helix(ORBIT, turns, 2.0, 0.0)
+    assert not found([*IN, *way, (0, 0, 2), (0, 0, 15)], pitch=PITCH)
+
+
+@pytest.mark.parametrize("pieces", [60, 300, 1000])
+def test_a_helix_of_fine_chords_rounded_to_a_micrometre_is_no_groove(pieces):
+    way = np.round(helix(ORBIT, 3.0, 2.0, pieces=pieces), 3)
+    assert not found([*IN, *map(tuple, way), (0, 0, 4.4), (0, 0, 15)], pitch=PITCH)
+
+
+@pytest.mark.parametrize(("way", "groove"), [(1.5, False), (2.5, True), (30.0, True)])
+@pytest.mark.parametrize("pieces", [1, 7, 40])
+def test_a_straight_way_along_a_flat_wall_is_a_groove(way, groove, pieces):
+    """The tool, of radius 2, goes beside a wall at x = 2; a gap of 0.02 is within the slack."""
+    y = np.linspace(-0.5 * way, 0.5 * way, pieces + 1)
+    tips = [(-9, y[0], 15), (-9, y[0], 2), *((-0.02, k, 2.0) for k in y), (-9, y[-1], 2), (-9, y[-1], 15)]
+    depths = found(tips, feed=(1, 2), tree=plane(2.0))
+    assert bool(depths) == groove
+    if groove:
+        assert 2.0 < depths[max(depths)] <= min(way, 20.0) + 1.0
