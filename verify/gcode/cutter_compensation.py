@@ -16,7 +16,8 @@ An arc of radius R that turns by w (1 counterclockwise, -1 clockwise) gets the r
 At a corner the direction turns by phi = s arg(tB / tA):
 
 - phi above ``Style.tangent`` is an inside corner: both offsets end at their intersection. An element too short for it
-  cannot be followed, nor can an inside arc with R <= r.
+  cannot be followed, nor can an inside arc with R < r. One with R = r, the fillet that the tool itself leaves, is a
+  point of the path between tangent neighbours (LinuxCNC refuses it).
 - phi below its negative is an outside corner: an arc about the corner (``Corner.ARC``), straight on along both tangents
   by e = r min(tan(|phi| / 2), 1) with a straight line between (``EXTENDED``), or by r tan(|phi| / 2) up to a turn of
   100 deg and an arc beyond (``INTERSECTION``).
@@ -39,6 +40,7 @@ SHARPEST = math.radians(100.0)
 """rad, the largest turn that ``Corner.INTERSECTION`` rounds by straight lines."""
 _SAME = 1e-9  # mm
 _FIT = 1e-6  # mm, by which a trimmed element may be too short
+_POINT = 1e-3  # mm, by which an inside arc may be smaller than the tool that leaves it: the steps of programs
 
 
 class Corner(Enum):
@@ -65,6 +67,7 @@ class Style:
     longer   : whether the first move must be longer than the radius
     arc_first : whether the first move may be an arc
     holds    : whether, after the end of compensation, moves along the third axis keep the place in the plane
+    fillets  : whether an inside arc may have the radius of the tool
     """
 
     corner: Corner
@@ -73,9 +76,11 @@ class Style:
     longer: bool = False
     arc_first: bool = False
     holds: bool = True
+    fillets: bool = True
 
 
-LINUXCNC_STYLE = Style(Corner.ARC, Approach.OWN_NORMAL, 0.05, longer=True, arc_first=True, holds=False)
+LINUXCNC_STYLE = Style(Corner.ARC, Approach.OWN_NORMAL, 0.05, longer=True, arc_first=True, holds=False,
+                       fillets=False)
 """LinuxCNC."""
 FANUC_STYLE = Style(Corner.EXTENDED, Approach.NEXT_NORMAL)
 """Fanuc and Haas, approach of type A."""
@@ -154,6 +159,7 @@ class _Offset:
     centre, sweep : of the offset arc
     cut    : mm of a line, rad of an arc, that the inside corner before it takes away
     first  : whether it leads onto the contour
+    point  : whether it is an inside arc of the radius of the tool, whose centre stays at one place
     """
 
     element: Element
@@ -165,6 +171,7 @@ class _Offset:
     first: bool = False
     cut: float = 0.0
     open_end: bool = False
+    point: bool = False
     waiting: list[object] = field(default_factory=list)
 
     @property
@@ -234,7 +241,7 @@ class Contour:
         if last is None:
             self._last = self._first(element, style)
             return
-        offset = self._offset(element)
+        offset = self._offset(element, style)
         if last.element.turn == 0 and last.first and style.approach is Approach.NEXT_NORMAL:
             yield from self._settle(offset.begun)
         else:
@@ -266,14 +273,14 @@ class Contour:
             raise CompensationError(f"the move that begins cutter radius compensation is {span:.4f} mm long; it must "
                                     f"be longer than the radius of the tool, {self.radius:g} mm")
         if element.turn:
-            return self._first_arc(element)
-        offset = self._offset(element)
+            return self._first_arc(element, style)
+        offset = self._offset(element, style)
         offset.start, offset.first, offset.open_end = self.at, True, True
         return offset
 
-    def _first_arc(self, element: Element) -> _Offset:
+    def _first_arc(self, element: Element, style: Style) -> _Offset:
         """The arc from where the tool stands that ends on the offset of ``element`` with its tangent."""
-        whole = self._offset(element)
+        whole = self._offset(element, style)
         normal, chord = 1j * element.tangent(True), self.at - whole.done
         across = (chord * normal.conjugate()).real
         if abs(across) < _SAME:
@@ -284,14 +291,16 @@ class Contour:
         sweep = turn * (turn * cmath.phase((whole.done - centre) / (self.at - centre)) % math.tau)
         return _Offset(element, self.at, self.at, whole.done, centre, sweep, first=True)
 
-    def _offset(self, element: Element) -> _Offset:
+    def _offset(self, element: Element, style: Style) -> _Offset:
         shift = 1j * self.side * self.radius
         begun = element.start + shift * element.tangent(False)
         done = element.end + shift * element.tangent(True)
-        if self.side * element.turn > 0 and element.radius <= self.radius:
+        inside, room = self.side * element.turn > 0, element.radius - self.radius
+        point = inside and style.fillets and -_POINT <= room <= _FIT
+        if inside and room <= 0 and not point:
             raise CompensationError(f"the inside arc of radius {element.radius:g} mm is not larger than the radius of "
                                     f"the tool, {self.radius:g} mm", "use a smaller tool, or a larger arc")
-        return _Offset(element, begun, begun, done, element.centre, element.sweep)
+        return _Offset(element, begun, begun, done, element.centre, element.sweep, point=point)
 
     def _corner(self, last: _Offset, offset: _Offset, style: Style) -> Iterator[Piece | object]:
         """The corner between two elements; afterwards the tool stands where ``offset`` begins."""
@@ -301,6 +310,11 @@ class Contour:
         bow = offset.element.turn or last.element.turn
         if abs(phi) <= style.tangent:
             yield from self._settle(last.done)
+        elif last.point or offset.point:
+            arc = (last if last.point else offset).element
+            raise CompensationError(f"the inside arc of radius {arc.radius:g} mm is not larger than the radius of the "
+                                    f"tool, {self.radius:g} mm, and an element next to it is not tangent",
+                                    "use a smaller tool, or a larger arc")
         elif self.side * bow < 0 if back else phi > 0:
             place = self._meeting(last, offset, phi)
             offset.cut = max(offset.ahead(place), 0.0)
@@ -343,7 +357,10 @@ class Contour:
             self._too_short(last)
         sweep = last.sweep - math.copysign(last.cut + cut, last.sweep) if last.centre is not None else 0.0
         self.at, self._last = end, None
-        yield Piece(last.start, end, last.centre, sweep, last.element)
+        if last.point:
+            yield Piece(last.start, end, None, 0.0, last.element)
+        else:
+            yield Piece(last.start, end, last.centre, sweep, last.element)
         yield from last.waiting
 
     def _meeting(self, last: _Offset, offset: _Offset, phi: float) -> complex:

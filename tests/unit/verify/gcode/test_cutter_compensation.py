@@ -75,6 +75,34 @@ def test_the_intersection_of_g451_turns_into_an_arc_where_it_gets_too_sharp():
             assert max(p.end.real for p in pieces) == pytest.approx(10 + reach, abs=1e-9)
 
 
+FILLET = "{} D10 X0. Y0. F800.\nX40.\nY15.\n{}\nG1 X10.\nG40 X-30.\n"
+
+
+@pytest.mark.parametrize("arc", ["G3 X35. Y20. R5.", "G3 X35. Y20. I-4.9995"])
+def test_a_fillet_of_the_radius_of_the_tool_is_a_place(arc):
+    """A pocket of corners R5 milled by a tool of 10 mm: the centre stands where the offsets of both walls meet."""
+    np.testing.assert_allclose(ends(read(FILLET.format("G41", arc))), [[0, 5], [35, 5], [35, 15], [35, 15], [10, 15],
+                                                                       [-30, 20]], atol=6e-4)
+
+
+def test_a_whole_turn_of_the_radius_of_the_tool_goes_straight_down():
+    found = read("G41 D10 X5. Y0. F800.\nG3 X5. Y0. I-5. Z-4.\nG1 Y1.\nG40 X-30.\n")
+    np.testing.assert_allclose(found.end[found.line == 8], [[0, 0, -4]], atol=1e-9)
+
+
+@pytest.mark.parametrize("body, reason", [
+    (FILLET.format("G41", "G3 X35. Y20. I-4.998"), "inside arc of radius 4.998 mm"),
+    (FILLET.format("G41", "G3 X35. Y20. R5.").replace("X10.", "X10. Y40."), "next to it is not tangent")])
+def test_a_smaller_fillet_and_one_with_a_corner_are_refused(body, reason):
+    with pytest.raises(ProgramError, match=reason):
+        read(body)
+
+
+def test_linuxcnc_refuses_a_fillet_of_the_radius_of_the_tool():
+    with pytest.raises(ProgramError, match="inside arc of radius 5 mm"):
+        read(FILLET.format("G41", "G3 X35. Y20. R5."), "linuxcnc")
+
+
 def test_arcs_keep_their_centre():
     """A quarter inside and outside; the start of the next element is tangent."""
     found = read("G42 D10 X0. Y0. F800.\nX10.\nG3 X30. Y20. J20.\nG1 Y40.\nG40 X60.\n")
