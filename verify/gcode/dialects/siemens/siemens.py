@@ -467,7 +467,7 @@ class SiemensReader(SiemensCalls):
         if name == "CYCLE800":
             line.after += self.swivelled(parts, self._number)
         elif name in ENVELOPES:
-            self._drill(DrillingCall(name, tuple(self._number(p) if p else None for p in parts)), line)
+            self._drill(DrillingCall(name, tuple(self._values(name, parts))), line)
         elif name == "FGROUP" and parts != [""] and not {"X", "Y", "Z"} <= {p.strip() for p in parts}:
             raise BlockError("FGROUP( ) without X, Y and Z: F does not count along the whole path",
                              "name X, Y and Z in it")
@@ -475,7 +475,7 @@ class SiemensReader(SiemensCalls):
             raise BlockError(f"SETMS({','.join(parts)[:20]}): another spindle becomes the master, and S and M3 turn "
                              "that one")
         elif name in ("HOLES1", "HOLES2"):
-            self._row(name, [self._number(p) if p else None for p in parts], line)
+            self._row(name, self._values(name, parts), line)
         elif name == "CYCLE832":
             line.out += self._tolerant(parts)
         elif name in NOT_FOLLOWED:

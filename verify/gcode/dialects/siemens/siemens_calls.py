@@ -9,13 +9,14 @@ from dataclasses import replace
 
 from verify.gcode.dialects.base import NUMBER, BlockError
 from verify.gcode.dialects.orientation import needed
-from verify.gcode.dialects.siemens.siemens_cycles import DrillingCall, drilling_blocks, row_of_holes
+from verify.gcode.dialects.siemens.siemens_cycles import TEXTS, DrillingCall, drilling_blocks, row_of_holes
 from verify.gcode.dialects.siemens.siemens_expressions import ValueReader, Variables
 from verify.gcode.dialects.siemens.siemens_moves import Line, SiemensMoves
 from verify.gcode.dialects.siemens.siemens_swivel import is_number
 from verify.gcode.dialects.stated_places import digits, level
 from verify.program.arc_chords import PLANE_AXES
 
+_TEXT = re.compile(r'"([^"]*)"')
 SMALL = 0.01
 """deg, deviation of a tool axis that needs no note: 0.01 mm at 57 mm above the tip."""
 
@@ -40,6 +41,16 @@ class SiemensCalls(SiemensMoves):
         if text[reader.at:].strip():
             raise BlockError(f"cannot read the value '{text[:40]}'")
         return number
+
+    def _values(self, name: str, parts: Sequence[str]) -> list[float | None]:
+        """The values of a call, None where one is left out or is a text that changes no move."""
+        out: list[float | None] = []
+        for k, part in enumerate(parts):
+            text = k in TEXTS.get(name, ()) and _TEXT.fullmatch(part.strip())
+            if text and text[1] and name.startswith("HOLES"):
+                raise BlockError(f"{name} with hidden holes is not followed")
+            out.append(self._number(part) if part and not text else None)
+        return out
 
     def _drill(self, call: DrillingCall, line: Line) -> None:
         self.uncompensated(call.name)

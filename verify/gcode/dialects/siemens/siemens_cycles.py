@@ -21,6 +21,8 @@ _DIRECTION = {"CYCLE86": 6, "CYCLE87": 5, "CYCLE88": 6}
 """Place of the direction of rotation (SDIR) of the cycles that bore and leave the spindle standing."""
 _AFTERWARDS = {"CYCLE84": 6, "CYCLE840": 7}
 """Place of the direction of rotation after the cycle (SDAC)."""
+TEXTS = {"CYCLE84": range(18, 21), "CYCLE840": range(14, 17), "HOLES1": range(8, 9), "HOLES2": range(8, 9)}
+"""Places of texts: the thread of a table (_PITM, _PTAB, _PTABA), whose pitch stands in PIT too, and hidden holes."""
 
 
 @dataclass(frozen=True)
@@ -177,14 +179,20 @@ def _pitch(call: DrillingCall, at: int) -> float | None:
 def row_of_holes(name: str, values: Arguments) -> list[tuple[float, float]]:
     """Places of HOLES1 (a row) or HOLES2 (a circle), along the axes of the plane, in units of the program.
 
+    values : in the order of the manual; from the seventh on those that the editor of the control adds
+
     Raises
     ------
     BlockError
-        A value is missing, or the number of holes is none.
+        A value is missing or cannot be followed, or the number of holes is none.
     """
-    if len(values) != 6 or any(v is None for v in values[:6 if name == "HOLES1" else 4]) or values[5] is None:
+    if not 6 <= len(values) <= 11 or any(v is None for v in values[:6 if name == "HOLES1" else 4]) or (
+            values[5] is None):
         raise BlockError(f"{name} needs its 6 values")
-    a, b, c, d, e, n = (v or 0.0 for v in values)
+    a, b, c, d, e, n = (v or 0.0 for v in values[:6])
+    e = _step_of_holes(name, values[6] or 0.0, e) if len(values) > 6 else e
+    if any(values[7:8]):
+        raise BlockError(f"{name} with an eighth value (_UMODE) is not followed")
     if n != int(n) or not 1 <= n <= 10_000:
         raise BlockError(f"{name}: {n:g} is not a number of holes")
     count = int(n)
@@ -196,4 +204,14 @@ def row_of_holes(name: str, values: Arguments) -> list[tuple[float, float]]:
             for k in range(count)]
 
 
-__all__ = ["DrillingCall", "drilling_blocks", "row_of_holes"]
+def _step_of_holes(name: str, kind: float, step: float) -> float:
+    """The step (INDA) of HOLES2 under its kind (_VARI), 0 for a full circle; that of HOLES1 unchanged."""
+    whole = {0.0: step, 1000.0: 0.0, 2000.0: step} if name == "HOLES2" else {0.0: step}
+    if kind in (10.0, 1010.0, 2010.0) and name == "HOLES2":
+        raise BlockError("HOLES2 that goes from hole to hole along an arc is not followed")
+    if kind not in whole or (kind == 2000.0 and not step):
+        raise BlockError(f"{name} of the kind {kind:g} (_VARI) is not followed")
+    return whole[kind]
+
+
+__all__ = ["TEXTS", "DrillingCall", "drilling_blocks", "row_of_holes"]

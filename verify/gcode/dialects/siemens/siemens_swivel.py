@@ -127,8 +127,9 @@ class SiemensFrames(OrientedMoves):
             self._reframe()
             return out
         call = f"CYCLE800({','.join(parts)})"[:60]
-        if not 15 <= len(parts) <= 16 or parts[15:] not in ([], [""], ["0"], ["1"]):
-            raise BlockError(f"{call} needs its 15 arguments as plain numbers, the second a name")
+        if not 14 <= len(parts) <= 16 or parts[15:] not in ([], [""], ["0"], ["1"]):
+            raise BlockError(f"{call} needs its 15 arguments as plain numbers, the second a name; the last may "
+                             "be left out")
         retract, state, mode = (number(parts[k] or "0") for k in (0, 2, 3))
         before, angles, after = ([number(v or "0") for v in parts[k:k + 3]] for k in (4, 7, 10))
         direction = number(parts[13] or "0")

@@ -410,3 +410,41 @@ def test_no_corner_next_to_a_move_that_leaves_the_plane(lines, plain, corners):
 
 def test_smoothing_of_the_tool_axis_moves_nothing():
     assert not read("ORISON\nG1 X3\nORISOF", "siemens").remarks
+
+
+def test_cycle800_without_its_last_argument():
+    """As older controls have it, without the retract along the tool."""
+    body = 'CYCLE800(1,"TC1",100000,57,0,0,0,20,30,0,0,0,0,-1{})\nG0 X10 Y20\nZ30\nG1 Z-2\nG0 G53 Z0\nCYCLE800()'
+    both = [read(body.format(last), "siemens", "table-table-AC") for last in ("", ",0,1")]
+    assert apart(*both) == 0.0
+
+
+@pytest.mark.parametrize(("edited", "plain"), [
+    ('CYCLE84(5,0,2,-10,,0,5,,1.25,0,200,200,0,1,0,0,5,1.4,,"ISO_METRIC","M8",,1001,1002)',
+     "CYCLE84(5,0,2,-10,,0,5,,1.25,0,200,200)"),
+    ('CYCLE840(5,0,2,-10,,0,4,3,0,,1.25,0,1,0,"","ISO_METRIC","M8",,1,1002)',
+     "CYCLE840(5,0,2,-10,,0,4,3,0,,1.25)"),
+    ("MCALL CYCLE81(5,0,2,-4)\nHOLES1(1,2,30,5,10,3,0,0,,,1)\nMCALL",
+     "MCALL CYCLE81(5,0,2,-4)\nHOLES1(1,2,30,5,10,3)\nMCALL"),
+    # 1000 is a full circle, whatever INDA; 2000 a part of one, in steps of INDA
+    ("MCALL CYCLE81(5,0,2,-4)\nHOLES2(1,2,10,30,45,4,1000,0,,,1)\nMCALL",
+     "MCALL CYCLE81(5,0,2,-4)\nHOLES2(1,2,10,30,90,4)\nMCALL"),
+    ('MCALL CYCLE81(5,0,2,-4)\nHOLES2(1,2,10,30,45,4,2000,0,"",,1)\nMCALL',
+     "MCALL CYCLE81(5,0,2,-4)\nHOLES2(1,2,10,30,45,4)\nMCALL")])
+def test_values_that_the_editor_of_the_control_adds_change_no_move(edited, plain):
+    first, second = (read(f"S900 M3\n{c}\nM3\nG1 X0 F100", "siemens") for c in (edited, plain))
+    assert apart(first, second) < 1e-9
+
+
+@pytest.mark.parametrize(("call", "said"), [
+    ("HOLES2(0,0,10,0,45,4,1010,0,,,1)", "along an arc"), ('HOLES2(0,0,10,0,0,4,1000,0,"0100",,1)', "hidden holes"),
+    ("HOLES2(0,0,10,0,0,4,2000)", "kind 2000"), ("HOLES1(0,0,0,5,10,3,1000)", "kind 1000"),
+    ("HOLES1(0,0,0,5,10,3,0,1)", "eighth value")])
+def test_rows_of_holes_in_other_ways_are_refused(call, said):
+    with pytest.raises(ProgramError, match=said):
+        read(f"S900 M3\nMCALL CYCLE81(5,0,2,-4)\n{call}\nMCALL", "siemens")
+
+
+def test_a_text_in_the_place_of_a_depth_is_refused():
+    with pytest.raises(ProgramError, match="where a number is needed"):
+        read('S900 M3\nCYCLE84(5,0,2,"A",,0,5,,1.25,0,200,200)', "siemens")
