@@ -160,6 +160,7 @@ class Modes(ToolChanges):
     def _mode(self, g: float, values: dict[str, float]) -> None:
         """Apply one G word that sets a state."""
         s = self.s
+        again = g in self.stated
         self.stated.add(g)
         if g in MOTION_CODES:
             self._motion(g)
@@ -178,8 +179,9 @@ class Modes(ToolChanges):
         elif g in (90.1, 91.1):
             s.centre_absolute = g == 90.1
         elif g in (93, 94, 95):
+            if self.fits or not again or g != s.feed_mode:  # LinuxCNC drops F with each of them, others at a change
+                s.feed = NAN
             s.feed_mode = int(g)
-            s.feed = NAN
         elif g in (98, 99):
             s.retract_to_r = g == 99
         elif g in (43, 43.4, 49):

@@ -146,7 +146,8 @@ class FanucReader(FanucPlanes):
         words = [(a, b) for a, b in words if not (a == "M" and self._idle_m(b))]
         codes = [float(b) for a, b in words if a == "G"]
         self._follow(codes)
-        words = self._without_data(words, codes, len(words) < count)
+        oriented = any(a == "M" and float(b) == ORIENTS for a, b in words)
+        words = self._without_data(words, codes, oriented or len(words) < count)
         for letter, digits in words:
             self._check(letter, digits)
         if len(ms := [b for a, b in words if a == "M"]) > 1:
@@ -182,7 +183,8 @@ class FanucReader(FanucPlanes):
     def _without_data(self, words: list[tuple[str, str]], codes: list[float], device: bool) -> list[tuple[str, str]]:
         """The words of a block without those that are data of a word that moves nothing.
 
-        device : whether the block has an M word of the machine, which may take P, and others where nothing else does
+        device : whether the block has an M word of the machine, or M19 with its angle, which may take P, and others
+            where nothing else does
 
         Raises
         ------

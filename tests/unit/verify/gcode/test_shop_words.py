@@ -363,7 +363,8 @@ def test_the_spindle_stands_after_a_stop_of_haas(dialect, stands, word):
 
 
 @pytest.mark.parametrize(("dialect", "word"), [("fanuc", "M19"), ("haas", "M19"), ("haas", "M19 P90"),
-                                               ("haas", "M19 R90."), ("linuxcnc", "M19 R0")])
+                                               ("haas", "M19 R90."), ("haas", "M19 R90"),
+                                               ("fanuc", "M19 R90"), ("linuxcnc", "M19 R0")])
 def test_a_spindle_that_takes_an_angle_stands(dialect, word):
     for again in ("", "M3\n"):
         p = read(f"{word}\n{again}G1 X1. F100.\n", dialect)
@@ -543,3 +544,22 @@ def test_places_that_haas_sends_out_are_no_moves():
 @pytest.mark.parametrize(("dialect", "word"), [("fanuc", "G54.1 P1"), ("haas", "G154 P2"), ("haas", "G111")])
 def test_a_work_offset_is_told_by_the_word_of_the_program(dialect, word):
     assert [r.message.split(" is not")[0] for r in read(f"{word}\nG1 X1. F9.\n", dialect).remarks] == [word]
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas"])
+def test_the_same_kind_of_feed_again_keeps_f(dialect):
+    """The line of safety that posts write at each tool change."""
+    p = read("G94\nG1 X5. F100.\nG0 G17 G40 G49 G80 G90 G94\nG43 H1\nG1 X9.\n", dialect)
+    assert p.feed[p.line == 12].tolist() == [100.0]
+
+
+def test_another_kind_of_feed_and_the_first_one_need_f():
+    for body in ("G94\nG1 X5. F100.\nG95\nG94\nG1 X9.\n", "F100.\nG94\nG1 X5.\n"):
+        with pytest.raises(ProgramError, match="without a feed"):
+            read(body)
+
+
+def test_linuxcnc_drops_f_with_the_same_kind_of_feed():
+    """As its interpreter does."""
+    with pytest.raises(ProgramError, match="without a feed"):
+        read("G94\nG1 X5. F100.\nG94\nG1 X9.\n", "linuxcnc")
