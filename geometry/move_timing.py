@@ -2,35 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import GeometryError
 from geometry.kernels import timing as kernels
+from geometry.machine_rates import RATES, Rates
 from geometry.mesh import F64
-
-
-@dataclass(frozen=True)
-class Rates:
-    """Rapid rate, acceleration and jerk of a machine.
-
-    rapid        : mm/min
-    acceleration : mm/s², in every direction
-    rounding     : mm, largest distance by which the control may pass a corner; at 0 it stops at each corner
-    jerk         : mm/s³, in every direction; math.inf where the acceleration changes at once
-    """
-
-    rapid: float
-    acceleration: float
-    rounding: float
-    jerk: float = 20000.0
-
-
-RATES = Rates(10000.0, 4905.0, 0.001)
-"""Rates of a machine whose setup gives none: half of the acceleration of gravity, and the jerk of a machining centre
-(shop practice)."""
 
 
 def change_seconds(slow: float, fast: float, rates: Rates) -> float:
@@ -98,3 +76,6 @@ def move_seconds(way: F64, feed: F64, rates: Rates, stop: NDArray[np.bool_] | No
     if len(ways):
         kernels.seconds_of_moves(ways, feeds / 60.0, stops, curves, rates.acceleration, rates.jerk, rates.rounding, out)
     return out
+
+
+__all__ = ["RATES", "Rates", "change_seconds", "change_way", "leg_seconds", "move_seconds", "peak_speed"]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from geometry.cutting_mechanics import compliance, effective_diameter
-from geometry.move_timing import RATES, Rates
+from geometry.machine_rates import RATES, Rates
 from geometry.tool_body import ToolBody
 from schemas.machine import Machine
 from schemas.materials import MATERIALS, FeedPoint, Material, find_material

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.machine_rates import RATES
 from geometry.mesh import F64, I32, TriangleMesh
-from geometry.move_timing import RATES
 from geometry.part import OtherSolid
 from geometry.tool_body import ToolBody
 from verify.assumptions import Assumed

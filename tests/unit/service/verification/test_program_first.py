@@ -1,6 +1,8 @@
 """What a program of others leaves open about itself: its control, and the sense of the rotary axes."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 
 import pytest
@@ -115,3 +117,10 @@ def test_marks_and_a_byte_order_mark():
     read = read_first(setup(), "G54 ; zero\nG0 X1 Y1 SUPA\nM30\n".replace(" SUPA", "") + "MSG (\"x\")\n", ending=".nc")
     assert read.nc.dialect == "siemens" and not read.assumed
     assert len(read_first(setup(), "\ufeff" + PLAIN, ending=".nc").read) == 1
+
+
+def test_a_program_is_read_without_what_takes_long_to_import():
+    """A program that cannot be read is refused within two seconds of the start."""
+    text = ("import sys, service.verification.program_first; "
+            "print([m for m in ('numba', 'scipy', 'trimesh', 'OCP', 'cadquery', 'dask') if m in sys.modules])")
+    assert subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True).stdout == "[]\n"
