@@ -12,7 +12,6 @@ from verify.gcode.dialects.orientation import needed
 from verify.gcode.dialects.siemens.siemens_cycles import TEXTS, DrillingCall, drilling_blocks, row_of_holes
 from verify.gcode.dialects.siemens.siemens_expressions import ValueReader, Variables
 from verify.gcode.dialects.siemens.siemens_moves import Line, SiemensMoves
-from verify.gcode.dialects.siemens.siemens_swivel import is_number
 from verify.gcode.dialects.stated_places import digits, level
 from verify.program.arc_chords import PLANE_AXES
 
@@ -80,16 +79,22 @@ class SiemensCalls(SiemensMoves):
 
     def _tolerant(self, parts: list[str]) -> list[str]:
         """CYCLE832: the tolerance of the path."""
-        if parts == [""] or parts[1:2] in (["0"], ["_OFF"]):
+        if parts == [""] or (len(parts) > 1 and self._is_off(parts[1])):
             self.notes.append("CYCLE832 is off: machine data decide how far the control rounds corners; the error "
                               "bound does not include it")
             self.bound(False)
             return []
-        if not is_number(parts[0]):
-            raise BlockError(f"CYCLE832({','.join(parts)}): its tolerance is not a plain number")
+        tolerance = self._number(parts[0])
         self._oriented_within(parts)
         self.bound(True)
-        return [f"G64 P{float(parts[0]):.6f}"]
+        return [f"G64 P{tolerance:.6f}"]
+
+    def _is_off(self, mode: str) -> bool:
+        """Whether a mode of CYCLE832 is off: a number, a variable of the program, or a name of the control."""
+        try:
+            return self._number(mode) == 0
+        except BlockError:  # a name of the control
+            return mode == "_OFF"
 
     def _oriented_within(self, parts: list[str]) -> None:
         """Keep a note for the first turning tool axis where CYCLE832 allows it more than a small deviation."""

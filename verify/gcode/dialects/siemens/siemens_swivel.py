@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from geometry.mesh import F64
-from verify.gcode.dialects.base import NUMBER, BlockError
+from verify.gcode.dialects.base import BlockError
 from verify.gcode.dialects.orientation import angles_of, needed
 from verify.gcode.dialects.oriented_moves import OrientedMoves
 from verify.gcode.dialects.stated_places import digits, level
@@ -181,9 +180,4 @@ class SiemensFrames(OrientedMoves):
         return out
 
 
-def is_number(text: str) -> bool:
-    """Whether a text is a plain number."""
-    return re.fullmatch(NUMBER, text) is not None
-
-
-__all__ = ["SiemensFrames", "is_number"]
+__all__ = ["SiemensFrames"]

@@ -448,3 +448,13 @@ def test_rows_of_holes_in_other_ways_are_refused(call, said):
 def test_a_text_in_the_place_of_a_depth_is_refused():
     with pytest.raises(ProgramError, match="where a number is needed"):
         read('S900 M3\nCYCLE84(5,0,2,"A",,0,5,,1.25,0,200,200)', "siemens")
+
+
+def test_the_tolerance_of_cycle832_may_be_a_variable():
+    """As the post of NX writes it."""
+    body = "DEF REAL _camtolerance\nDEF INT _OFFMODE=0\n_camtolerance=0.004\nCYCLE832({})\nX1 Y1\nX2"
+    by_name, plain, off = (read(body.format(c), "siemens") for c in (
+        "_camtolerance,_FINISH,1", "0.004,_FINISH,1", "_camtolerance,_OFFMODE,1"))
+    assert by_name.leaves == plain.leaves == 0.004 and not by_name.unbounded and off.unbounded
+    with pytest.raises(ProgramError, match="not a variable of the program"):
+        read("CYCLE832(TOL,_FINISH,1)\nX1", "siemens")
