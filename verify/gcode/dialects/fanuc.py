@@ -345,8 +345,9 @@ class FanucReader(FanucPlanes):
     def _after(self, codes: list[float], values: Mapping[str, str]) -> list[str]:
         """Blocks that follow a block with these G words and values.
 
-        A move in Z to a fixed place of the machine drops the length offset, though G43 stays in force. Only G43 with H
-        brings it back where bit 6 of parameter 5001 is 0 (operator's manual B-63844EN/02, 14.1.2).
+        A move in Z to a fixed place of the machine drops the length offset, though G43 stays in force (operator's
+        manual B-63844EN/02, 14.1.2). A parameter decides whether the next block or only G43 with H brings it back: the
+        second is the safe one to take.
         """
         away = next((word for word in (28, 30, 53) if word in codes), None)
         if away is not None and not self.machine.s.tcp_word and (
