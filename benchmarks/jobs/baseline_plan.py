@@ -15,6 +15,7 @@ import numpy as np
 
 from geometry.mesh import F64
 from toolpath.linking.linker import Linker
+from toolpath.linking.ways_in import Way, WaysIn
 from toolpath.passes.contours import dilated
 from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.pass_order import nearest_order
@@ -31,14 +32,20 @@ from zones.reach.tip_field import TipField
 from zones.zoning.zones import ZoneArea
 
 
+class FromAbove(WaysIn):
+    """Ways in that never go on from the end of a pass."""
+
+    def straight_on(self, points: F64, closed: bool) -> Way | None:
+        """None."""
+        return None
+
+
 class Retracting(Linker):
-    """A linker that never goes on from the end of a pass: every one begins at the clearance plane."""
+    """A linker whose passes all begin at the clearance plane."""
 
-    def _straight_on(self, points: F64, closed: bool) -> Linker.Way | None:
-        return None
-
-    def _across(self, start: F64) -> F64 | None:
-        return None
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.ways = FromAbove(self.go, self.depths, self.gone, self.engaged)
 
 
 class Plain(Finish):

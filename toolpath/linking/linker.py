@@ -1,27 +1,15 @@
 """Links passes to one safe motion: ways in, ways between passes, ways out.
 
 Stock that stands higher over a pass than the flutes reach is removed first, above the pass. In a gap that only just
-fits the tool, it is removed layer by layer. Then the linker tries these ways in, in this order.
-
-1. From the end of a pass straight on to the next one, where the level move between them is free and removes no more
-   than a layer. Down to a deeper level the tool goes in air, there or beside its start, or along the pass itself, never
-   steeper than the ramp angle.
-2. Down in air over the start of the pass, or over a free place beside it that is in air or that the tool has reached
-   before, and in from there.
-3. Down a ramp along the pass, round a closed one from where least stock is touched, back and forth on an open one. Its
-   top is in air or just above an earlier cut, or a free place close beside it is.
-
-A pass with none of these is left out. A pass along a wall begins and ends on an arc (``toolpath.linking.lead_arcs``)
-where the tool is free on it and clear of stock at its far end; ways 1 and 2 lead to that end.
-``toolpath.linking.rapid_travel`` brings the tool to the beginning of ways 2 and 3. Where the engaged angle has a limit
-(``toolpath.stock.engagement``) ways in keep it, and a pass that would exceed it is skimmed first.
+fits the tool, it is removed layer by layer. ``toolpath.linking.ways_in`` finds the way into a pass; a pass without one
+is left out. ``toolpath.linking.rapid_travel`` brings the tool to the beginning of that way. Where the engaged angle has
+a limit (``toolpath.stock.engagement``) a pass that would exceed it is skimmed first.
 
 Places are tips in mm, access frame.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -34,26 +22,13 @@ from geometry.mesh import F64
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.feeds.feed_scheduling import Pace, paced
 from toolpath.lines import Line, dense, legs, pieces_where, thinned
-from toolpath.linking.lead_arcs import arcs_along
-from toolpath.linking.ramp_entry import RAMP_SHARE, head_of, way_down
 from toolpath.linking.rapid_travel import Motions, Travel
-from toolpath.scallop_budget import LEAD_SHARE
+from toolpath.linking.ways_in import FLUTE_SHARE, LOOK_EVERY, LOOK_RIM, MAX_AGAIN, MAX_OVER, Way, WaysIn
 from toolpath.stock.cut_history import Depths, still_to_walk
 from toolpath.stock.engagement import UNBOUNDED, skims, within
-from toolpath.stock.stock_map import SURE_RIM, StockMap
+from toolpath.stock.stock_map import StockMap
 from toolpath.workingsteps import Trajectory, TrajectoryKind
-from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
-
-FLUTE_SHARE = 0.8  # flute lengths: highest stock over a pass
-LOOK_EVERY = 0.2  # radii: discs so far apart leave out 0.5 % of it between them
-MAX_AGAIN = 3  # moves at the beginning of a way down that the tool has cut before
-LOOK_RIM = -0.3  # stock lattice steps off the radius, where a ramp looks for the stock that it comes down through
-TOUCH_RIM = -0.02  # the same for the place it comes down at: all but the wall it touches
-MAX_OVER = 1.5  # layers: most stock over a pass, or over a lane onto one
-BEEN_NEAR = 0.5  # diameters: how near a place lies that the tool has reached before, to come down beside a cut
-MAX_BEEN = 6  # such places
-BEGINNINGS = 4  # places round a closed pass at which an arc onto it is tried
-COMPASS = np.array([[math.cos(a), math.sin(a)] for a in np.arange(8) * math.pi / 4])
+from zones.reach.tip_field import TipField
 
 
 @dataclass
@@ -87,6 +62,7 @@ class Linker:
     def __post_init__(self) -> None:
         self.go = Travel(self.field, self.stock, self.motions, self.found)
         self.gone = Depths(self.stock.lattice)  # ways back in air
+        self.ways = WaysIn(self.go, self.depths, self.gone, self.engaged)
 
     @property
     def trajectories(self) -> list[Trajectory]:
@@ -199,8 +175,9 @@ class Linker:
         tool, step = self.field.tool, self.motions.step_down
         along = dense(points, LOOK_EVERY * tool.radius)
         over = self.stock.overlap(along, tool, LOOK_RIM)
-        if (over.max() <= MAX_OVER * step or not len(self._been(points[0]))
-                or bool(self.stock.in_air(points[:1], tool)[0]) or next(self._air_beside(points), None) is not None):
+        if (over.max() <= MAX_OVER * step or not len(self.ways.been(points[0]))
+                or bool(self.stock.in_air(points[:1], tool)[0])
+                or next(self.ways.air_beside(points), None) is not None):
             return
         for k in range(int(over.max() / step), 0, -1):
             lifted = Line(along + np.array([0.0, 0.0, k * step]), closed)
@@ -234,12 +211,13 @@ class Linker:
             return False
         arc = np.empty((0, 3))
         if self.walls and not eased:
-            arc, points = self._onto(points, closed)
+            arc, points = self.ways.onto(points, closed)
         if len(arc):
             led = np.vstack([arc, points[1:]])
-            way: Linker.Way | None = self._straight_on(led, False) or (arc[:1], led, False)
+            way: Way | None = self.ways.straight_on(led, False) or (arc[:1], led, False)
         else:
-            way = self._straight_on(points, closed) or self._from_air(points) or self._ramped(points, closed)
+            way = (self.ways.straight_on(points, closed) or self.ways.from_air(points)
+                   or self.ways.ramped(points, closed))
         if way is None:
             return False
         entry, cut, joined = way
@@ -266,43 +244,11 @@ class Linker:
         self.passes += 1
         if self.walls and not eased:
             length = Line(points, closed).length
-            off = self._arc(cut[-1], cut[-2] - cut[-1], length, onto=False)  # a ring may have been begun elsewhere
+            # a ring may have been begun elsewhere
+            off = self.ways.arc(cut[-1], cut[-2] - cut[-1], length, onto=False)
             if off is not None:
                 self._led(TrajectoryKind.LIFT, off)
         return True
-
-    def _onto(self, points: F64, closed: bool) -> tuple[F64, F64]:
-        """An arc (k, 3), mm, onto a pass (n, 3), k = 0 where there is none, and the pass, begun where the arc ends."""
-        length = Line(points, closed).length
-        starts = sorted({0, *(len(points) * np.arange(1, BEGINNINGS) // BEGINNINGS).tolist()}) if closed else [0]
-        for first in starts:
-            begun = np.vstack([points[first:-1], points[:first + 1]]) if first else points
-            arc = self._arc(begun[0], begun[1] - begun[0], length, onto=True)
-            if arc is not None:
-                return arc, begun
-        return np.empty((0, 3)), points
-
-    def _arc(self, at: F64, way: F64, length: float, *, onto: bool) -> F64 | None:
-        """A level arc (k, 3), mm, onto a place (3,) of a pass that continues along ``way``, or off it.
-
-        length : mm, of the pass
-
-        None where the tool is not free on any arc, is barred there, has too much stock on it, or was there before.
-        """
-        tool = self.field.tool
-
-        def free(arc: F64) -> bool:
-            if not bool(self.stock.in_air(arc[:1], tool)[0]):
-                return False
-            tips = dense(arc, 0.3 * self.field.lattice.step)
-            return (self.go.free(tips) and not bool(self.found.bars(tool, tips).any())
-                    and self._lane(tips, MAX_OVER * self.motions.step_down))
-
-        for arc in arcs_along(self.field, at, way, length, LEAD_SHARE * self.motions.tolerance):
-            walked = arc if onto else np.ascontiguousarray(arc[::-1])
-            if int(self.depths.were_cut(walked).sum()) <= MAX_AGAIN and free(arc):
-                return walked
-        return None
 
     def _descent(self, points: F64) -> float:
         """Feed along a way down (n, 3), mm, at which its vertical part keeps to the plunge feed, mm/min."""
@@ -380,173 +326,3 @@ class Linker:
         """Lift to the clearance plane and return all trajectories."""
         self.go.lift()
         return tuple(self.trajectories)
-
-    # -- ways in ----------------------------------------------------------------------------------------------
-
-    Way = tuple[F64, F64, bool]
-
-    def _straight_on(self, points: F64, closed: bool) -> Way | None:
-        if self.at is None:
-            return None
-        here, start = self.go.here(), points[0]
-        run = float(np.hypot(*(start - here)[:2]))
-        if run > 4.0 * self.field.tool.radius + 1.0 or abs(start[2] - here[2]) > 2.0 * self.motions.step_down:
-            return None
-        z = max(here[2], start[2])
-        if not self.go.free_move(here[:2], start[:2], z):
-            return None
-        n = max(2, int(run / 0.2) + 1)
-        t = np.linspace(0.0, 1.0, n)[:, None]
-        level = np.column_stack([here[:2] + t * (start[:2] - here[:2]), np.full(n, z)])
-        if not self._lane(level, self.motions.step_down):
-            return None
-        over = z - start[2]
-        if here[2] < z and not bool(self.stock.in_air(np.vstack([here, [*here[:2], z]]), self.field.tool).all()):
-            return None
-        entry = np.array([[*here[:2], z], [*start[:2], z]])
-        entry = entry[np.r_[True, np.linalg.norm(np.diff(entry, axis=0), axis=1) > 1e-9]]
-        if over <= 1e-9:
-            return entry, points, True
-        if bool(self.stock.in_air(start[None, :], self.field.tool)[0]):
-            return np.vstack([entry, start]), points, True
-        aside = self._down_aside(points, z)
-        if aside is not None:
-            return aside, points, True
-        ramp = self._ramp(points, closed, over)
-        if ramp is None or int(self._known_down(ramp, points).sum()) > MAX_AGAIN:
-            return None  # the known part of a way down can be left out only where the tool comes from above
-        return entry, ramp, True
-
-    def _down_aside(self, points: F64, z: float) -> F64 | None:
-        """From here across at height z, mm, to beside the start of a pass, down there in air, and onto it.
-
-        A flat pass has a long way down along itself, which the tool follows twice. None where this way is longer, or
-        where the tool is not free in air.
-        """
-        here, start, m = self.go.here(), points[0], self.motions
-        sooner = 2.0 * (z - start[2]) / (math.tan(m.ramp_angle) * RAMP_SHARE * m.feed)
-        for q in itertools.chain(self._air_beside(points), self._been_beside(start) if self._shallow(points) else ()):
-            way = np.array([here, [*here[:2], z], [*q[:2], z], q])
-            way = way[np.r_[True, np.linalg.norm(np.diff(way, axis=0), axis=1) > 1e-9]]
-            length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
-            if length / m.link_feed + float(np.linalg.norm(start - q)) / m.feed > sooner:
-                continue
-            if (self.go.nothing_stands(way) and self.go.free_move(here[:2], q[:2], z)
-                    and int((self.gone.were_cut(way) | self.depths.were_cut(way)).sum()) <= MAX_AGAIN):
-                return np.vstack([way[1:], start])
-        return None
-
-    def _from_air(self, points: F64) -> Way | None:
-        start = points[0]
-        if bool(self.stock.in_air(start[None, :], self.field.tool)[0]):
-            return start[None, :], points, False
-        q = next(self._air_beside(points), None)
-        if q is None and self._shallow(points):
-            q = next(self._been_beside(start), None)
-        return None if q is None else (np.vstack([q, start]), points, False)
-
-    def _air_beside(self, points: F64) -> Iterator[F64]:
-        """Places (3,) in air, as high as the start of a pass (n, 3), mm, that lead onto it straight; nearest first."""
-        start, tool = points[0], self.field.tool
-        ahead = points[1, :2] - start[:2]
-        ahead = ahead / max(float(np.hypot(*ahead)), 1e-12)
-        left = np.array([-ahead[1], ahead[0]])
-        ways = [left, -ahead, (left - ahead) / math.sqrt(2), -left, (left + ahead) / math.sqrt(2)]
-        for far in (2.5 * self.stock.lattice.step, *(np.array([0.25, 0.5, 1.0, 1.5, 2.0, 3.0]) * tool.diameter)):
-            for side in ways:
-                q = np.array([*(start[:2] + far * side), start[2]])
-                if bool(self.stock.in_air(q[None, :], tool)[0]) and self._leads_onto(q, start):
-                    yield q
-
-    def _been_beside(self, start: F64) -> Iterator[F64]:
-        """Places (3,), mm, as high as a start of a cut, that the tool has reached before, straight beside it."""
-        for x, y, _ in self._been(start)[:MAX_BEEN]:
-            q = np.array([x, y, start[2]])
-            if self._shallow(dense(np.vstack([q, start]), LOOK_EVERY * self.field.tool.radius)):
-                if self._leads_onto(q, start):
-                    yield q
-
-    def _been(self, start: F64) -> F64:
-        """Places (n, 3), mm, close to a start of a cut, that the tool has reached before, as deep or deeper."""
-        been = self.depths.near(start[:2], BEEN_NEAR * self.field.tool.diameter)
-        return been[been[:, 2] <= start[2]]
-
-    def _shallow(self, points: F64) -> bool:
-        """Whether no more than a layer stands over tips (n, 3), mm, skins on the walls beside them included."""
-        return float(self.stock.overlap(points, self.field.tool, LOOK_RIM).max()) <= MAX_OVER * self.motions.step_down
-
-    def _leads_onto(self, q: F64, start: F64) -> bool:
-        """Whether the tool can go from a place straight across to a start of a cut as high, (3,) mm."""
-        if not self.go.free_move(q[:2], start[:2], start[2]) or self.go.limit(q) > q[2] + LEVEL_TOLERANCE:
-            return False
-        t = np.linspace(0.0, 1.0, max(2, int(np.hypot(*(start - q)[:2]) / 0.2) + 1))[:, None]
-        lane = q + t * (start - q)
-        return not self.found.bars(self.field.tool, lane).any() and self._lane(lane, MAX_OVER * self.motions.step_down)
-
-    def _lane(self, tips: F64, allowed: float) -> bool:
-        """Whether a level lane of tips (n, 3), mm, has at most ``allowed`` mm of stock on it, none above the flutes,
-        and keeps the limit of the engaged angle.
-        """
-        tool = self.field.tool
-        return (float(self.stock.overlap(tips, tool, lower_bound=0.0).max()) <= allowed
-                and float(self.stock.standing(tips, tool).max()) <= FLUTE_SHARE * tool.flute_length
-                and within(self.stock, tips, tool, self.engaged, self.found))
-
-    def _ramped(self, points: F64, closed: bool) -> Way | None:
-        tool = self.field.tool
-        touched = self.stock.overlap(points, tool, TOUCH_RIM)
-        if closed:
-            first = int(np.argmin(touched[:-1]))
-            points = np.vstack([points[first:-1], points[:first + 1]])
-            touched = np.roll(touched[:-1], -first)
-        seen = max(float(self.stock.overlap(points, tool, LOOK_RIM).max()), float(touched[0]))
-        highest = max(float(self.stock.overlap(points[:1], tool, SURE_RIM)[0]),
-                      float(self.stock.under_end(points[:1], tool)[0]))
-        # where the tool has been before nothing is left that it could take; an open line is gone down along its head
-        slope = math.tan(self.motions.ramp_angle) * RAMP_SHARE
-        head = points if closed else head_of(points, 0.5 * (seen + 0.1) / slope)
-        above = max(float(self.depths.above(head).max()), 0.0)
-        been = self.depths.near(points[0, :2], BEEN_NEAR * tool.diameter)[:, 2].min(initial=math.inf)
-        beside = max(float(been - points[0, 2]), 0.0)
-        if seen - beside > MAX_OVER * self.motions.step_down:
-            beside = math.inf
-        for most in (min(beside, above, seen), min(above, seen), seen, max(seen, self.motions.step_down), highest):
-            over = most + 0.1
-            ramp = self._ramp(points, closed, over) if math.isfinite(over) and over > 0.0 else None
-            if ramp is not None:  # over a move it made before a tool stands free, so it begins after the last of these
-                known = np.flatnonzero(self._known_down(ramp, points))
-                ramp = ramp[int(known[-1]) + 1 if len(known) else 0:]
-            entry = self._beside(ramp[0]) if ramp is not None else None
-            if ramp is not None and entry is not None:
-                return entry, ramp, False
-        return None
-
-    def _beside(self, top: F64) -> F64 | None:
-        """Where to come down to the top of a ramp: there, or off the wall where no rim can be left.
-
-        Where this tool has cut as deep nothing can be left, however close the stock stands all round.
-        """
-        tool = self.field.tool
-        if self.depths.lowest(top) <= top[2] or bool(self.stock.in_air(top[None, :], tool)[0]):
-            return top[None, :]
-        for far in (0.06, 0.12, 0.25, 0.5, 1.0):
-            ring = top + np.column_stack([far * COMPASS, np.zeros(len(COMPASS))])
-            for k in np.flatnonzero(self.stock.in_air(ring, tool)):
-                free = self.go.limit(ring[k]) <= top[2] + LEVEL_TOLERANCE
-                if free and self.go.free_move(ring[k, :2], top[:2], top[2]):
-                    return np.vstack([ring[k], top])
-        q = next(self._been_beside(top), None)
-        return None if q is None else np.vstack([q, top])
-
-    def _ramp(self, points: F64, closed: bool, over: float) -> F64 | None:
-        tool = self.field.tool
-        ramp = way_down(points, closed, over, tool, self.motions.ramp_angle, self.found.care(tool, points))
-        if ramp is None or not within(self.stock, ramp[:len(ramp) - len(points) + 1], tool, self.engaged, self.found):
-            return None
-        return ramp
-
-    def _known_down(self, ramp: F64, points: F64) -> NDArray[np.bool_]:
-        """Moves of the way down of a ramp, without the pass (n, 3) after it, that the tool has cut before."""
-        return self.depths.were_cut(ramp[:len(ramp) - len(points) + 1])
-
-

@@ -22,7 +22,8 @@ from geometry.cutting_mechanics import effective_diameter
 from geometry.mesh import F64
 from toolpath.feeds.feed_scheduling import Pace
 from toolpath.five_axis.oriented_motion import THICK
-from toolpath.linking.linker import FLUTE_SHARE, Linker
+from toolpath.linking.linker import Linker
+from toolpath.linking.ways_in import FLUTE_SHARE
 from toolpath.passes.contours import dilated
 from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.pass_order import nearest_order

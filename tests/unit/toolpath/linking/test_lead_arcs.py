@@ -9,7 +9,7 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
-from toolpath.counterexamples import BARRED, MIN_BARRED, Counterexamples
+from toolpath.counterexamples import BARRED, MIN_BARRED, NONE, Counterexamples
 from toolpath.five_axis.oriented_motion import Surroundings, with_ways
 from toolpath.five_axis.oriented_piece import Piece
 from toolpath.lines import Line, dense
@@ -53,7 +53,7 @@ FREE = RotaryAxes(lambda axes: np.ones(len(axes), bool), lambda tips, axes: (tip
 WALL = joined(box_mesh([0, 0, -2], [30, 30, 0]), box_mesh([0, 18, 0], [30, 22, 8]))
 
 
-def beside_the_wall(skin, *, slot=None, body=None):
+def beside_the_wall(skin, *, slot=None, body=None, found=NONE):
     """A wall along x, its face at y = 18, with a skin of stock on it; slot : mm to a second wall before it."""
     mesh = WALL if slot is None else joined(WALL, box_mesh([0, 2, 0], [30, 18 - slot, 8]))
     body = body or tool(4.0, 0.0)
@@ -62,7 +62,7 @@ def beside_the_wall(skin, *, slot=None, body=None):
     top = np.where((y > 18 - skin)[:, None] & (y < 23)[:, None], stock.top, -2.0)
     stock.become(StockMap(stock.lattice, top, top.copy(), stock.part))
     motions = Motions(800, 200, 3000, 10000, 14.0, 12.0, RAMP, 2.0, 0.001)
-    return Linker(field_of(mesh, body), stock, motions, Depths(stock.lattice), walls=True)
+    return Linker(field_of(mesh, body), stock, motions, Depths(stock.lattice), found, walls=True)
 
 
 def along(z, x0=6.0, x1=24.0, y=15.999):
@@ -145,8 +145,7 @@ def test_where_the_tool_is_barred_there_is_no_arc_but_the_pass():
     link = beside_the_wall(0.2)
     link.add(along(6.0))
     far = next(t for t in link.trajectories if t.motion is TrajectoryKind.APPROACH and len(t.points) >= 5).points[0]
-    again = beside_the_wall(0.2)
-    again.found = Counterexamples(barred={"T1": far[None]})
+    again = beside_the_wall(0.2, found=Counterexamples(barred={"T1": far[None]}))
     assert again.add(along(6.0)) and again.passes == 1
     reach = max(BARRED * again.field.tool.radius, MIN_BARRED)
     for t in again.trajectories:

@@ -12,11 +12,12 @@ from geometry.mesh_queries.bvh import TriangleTree
 from geometry.move_timing import leg_seconds
 from output.program_grid import to_grid
 from tests.hand_parts import RAMP, ball, box_mesh, field_of, joined, tool
-from toolpath.counterexamples import BARRED, CARE, Counterexamples
+from toolpath.counterexamples import BARRED, CARE, NONE, Counterexamples
 from toolpath.feeds.feed_scheduling import GUARD, Pace
 from toolpath.lines import Line, dense, legs
-from toolpath.linking.linker import FLUTE_SHARE, Linker
+from toolpath.linking.linker import Linker
 from toolpath.linking.rapid_travel import OVER, Motions
+from toolpath.linking.ways_in import FLUTE_SHARE
 from toolpath.passes.pass_order import nearest_order
 from toolpath.stock.cut_history import Depths
 from toolpath.stock.stock_map import SKIN, StockMap
@@ -33,14 +34,15 @@ def stand(stock, beyond, height, before=np.inf):
     stock.become(StockMap(stock.lattice, top, top.copy(), stock.part))
 
 
-def linker(body=None, top=TOP, post=False, step_down=1.0):
+def linker(body=None, top=TOP, post=False, step_down=1.0, found=NONE):
     """A plate 30 x 30 with its top at 0, stock up to ``top``, a post in the middle if asked for."""
     mesh = box_mesh([0, 0, -2], [30, 30, 0])
     if post:
         mesh = joined(mesh, box_mesh([13, 13, 0], [17, 17, 3]))
     field = field_of(mesh, body or ball(4.0))
     stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -2]), np.array([30.0, 30, top]), 0.15)
-    return Linker(field, stock, Motions(800, 200, 3000, 10000, 8.0, 6.0, RAMP, step_down, 0.001), Depths(stock.lattice))
+    return Linker(field, stock, Motions(800, 200, 3000, 10000, 8.0, 6.0, RAMP, step_down, 0.001), Depths(stock.lattice),
+                  found)
 
 
 def straight(x0, x1, y, z):
@@ -423,8 +425,8 @@ def test_a_loop_begins_at_its_nearest_point_and_keeps_its_sense():
 
 
 def test_where_the_tool_is_barred_a_line_is_left_out():
-    link = linker(top=-1.0)
-    link.found = Counterexamples(barred={link.field.tool.id: np.array([[12.0, 10.0, 1.0]])})
+    body = ball(4.0)
+    link = linker(body, top=-1.0, found=Counterexamples(barred={body.id: np.array([[12.0, 10.0, 1.0]])}))
     assert not link.add(straight(5, 20, 10, 1.0))
     cuts = [t.points for t in link.trajectories if t.motion is TrajectoryKind.CUT]
     ends = sorted((float(p[:, 0].min()), float(p[:, 0].max())) for p in cuts)
@@ -436,8 +438,9 @@ def test_where_the_tool_is_barred_a_line_is_left_out():
 
 
 def test_where_the_tool_dug_ramps_are_at_most_half_as_steep():
-    usual, careful = linker(top=3.0), linker(top=3.0)
-    careful.found = Counterexamples({careful.field.tool.id: np.array([[15.0, 10.0, 1.0]])})
+    body = ball(4.0)
+    usual = linker(body, top=3.0)
+    careful = linker(body, top=3.0, found=Counterexamples({body.id: np.array([[15.0, 10.0, 1.0]])}))
     assert usual.add(straight(6, 24, 10, 1.0)) and careful.add(straight(6, 24, 10, 1.0))
     assert np.tan(steepest_cut(careful)) <= CARE * np.tan(RAMP) < np.tan(steepest_cut(usual))
 
@@ -450,10 +453,10 @@ def test_straight_on_no_way_down_is_gone_again(known):
     link = linker(top=3.0)
     link.go.at = np.array([7.0, 10.0, 2.6])
     link.stock.cut(np.array([[3.0, 10.0, 2.6], [7.0, 10.0, 2.6]]), link.field.tool)
-    entry, ramp, joined = link._straight_on(points, False)
+    entry, ramp, joined = link.ways.straight_on(points, False)
     assert joined and len(ramp) > len(points) + 9 and ramp[0, 2] == pytest.approx(2.6)
     link.depths.cut(ramp[:known + 1])
-    assert (link._straight_on(points, False) is None) == (known > 3)
+    assert (link.ways.straight_on(points, False) is None) == (known > 3)
 
 
 def test_straight_on_a_pass_may_end_on_what_is_known():
@@ -464,7 +467,7 @@ def test_straight_on_a_pass_may_end_on_what_is_known():
     link.go.at = np.array([7.0, 10.0, 2.6])
     link.stock.cut(np.array([[3.0, 10.0, 2.6], [7.0, 10.0, 2.6]]), link.field.tool)
     link.depths.cut(points[-4:])
-    assert link._straight_on(points, False) is not None
+    assert link.ways.straight_on(points, False) is not None
 
 
 def test_what_a_line_has_above_the_rapids_is_not_walked():
@@ -495,11 +498,11 @@ def test_a_way_down_begins_after_the_last_move_that_was_made_before():
     """Two passes one below the other, whose ways down to and fro fall together in the middle: seed 69 of the sweep."""
     link = linker(ball(1.5), top=3.0)
     points = np.column_stack([np.linspace(10.0, 11.0, 5), np.full(5, 10.0), np.full(5, 1.0)])
-    whole = link._ramped(points, False)
+    whole = link.ways.ramped(points, False)
     assert whole is not None and len(whole[1]) > 40
     first, last = 2, 4  # where it is no lower than what is seen there, or a way would begin just above it
     link.depths.cut(whole[1][first:last + 1])
-    entry, ramp, _ = link._ramped(points, False)
+    entry, ramp, _ = link.ways.ramped(points, False)
     np.testing.assert_allclose(ramp, whole[1][last:])
     np.testing.assert_allclose(entry[-1], whole[1][last])
 
@@ -552,10 +555,10 @@ def test_no_way_in_leads_through_a_wall_from_where_the_tool_has_been():
     for y in (11.7, 18.3):
         link.depths.cut(straight(10, 20, y, 0.5).points)
     for x, y in ((15.0, 18.3), (15.0, 18.35)):
-        for q in link._been_beside(np.array([x, y, 1.0])):
+        for q in link.ways._been_beside(np.array([x, y, 1.0])):
             assert q[1] > 15.2
-    assert not link._leads_onto(np.array([15.0, 11.7, 1.0]), np.array([15.0, 18.3, 1.0]))
-    assert not link._leads_onto(np.array([15.0, 15.0, 1.0]), np.array([15.0, 18.3, 1.0]))
+    assert not link.ways._leads_onto(np.array([15.0, 11.7, 1.0]), np.array([15.0, 18.3, 1.0]))
+    assert not link.ways._leads_onto(np.array([15.0, 15.0, 1.0]), np.array([15.0, 18.3, 1.0]))
 
 
 def test_a_way_down_goes_down_no_faster_than_straight_down_it_may():
