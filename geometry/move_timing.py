@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from geometry.errors import GeometryError
 from geometry.kernels import timing as kernels
-from geometry.machine_rates import RATES, Rates
+from geometry.machine_rates import Rates
 from geometry.mesh import F64
 
 
@@ -76,6 +76,3 @@ def move_seconds(way: F64, feed: F64, rates: Rates, stop: NDArray[np.bool_] | No
     if len(ways):
         kernels.seconds_of_moves(ways, feeds / 60.0, stops, curves, rates.acceleration, rates.jerk, rates.rounding, out)
     return out
-
-
-__all__ = ["RATES", "Rates", "change_seconds", "change_way", "leg_seconds", "move_seconds", "peak_speed"]

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from geometry.move_timing import Rates
+from geometry.machine_rates import Rates
 from toolpath.counterexamples import Counterexamples, HighWall
 from toolpath.plan_checkpoint import FinishSnapshot, LayersSnapshot, PackedLines, PlanSnapshot, ToolSnapshot
 from toolpath.planning.job_plan import Plan

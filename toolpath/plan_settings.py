@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.cutting_mechanics import effective_diameter
+from geometry.machine_rates import RATES, Rates
 from geometry.mesh import F64
-from geometry.move_timing import RATES, Rates
 from geometry.tool_body import ToolBody
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.scallop_budget import ScallopBudget

@@ -12,8 +12,9 @@ from enum import StrEnum
 
 import numpy as np
 
+from geometry.machine_rates import RATES, Rates
 from geometry.mesh import F64
-from geometry.move_timing import RATES, Rates, move_seconds
+from geometry.move_timing import move_seconds
 from geometry.tool_body import ToolBody
 from toolpath.tool_deflection import DeflectionEstimate
 

@@ -15,8 +15,8 @@ from functools import cached_property
 import numpy as np
 
 from geometry.cutting_mechanics import effective_diameter
+from geometry.machine_rates import Rates
 from geometry.mesh import F64
-from geometry.move_timing import Rates
 from geometry.part import OtherSolid
 from geometry.setup_frame import SetupFrame
 from geometry.tool_body import ToolBody

@@ -16,8 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.machine_rates import Rates
 from geometry.mesh import F64
-from geometry.move_timing import Rates, change_seconds, change_way, peak_speed
+from geometry.move_timing import change_seconds, change_way, peak_speed
 from toolpath.lines import SHORTEST, stretch
 from toolpath.workingsteps import Trajectory, TrajectoryKind
 

@@ -17,8 +17,9 @@ from dataclasses import field as fresh
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
+from geometry.machine_rates import RATES, Rates
 from geometry.mesh import F64
-from geometry.move_timing import RATES, Rates, leg_seconds
+from geometry.move_timing import leg_seconds
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.feeds.feed_scheduling import GUARD
 from toolpath.lines import dense, stretch

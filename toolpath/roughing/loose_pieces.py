@@ -41,7 +41,7 @@ def loose_pieces(field: TipField, stock: StockMap, z: float, area: NDArray[np.bo
         return out
     openings, _ = ndimage.label(free, BESIDE)
     border = np.concatenate([openings[0], openings[-1], openings[:, 0], openings[:, -1]])
-    held = dilated(~free, 1.0) | np.isin(openings, np.unique(border)) | _over_part(stock, field)
+    held = dilated(~free, 1.0) | np.isin(openings, np.unique(border)) | stock.over_part(lat)
     cut = np.bincount(openings[free & ~left], minlength=int(openings.max()) + 1)
     pieces, count = ndimage.label(left, BESIDE)
     for k, where in enumerate(ndimage.find_objects(pieces), start=1):
@@ -49,15 +49,6 @@ def loose_pieces(field: TipField, stock: StockMap, z: float, area: NDArray[np.bo
         if not (mine & held[where]).any() and mine.sum() <= WORTH * cut[openings[where][mine][0]]:
             out[where] |= mine
     return out
-
-
-def _over_part(stock: StockMap, field: TipField) -> NDArray[np.bool_]:
-    """(ny, nx) bool: nodes of the lattice of the tip that are over the part."""
-    lat = field.lattice
-    rows, columns = (np.arange(n) for n in (lat.ny, lat.nx))
-    row = stock.lattice.cells(lat.nodes(rows, np.zeros(lat.ny, np.int64), 0.0)[:, :2])[0]
-    column = stock.lattice.cells(lat.nodes(np.zeros(lat.nx, np.int64), columns, 0.0)[:, :2])[1]
-    return np.asarray(np.isfinite(stock.part)[np.ix_(row, column)])
 
 
 __all__ = ["loose_pieces"]

@@ -342,6 +342,12 @@ class StockMap:
         mark_standing(self.top, self.part, z, rows, cols, out)
         return out
 
+    def over_part(self, lattice: Lattice) -> NDArray[np.bool_]:
+        """Nodes of another lattice that are over a cell with the part in it, (ny, nx) bool, on ``lattice``."""
+        row, column = np.meshgrid(np.arange(lattice.ny), np.arange(lattice.nx), indexing="ij")
+        at = self.lattice.cells(lattice.nodes(row.ravel(), column.ravel(), 0.0)[:, :2])
+        return np.asarray(np.isfinite(self.part[at]).reshape(lattice.ny, lattice.nx))
+
     def standing(self, tips: F64, tool: ToolBody) -> F64:
         """Upper bound of the height of stock, not beside a wall, above tips within the cutter, (n,) float64, mm.
 

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.machine_rates import Rates
 from geometry.mesh import F64
-from geometry.move_timing import Rates, move_seconds
+from geometry.move_timing import move_seconds
 from verify.model import ProofSetup, Spent
 from verify.program.move_kinds import RAPID
 from verify.program.program import Program

@@ -7,7 +7,8 @@ import pytest
 
 from geometry.errors import GeometryError
 from geometry.kernels import timing as kernels
-from geometry.move_timing import Rates, change_seconds, change_way, leg_seconds, move_seconds, peak_speed
+from geometry.machine_rates import Rates
+from geometry.move_timing import change_seconds, change_way, leg_seconds, move_seconds, peak_speed
 
 A = 1000.0
 AT_ONCE = math.inf

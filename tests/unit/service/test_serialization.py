@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import CamError
-from geometry.move_timing import Rates
+from geometry.machine_rates import Rates
 from service.serialization import Known, pack, unpack
 from tests.synthetic_plan import BALL
 from toolpath.counterexamples import Counterexamples, HighWall

@@ -7,7 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from geometry.move_timing import Rates, change_seconds
+from geometry.machine_rates import Rates
+from geometry.move_timing import change_seconds
 from toolpath.feeds import feed_changes
 from toolpath.feeds.feed_changes import LEAST, PRICE, with_few_changes
 from toolpath.lines import SHORTEST
