@@ -43,7 +43,6 @@ from tests.arc_plans import off  # noqa: E402
 from toolpath.lines import thinned  # noqa: E402
 from toolpath.scallop_budget import ARC_SHARE  # noqa: E402
 from toolpath.workingsteps import TrajectoryKind  # noqa: E402
-from verify.gcode import block_motion  # noqa: E402
 from verify.gcode.reader import read_program  # noqa: E402
 from verify.program.program import Program  # noqa: E402
 
@@ -60,11 +59,7 @@ def deviation(work: Workplan, made: Workplan, text: str) -> float:
 
     made : the plan with arcs, which tells how many blocks each trajectory has
     """
-    kept, block_motion.CHORD = block_motion.CHORD, 1e-6
-    try:
-        p = read_program(text)
-    finally:
-        block_motion.CHORD = kept
+    p = read_program(text, chord=1e-6)
     feeds = np.flatnonzero(~np.isnan(p.feed) & (p.start != p.end).any(axis=1))
     begins = np.append(np.flatnonzero(np.append(True, p.line[feeds][1:] != p.line[feeds][:-1])), len(feeds))
     at, worst = 0, 0.0

@@ -13,7 +13,7 @@ import pytest
 from service import pipeline
 from service.from_wire import parse_setup
 from service.stages import plan_prove_loop
-from toolpath.linking import linker
+from toolpath.linking import ways_in
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
@@ -36,12 +36,12 @@ def _planned(folder: Path, told: list[float]) -> dict[str, Any]:
 @pytest.fixture(autouse=True)
 def steep(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Ways down are too steep where the plan takes no care."""
-    right = linker.way_down
+    right = ways_in.way_down
 
     def way_down(points: Any, closed: bool, over: float, tool: Any, angle: float, care: float) -> Any:
         return right(points, closed, over, tool, angle if care < 1.0 else TOO_STEEP * angle, care)
 
-    monkeypatch.setattr(linker, "way_down", way_down)
+    monkeypatch.setattr(ways_in, "way_down", way_down)
     yield
 
 
