@@ -11,7 +11,6 @@ from enum import StrEnum
 from pathlib import Path
 
 import numpy as np
-import trimesh
 
 from geometry.errors import GeometryError, InputError
 from geometry.mesh import TriangleMesh
@@ -49,6 +48,8 @@ def stl_bytes(mesh: TriangleMesh, form: StlForm | str = StlForm.BINARY) -> bytes
         bad = int(np.flatnonzero(~finite)[0])
         raise GeometryError(f"vertex {bad} of the mesh is not finite", code="mesh_not_finite",
                             subjects=(f"vertex {bad}",), remedy="mesh the shape again")
+    import trimesh  # here: it takes a third of a second, and few jobs write a mesh
+
     plain = trimesh.Trimesh(mesh.vertices, mesh.faces, face_normals=mesh.normals, process=False, validate=False)
     if StlForm(form) is StlForm.TEXT:
         return trimesh.exchange.stl.export_stl_ascii(plain).encode("ascii")
@@ -75,6 +76,8 @@ def read_stl(path: str | os.PathLike[str]) -> TriangleMesh:
     InputError
         ``not_stl``: the file is missing or is not STL.
     """
+    import trimesh
+
     try:
         with Path(path).open("rb") as file:
             read = trimesh.load_mesh(file, file_type="stl", process=False)

@@ -51,7 +51,7 @@ def test_the_hollow_is_cut_by_the_tilted_end_and_proved(report: dict[str, Any]) 
 
 
 def test_it_takes_a_part_of_what_an_upright_tool_takes(report: dict[str, Any]) -> None:
-    """104.6 s of 124.3, links counted: both ends gained by layers that leave less above the hollow, the upright more."""
+    """104.6 s of 124.3, links counted: layers leave little above the hollow, which spares the upright end more."""
     (zone,) = [z for z in report["zones"] if z["form"] == "shallow"]
     (upright,) = [r for r in zone["rejected"] if str(r["reason"]).startswith("takes longer")
                   and r["strategy"] in ("spiral", "zigzag")]

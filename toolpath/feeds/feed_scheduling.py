@@ -96,10 +96,12 @@ def _in_stock(way: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> NDArray[
     missed = 2.0 * math.acos(max(1.0 - SURE_RIM * stock.lattice.step / tool.radius, 0.0))
     deep = over > SKIN_SHARE * tool.radius
     turn[turn == 0] = np.where(deep, math.ceil(missed / ANGLE), round(math.pi / ANGLE))[turn == 0]
-    kinds, place = np.unique(np.column_stack([depth, turn]), axis=0, return_inverse=True)
-    known = np.array([pace.under(d * pace.layer / DEPTHS, t * ANGLE) for d, t in kinds.tolist()])
+    turns = int(turn.max(initial=0)) + 1
+    kinds, place = np.unique(depth * turns + turn, return_inverse=True)
+    depths = kinds // turns
+    known = np.array([pace.under(k // turns * pace.layer / DEPTHS, k % turns * ANGLE) for k in kinds.tolist()])
     if pace.hidden is None:  # a rim has its own bounds
-        known = np.where(kinds[:, 0] > DEPTHS, known, np.maximum(known, pace.feed))
+        known = np.where(depths > DEPTHS, known, np.maximum(known, pace.feed))
     else:
         known = np.maximum(known, pace.feed)
     levels = np.floor(np.log(known / pace.feed) / math.log(STEP) + 1e-9)

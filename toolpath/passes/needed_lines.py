@@ -8,6 +8,7 @@ Places are in mm, access frame.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,6 +22,7 @@ from toolpath.lines import Line, dense, pieces_where, thinned
 from toolpath.stock.residual_map import UNTOUCHED, ResidualMap
 
 STRAIGHT = 1e-4  # mm: points between which a line is straight to this make one move; it has to take a flat place whole
+LEVEL = 1e-3  # mm between the heights of a line that is level
 CUT = 0.0  # mm: a sample with no more left is not measured
 
 
@@ -89,8 +91,11 @@ def _served(lines: Sequence[Line], residual: ResidualMap, tool: ToolBody, failin
     trial, out = residual.copied(), []
     trial.residual[:] = CUT
     trial.residual[failing] = UNTOUCHED
+    over = float((residual.points[failing, 2] - tips[failing, 2]).max(initial=0.0))
     for line in lines:
-        trial.cut(thinned(line.points, STRAIGHT), tool)
+        # a level line serves no sample farther above it: its tip would be farther away than ``beside``
+        above = reach.beside + over if np.ptp(line.points[:, 2]) < LEVEL else math.inf
+        trial.cut(thinned(line.points, STRAIGHT), tool, above + LEVEL)
         at = failing[trial.residual[failing] < UNTOUCHED]
         mine = at[~_away([line], tips[at], reach)] if len(at) else at
         out.append((mine, trial.residual[mine].copy()))

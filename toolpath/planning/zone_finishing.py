@@ -58,6 +58,7 @@ REFINEMENTS = 4
 LEANING = frozenset((flank.NAME, curvature_matched.NAME, inclined_axis.NAME))  # strategies of a tool that leans
 SPARED = 0.25  # of the scallop: where other lines leave no more, a line is not needed
 OVERRUN = 0.3  # radii that a line runs past the last sample that needs it
+WHOLE = 0.5  # of the samples: where more need lines, those laid out for all are there already
 MIN_AGAIN = 4  # moves that a line repeats before they are left out
 AS_IT_IS = 1e-9  # mm, tolerance of a line that is thinned out already
 
@@ -304,7 +305,10 @@ class Finish:
     def _groups(self, k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
         if k > REFINEMENTS:
             return [touch_points.touches(self.field, self.checks.tips[failing])]
-        return self.strategy.rounds(k, failing)
+        every = np.arange(len(self.checks.points))
+        whole = (k == 0 and not self.strategy.ordered and not self.settings.planes
+                 and len(failing) > WHOLE * len(every))
+        return self.strategy.rounds(k, every if whole else failing)
 
     def _needed(self, k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
         """Lines of round k, of the first one as far as a failing sample needs them.

@@ -8,6 +8,7 @@ Arrays are float64. Places are in mm, normals and axes dimensionless unit vector
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -53,6 +54,7 @@ class ResidualMap:
         level = np.where(normals[:, 2] > 1.0 - 1e-6, LEVEL_PLANE, np.where(upright, UPRIGHT, 0)).astype(np.int8)
         self._by_cell, self._level = self.points[order], level[order]
         self._squares = _squares(normals[order], self._level, None if covers is None else covers[order])
+        self._widest = float(self._squares.half.max(initial=0.0))
 
     def copied(self) -> ResidualMap:
         """A copy with a residual of its own."""
@@ -60,19 +62,21 @@ class ResidualMap:
         out.residual = self.residual.copy()
         return out
 
-    def cut(self, path: F64, tool: ToolBody) -> None:
+    def cut(self, path: F64, tool: ToolBody, above: float = math.inf) -> None:
         """Lower the residual by one polyline of tips, with heights as a program rounds them.
 
-        path : (m, 3) float64, mm, access frame
+        path  : (m, 3) float64, mm, access frame
+        above : mm; what the side of the tool leaves on samples farther above each move need not be measured
 
         A flat end that only just comes down to a place at the top of a wall passes over it where rounding lifts it.
         """
-        self.cut_all([path], tool)
+        self.cut_all([path], tool, above)
 
-    def cut_all(self, paths: Sequence[F64], tool: ToolBody) -> None:
+    def cut_all(self, paths: Sequence[F64], tool: ToolBody, above: float = math.inf) -> None:
         """Lower the residual by polylines of tips, one after the other, as ``cut`` does.
 
         paths : each (m, 3) float64, mm, access frame
+        above : as in ``cut``
         """
         paths = [p for p in paths if len(p)]
         if not paths:
@@ -81,6 +85,7 @@ class ResidualMap:
         path[:, 2] = np.rint(path[:, 2] * PER_MM) / PER_MM
         starts = np.cumsum([0, *map(len, paths)])
         cells, sizes = self._cells, _sizes(tool)
+        sizes = sizes._replace(length=min(sizes.length, above + self._widest))
         steps = np.hypot(*np.diff(path[:, :2], axis=0).T)
         steps[starts[1:-1] - 1] = 0.0
         area = cells.ncx * cells.ncy * cells.size**2

@@ -86,3 +86,17 @@ def test_a_line_of_many_points_serves_flat_places_as_the_straight_line_does():
                            covers=np.full(len(points), 0.05 - 1e-9))
     many = Line(np.column_stack([np.arange(0.0, 10.0, 0.03), np.full(334, 0.5), np.zeros(334)]), False)
     assert kept([many], residual, tool(1.0, 0.0), points) == [many]
+
+
+def test_samples_high_above_a_level_line_keep_what_they_have_and_the_others_are_measured_as_ever():
+    z, y = np.meshgrid(np.arange(0.05, 4.0, 0.1), np.arange(0.05, 6.0, 0.1))
+    points = np.column_stack([np.zeros(z.size), y.ravel(), z.ravel()])
+    maps = [ResidualMap(points, np.tile([1.0, 0.0, 0.0], (len(points), 1)), margin=0.1,
+                        covers=np.full(len(points), 0.05)) for _ in range(2)]
+    line = np.array([[1.02, 6.0, 0.5], [1.02, 0.0, 0.5]])
+    maps[0].cut(line, tool(2.0, 0.4))
+    maps[1].cut(line, tool(2.0, 0.4), above=1.0)
+    near = points[:, 2] <= 1.5
+    assert (maps[0].residual[near] == maps[1].residual[near]).all() and (maps[0].residual < UNTOUCHED).any()
+    assert (maps[1].residual[points[:, 2] > 1.6] == UNTOUCHED).all()
+    assert (maps[0].residual[points[:, 2] > 1.6] < UNTOUCHED).any()
