@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from tests.linked_plate import loop, straight
 from toolpath.lines import Line
 from toolpath.passes.pass_order import nearest_order
 
@@ -48,3 +49,24 @@ def test_the_order_is_that_of_a_search_through_all_lines(seed, start, either):
     found, expected = nearest_order(lines, start, either), slow_order(lines, start, either)
     assert [line.points.tolist() for line in found] == [line.points.tolist() for line in expected]
     assert [line.closed for line in found] == [line.closed for line in expected]
+
+
+def test_order_goes_to_the_nearest_start():
+    lines = [straight(0, 1, y, 0) for y in (5.0, 1.0, 3.0)]
+    got = nearest_order(lines, np.array([0.0, 0, 9]), False)
+    assert [p.points[0, 1] for p in got] == [1, 3, 5]
+    assert all((p.points[0, 0], p.points[-1, 0]) == (0, 1) for p in got)  # climb is kept
+    free = nearest_order(lines, np.array([0.0, 0, 9]), True)
+    assert [p.points[0, 0] for p in free] == [0, 1, 0]  # to and fro
+    assert nearest_order([], None, True) == []
+
+
+def test_a_loop_begins_at_its_nearest_point_and_keeps_its_sense():
+    line = loop(5.0, 0.0)
+    (got,) = nearest_order([line], np.array([15.0, 30.0, 0]), True)
+    assert got.closed and got.points[0, :2] == pytest.approx([15, 20], abs=0.4)
+    assert (got.points[0] == got.points[-1]).all() and got.length == pytest.approx(line.length)
+
+    def area(p):
+        return 0.5 * float(np.sum(p[:-1, 0] * p[1:, 1] - p[1:, 0] * p[:-1, 1]))
+    assert math.copysign(1, area(got.points)) == math.copysign(1, area(line.points))
