@@ -10,6 +10,7 @@ import contextlib
 import ctypes
 import gc
 import json
+import math
 import os
 import resource
 import signal
@@ -27,6 +28,7 @@ import psutil
 from geometry.errors import ResourceError, error_from_dict
 
 POLL, LONG_POLL = 0.02, 0.1  # s, of a child at work and of one that waits
+FAMILY_EVERY = 0.25  # s between two searches for descendants: each reads the list of all processes of the machine
 _PR_SET_PDEATHSIG = 1
 GARBAGE = 100_000, 20, 20  # new containers between two searches for garbage, and searches of each age between the next
 RESULT_VARIABLE = "ZONEMILL_CHILD_RESULT"
@@ -109,14 +111,14 @@ def _hand_over(child: subprocess.Popen[bytes], request: Future[bytes], stop: thr
 def _watch(child: subprocess.Popen[bytes], time_limit: float, memory_limit: float, name: str,
            stop: threading.Event | None) -> None:
     deadline = time.monotonic() + time_limit
-    handle = psutil.Process(child.pid)
+    family = Family(child.pid)
     while True:
         try:
             child.wait(timeout=POLL)
             return
         except subprocess.TimeoutExpired:
             pass
-        used = _resident(handle)
+        used = family.resident()
         if used > memory_limit:
             raise _memory_error(name, used, memory_limit)
         if time.monotonic() > deadline or (stop is not None and stop.is_set()):
@@ -125,14 +127,33 @@ def _watch(child: subprocess.Popen[bytes], time_limit: float, memory_limit: floa
                                 remedy="simplify the part, ask for a coarser chord, or raise the time limit")
 
 
-def _resident(handle: psutil.Process) -> int:
-    total = 0
-    try:
-        for process in [handle, *handle.children(recursive=True)]:
-            total += process.memory_info().rss
-    except psutil.Error:
-        pass  # the process ended between two looks
-    return total
+class Family:
+    """A process and its descendants, for the memory that they take together.
+
+    pid : of a process of this user that runs
+    """
+
+    def __init__(self, pid: int) -> None:
+        self._first = psutil.Process(pid)
+        self._all, self._looked = [self._first], -math.inf
+
+    def resident(self) -> int:
+        """Resident memory of all of them, bytes; 0 once the first has ended.
+
+        A descendant counts ``FAMILY_EVERY`` s after it was born, or sooner.
+        """
+        now = time.monotonic()
+        if now - self._looked >= FAMILY_EVERY:
+            with contextlib.suppress(psutil.Error):
+                self._all, self._looked = [self._first, *self._first.children(recursive=True)], now
+        total = 0
+        for process in self._all:
+            try:
+                total += process.memory_info().rss
+            except psutil.Error:  # it ended between two looks
+                if process is self._first:
+                    return 0
+        return total
 
 
 def _kill_group(child: subprocess.Popen[bytes]) -> None:

@@ -22,6 +22,7 @@ from typing import Any
 
 import psutil  # type: ignore[import-untyped]
 
+from geometry.child_process import Family
 from geometry.errors import CancelledError, ResourceError, error_from_dict
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -130,7 +131,7 @@ def _watch(child: subprocess.Popen[bytes], lines: _Lines, limits: ProcessLimits,
            keep: Callable[[], bool]) -> dict[str, Any]:
     """Monitor the child until it ends; returns its last message, {} when there was none."""
     deadline = time.monotonic() + limits.time_s
-    handle = psutil.Process(child.pid)
+    family = Family(child.pid)
     next_look = 0.0
     with selectors.DefaultSelector() as selector:
         selector.register(lines.reading, selectors.EVENT_READ)
@@ -145,7 +146,7 @@ def _watch(child: subprocess.Popen[bytes], lines: _Lines, limits: ProcessLimits,
                 return lines.final
             if time.monotonic() >= next_look:
                 next_look = time.monotonic() + limits.poll_s
-                _check(handle, limits, deadline, keep)
+                _check(family, limits, deadline, keep)
 
 
 class _Lines:
@@ -177,29 +178,18 @@ class _Lines:
         return chunk != b""
 
 
-def _check(handle: psutil.Process, limits: ProcessLimits, deadline: float, keep: Callable[[], bool]) -> None:
+def _check(family: Family, limits: ProcessLimits, deadline: float, keep: Callable[[], bool]) -> None:
     if not keep():
         raise CancelledError("the job was cancelled")
     if time.monotonic() > deadline:
         raise ResourceError(f"the job did not finish within {limits.time_s:g} s and was stopped", code="job_timeout",
                             measured=limits.time_s, limit=limits.time_s,
                             remedy="allow a larger scallop height or fewer faces, or raise ZONEMILL_JOB_TIME_LIMIT_S")
-    used = resident(handle)
+    used = family.resident()
     if used > limits.memory_bytes:
         raise ResourceError(f"the job needed more than {limits.memory_bytes / 1e9:.2f} GB of memory and was stopped",
                             code="job_memory", measured=used, limit=limits.memory_bytes,
                             remedy="simplify the part or raise ZONEMILL_JOB_MEMORY_LIMIT_MB")
-
-
-def resident(handle: psutil.Process) -> int:
-    """Resident memory of a process and its descendants, bytes; 0 once it is gone."""
-    total = 0
-    try:
-        for process in [handle, *handle.children(recursive=True)]:
-            total += process.memory_info().rss
-    except psutil.Error:
-        pass  # it has just ended
-    return total
 
 
 def _await_exit(child: subprocess.Popen[bytes]) -> None:
