@@ -54,7 +54,7 @@ def idle_tools(cut: BOOL, speed: F64, zeros: NDArray[np.int64], source: Source, 
 
     cut     : (m,) bool, moves that remove stock
     speed   : (m,) float64, 1/min, of the spindle, 0 where it stands
-    zeros   : (m,) int64, number of the coordinates that each move counts in
+    zeros   : (m,) int64, dimensionless, number of the coordinates that each move counts in
     samples : SurfaceSamples of the part
     within  : mm; a tool that comes so near to part or stock passes over finished ground
     fine    : tools so thin that the stock model may not show their cuts
