@@ -231,7 +231,7 @@ def _speeds(read: Sequence[FramedProgram], known: NDArray[np.bool_]) -> F64:
 
 
 def _zeros(read: Sequence[FramedProgram], known: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(m,) int64, dimensionless, number of the coordinates in force in each move, the same for the same ones of a program."""
+    """(m,) int64, dimensionless, number of the coordinates that each move counts in, as ``Program.zeros`` has them."""
     out = [np.zeros(0, np.int64)]
     for p in (r.program for r in read):
         begun, number = np.array(p.zeros or [(0, 0)], np.int64).T
