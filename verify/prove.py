@@ -184,7 +184,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
         unread = None if asked.whole is None else unread_work(asked.whole, framed[0], measured, cutting, tools)
         work, left = work_done(asked, measured, cutting, run.cut, source, unread)
         findings += [*cuts.allowance, *left,
-                     *idle_tools(run.cut, _speeds(framed, known), source, scored.samples,
+                     *idle_tools(run.cut, _speeds(framed, known), _zeros(framed, known), source, scored.samples,
                                  slack + asked.facet + measured.error, cutting, no_trace),
                      *deep_findings(scored.samples, cuts.residual, cuts.mover, cutting, source),
                      *slot_findings(scored.samples, cuts.residual, cutting, source)]
@@ -228,6 +228,15 @@ def _speeds(read: Sequence[FramedProgram], known: NDArray[np.bool_]) -> F64:
     """(m,) float64, 1/min, of the spindle in each move; inf where nothing states it."""
     speeds = (p.speed if len(p.speed) else np.full(len(p), np.inf) for p in (r.program for r in read))
     return np.concatenate([np.zeros(0), *speeds])[known]
+
+
+def _zeros(read: Sequence[FramedProgram], known: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(m,) int64, dimensionless, number of the coordinates that each move counts in, as ``Program.zeros`` has them."""
+    out = [np.zeros(0, np.int64)]
+    for p in (r.program for r in read):
+        begun, number = np.array(p.zeros or [(0, 0)], np.int64).T
+        out.append(number[np.searchsorted(begun, np.arange(len(p)), side="right") - 1])
+    return np.concatenate(out)[known]
 
 
 def _settled(scored: ScoredSamples, part: Part, tools: Sequence[ToolBody], setup: ProofSetup, moves: Moves,

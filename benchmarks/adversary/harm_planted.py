@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.adversary.adversary_case import REFUSED, Case, Expected, Op, Script, made, written
+from benchmarks.adversary.adversary_case import REFUSED, SAFE, Case, Expected, Op, Script, made, written
 from benchmarks.adversary.adversary_parts import (
     BALL,
     BOW_RADIUS,
@@ -225,8 +225,25 @@ def aside_zero(rng: Rng) -> Case:
     return made("aside", part, s, ("gouge",), None, d, setup, what=f"{scale} x {tolerance}")
 
 
+def shifted_away(rng: Rng) -> Case:
+    """A shift of program zero takes the second half of the cuts past the part, with the tool that made the first."""
+    part, dialect = choice(rng, "step", "slot", "floor", "pocket"), choice(rng, "linuxcnc", "fanuc", "siemens")
+    word = choice(rng, "X", "Y", "Z")
+    by = 60.0 if word == "Z" else float(rng.uniform(80.0, 300.0))
+    s: Script = PARTS[part].program()
+    feeds = [k for k, op in enumerate(s.ops) if op.kind in ("feed", "arc")]
+    half = feeds[len(feeds) // 2]
+    lifts = [k for k, op in enumerate(s.ops) if op.kind == "rapid" and op.z == SAFE and feeds[2] < k < feeds[-1]]
+    k = min(lifts, key=lambda n: abs(n - half))
+    begin, end = ("TRANS {}{:.3f}", "TRANS") if dialect == "siemens" else ("G52 {}{:.3f}", "G52 X0. Y0. Z0.")
+    s.ops.insert(k + 1, Op("raw", text=begin.format(word, by)))
+    s.raw(end)
+    return made("shifted away", part, s, ("nothing_cut", "stock_left"), None, None,
+                {"machine": {"dialects": [dialect]}}, dialect, what=f"{word}{by:.0f}")
+
+
 MECHANISMS = {"stray rotary word": stray_rotary_word, "wrong tool": wrong_tool, "swapped I J": swapped_ij,
               "arc plane": arc_plane, "missing pass": missing_pass, "shifted pass": shifted_pass,
               "unknown tool": unknown_tool, "other tool": other_tool, "lost point": lost_point,
               "truncated": truncated, "row left out": uncovered_level, "too deep": deep_zero, "too high": high_zero,
-              "aside": aside_zero}
+              "aside": aside_zero, "shifted away": shifted_away}

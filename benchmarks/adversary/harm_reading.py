@@ -319,8 +319,8 @@ def left_at_m99(rng: Rng) -> Case:
     part, dialect = choice(rng, *LEVEL), choice(rng, "fanuc", "haas")
     turn, share = float(np.round(rng.uniform(1.0, 359.0), 1)), float(np.round(rng.uniform(0.8, 0.99), 3))
     left, word = {"G68": (f"G68 X0. Y0. R{turn:.1f}", ""), "G51": (f"G51 X0. Y0. Z0. P{share:.3f}", ""),
-                  "G91": ("G91", "G90 "), "G95": ("G95", "G94 "), "G52": (f"G52 X{turn / 90.0:.3f}", "")}[
-                      choice(rng, "G68", "G51", "G91", "G95", "G52")]
+                  "G95": ("G95", "G94 "), "G52": (f"G52 X{turn / 90.0:.3f}", "")}[
+                      choice(rng, "G68", "G51", "G95", "G52")]  # each tool change states G90
     s = PARTS[part].program()
     s.head = ["%", "O1000", "G21 G17 G90 G94 G40 G49 G80".replace(word, ""), "G54"]
     s.foot = ["M5", "G91 G28 Z0.", "G90", left, "M99", "%"]

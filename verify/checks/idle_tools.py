@@ -6,6 +6,7 @@ Arrays are float64, mm or dimensionless for directions, in the frame of the proo
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from verify.surface.guard_points import convex_edges
 from verify.surface.removal import residual_on_normals
 
 MAX_RAYS = 100_000  # samples that a tool is looked for at; and as many places on edges, and of its tip
+SAME_AXIS = 1e-4  # of the coordinates of a unit vector: closer axes are one
 BOOL = NDArray[np.bool_]
 
 
@@ -46,12 +48,13 @@ def idle_programs(names: Sequence[str], cut: BOOL, moves: Moves, source: Source,
     return out
 
 
-def idle_tools(cut: BOOL, speed: F64, source: Source, samples: SurfaceSamples, within: float, cutting: Cutting,
-               fine: Sequence[ToolBody]) -> list[Finding]:
+def idle_tools(cut: BOOL, speed: F64, zeros: NDArray[np.int64], source: Source, samples: SurfaceSamples, within: float,
+               cutting: Cutting, fine: Sequence[ToolBody]) -> list[Finding]:
     """Tools that feed in air from beginning to end, in programs whose other tools cut: a wrong length, as a rule.
 
     cut     : (m,) bool, moves that remove stock
     speed   : (m,) float64, 1/min, of the spindle, 0 where it stands
+    zeros   : (m,) int64, dimensionless, number of the coordinates that each move counts in
     samples : SurfaceSamples of the part
     within  : mm; a tool that comes so near to part or stock passes over finished ground
     fine    : tools so thin that the stock model may not show their cuts
@@ -60,6 +63,11 @@ def idle_tools(cut: BOOL, speed: F64, source: Source, samples: SurfaceSamples, w
     -----
     A tool with the spindle standing is no cutter (a probe), nor is one that only comes down and leaves aside. Taps and
     thread mills work in walls that the part shows with or without the thread: their radius is added to ``within``.
+
+    Of a tool that does cut, two kinds of moves are looked at by themselves. Where it never turns in a feed move: those
+    along each of its axes, as without tool centre point control a head carries it past the part. And those in
+    each of the shifts and frames of the program, which may lie elsewhere; there a layer above the stock may count
+    down to it, so a diameter is added to ``within``.
     """
     moves, out, traceless = cutting.moves, list[Finding](), {t.number for t in fine}
     works = _works(moves, cutting.tools) & (speed > 0.0)
@@ -69,13 +77,49 @@ def idle_tools(cut: BOOL, speed: F64, source: Source, samples: SurfaceSamples, w
             continue  # the program as a whole is told
         for k in np.unique(moves.tool[mine & works]).tolist():
             tool, own = cutting.tools[k], mine & moves.feed & (moves.tool == k)
-            room = within + (tool.radius if tool.kind in ("tap", "thread_mill") else 0.0)
-            if tool.number in traceless or cut[own].any() or _comes_near(own, samples, room, cutting):
+            if tool.number in traceless:
                 continue
-            lines = source.line[own]
-            out.append(Finding(FindingKind.NOTHING_CUT, name, int(lines.min()), None, None, None, 0.0, 0.0,
-                               f"T{tool.number}: no feed move meets part or stock, lines {lines.min()} to "
-                               f"{lines.max()}: check the length of the tool", int(own.sum())))
+            room = within + (tool.radius if tool.kind in ("tap", "thread_mill") else 0.0)
+            for part in _parts(own, moves, zeros) if cut[own].any() else [_Part(own, "", "the length of the tool")]:
+                far = room + tool.diameter if part.shifted else room
+                if cut[part.moves].any() or not (part.moves & works).any() or _comes_near(part.moves, samples, far,
+                                                                                          cutting):
+                    continue
+                lines = source.line[part.moves]
+                out.append(Finding(FindingKind.NOTHING_CUT, name, int(lines.min()), None, None, None, 0.0, 0.0,
+                                   f"T{tool.number}: no feed move{part.where} meets part or stock, lines {lines.min()} "
+                                   f"to {lines.max()}: check {part.check}", int(part.moves.sum())))
+    return out
+
+
+class _Part(NamedTuple):
+    """Feed moves of a tool, (m,) bool: where they are, in words, what to check, and whether their zero is shifted."""
+
+    moves: BOOL
+    where: str
+    check: str
+    shifted: bool = False
+
+
+def _parts(own: BOOL, moves: Moves, zeros: NDArray[np.int64]) -> list[_Part]:
+    """The feed moves ``own`` (m,) bool of a tool by its axis, where it turns in none, else by their coordinates."""
+    rows, out = np.flatnonzero(own), []
+    if moves.axes is not None and moves.axes.angle[rows].max() <= 0.0:
+        axes, of = np.unique(np.round(moves.axes.axis[rows] / SAME_AXIS), axis=0, return_inverse=True)
+        for k, axis in enumerate(axes * SAME_AXIS if len(axes) > 1 else ()):
+            way = ", ".join(f"{v + 0.0:.3g}" for v in axis)
+            out.append(_Part(_only(own, rows[of.ravel() == k]), f" along the axis ({way})",
+                             "rotary axes, pivots and tool centre point control"))
+    if not out:
+        numbers = np.unique(zeros[rows])
+        out = [_Part(_only(own, rows[zeros[rows] == k]), " in these shifted or turned coordinates", "shift and frame",
+                     shifted=True) for k in numbers[numbers > 0]]
+    return out
+
+
+def _only(own: BOOL, rows: NDArray[np.int64]) -> BOOL:
+    out = np.zeros(len(own), np.bool_)
+    out[rows] = True
     return out
 
 

@@ -286,6 +286,9 @@ class BlockMotion(FrameWords):
         s, error = self.s, self.log.error
         self._settled("a drilling cycle")
         k, here = PLANE_AXES[s.plane][2], self._here()
+        if s.feed_mode == 93:
+            return error("a drilling cycle in inverse time (G93), whose moves have no feed of their own: program G94 "
+                         "or G95 before it")
         if s.cycle.setdefault("plane", s.plane) != s.plane:
             return error("a drilling cycle continues in another plane: end it with G80 first")
         self._pecks(values)

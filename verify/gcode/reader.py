@@ -30,7 +30,7 @@ from verify.gcode.block_motion import BlockMotion
 from verify.gcode.block_words import Block, BlockError, parse_block, straight, used_letters
 from verify.gcode.dialects import CONTROLS, DIALECTS, LINUXCNC, translated_blocks
 from verify.gcode.flow.control_flow import Flow, has_flow
-from verify.gcode.flow.second_run import KEPT_MODES, TABLES, Change, first_change, left_modes
+from verify.gcode.flow.second_run import KEPT_BY_LINUXCNC, KEPT_MODES, TABLES, Change, first_change, left_modes
 from verify.gcode.flow.system_parameters import served
 from verify.gcode.machine_words import functions_note
 from verify.gcode.program_text import cleaned
@@ -60,6 +60,7 @@ class Reader(BlockMotion):
 
     dialect = LINUXCNC
     leaves_modes: tuple[Assumed, ...] = ()
+    _noted: tuple[object, ...] = (None, None, 0.0, 0.0, 0.0)
 
     def read(self, text: str, report: Report = silent, dialect: str = LINUXCNC) -> Program:
         """Moves and remarks of ``text``; raises as ``read_program`` says, and what ``report`` raises."""
@@ -102,7 +103,7 @@ class Reader(BlockMotion):
                        swaps=tuple(log.swaps), unplaced=tuple(log.unplaced), by_joints=frozenset(log.by_joints),
                        lifts=tuple(log.lifts), kept_on=tuple(log.kept_on), ways_told=frozenset(log.ways_told),
                        taps={int(table[row, 9]): out for row, out in log.taps if row < len(table)},
-                       own_speed=self.control is not None and self.control.own_speed)
+                       own_speed=self.control is not None and self.control.own_speed, zeros=tuple(log.zeros))
 
     def _blocks(self, text: str, lines: list[str]) -> Iterable[tuple[int, str]]:
         """Blocks of the program with their lines, in the words of this reader and the order they run."""
@@ -123,10 +124,11 @@ class Reader(BlockMotion):
         """
         log = self.log
         curved = Change(int(table[0, 9]), "G41 or G42 in force") if compensated and len(table) else None
+        tilted = self.control is not None and self.control.frame is not None
         if log.repeats:
             again = self._copy()
             again.s.ended = False
-            left = left_modes(begin.s, self.s)
+            left = left_modes(begin.s, self.s, tilted=tilted)
             why = f" ({', '.join(left)})" if left else ""
             if change := curved or again._change(text, lines, table):
                 log.remark("second_run", f"M99 begins the program again with what it has left{why}: the second round "
@@ -142,18 +144,27 @@ class Reader(BlockMotion):
                            f"with: its next run has {change.what} in line {change.line}; write the first value at the "
                            "beginning of the program, or back at its end", line=self.tables_written)
                 return
-        left = [*left_modes(begin.s, self.s, self.assumed), *(["G41 or G42"] if curved else [])]
-        if left and self.dialect not in KEPT_MODES:  # the tool stays on every control
-            left = [word for word in left if word.endswith("in the spindle")]
-        if left:
-            again = self._copy() if self.dialect in KEPT_MODES else begin._copy()
+        left = [*left_modes(begin.s, self.s, self.assumed, tilted), *(["G41 or G42"] if curved else [])]
+        keeps = self.dialect in KEPT_MODES
+        if not keeps:  # the tool stays on every control
+            stays = ("in the spindle", *(("G20", "G21", "G90.1", "point control") if self.fits else ()))
+            left = [word for word in left if word.endswith(stays)]
+        if left or tilted:
+            again = self._copy() if keeps else begin._copy()
+            if not keeps and again.control is not None and self.control is not None and again.control.keep_frames(
+                    self.control):
+                left.append("a shift, a turn, a mirror, a scale or a tilted plane")
             again.s.ended = again.s.spindle = again.s.coolant = False
             again.s.position, again.s.tool = [NAN] * 3, self.s.tool
-            if change := curved or again._change(text, lines, table):
+            for name in KEPT_BY_LINUXCNC if self.fits else ():
+                setattr(again.s, name, getattr(self.s, name))
+            if left and (change := curved or again._change(text, lines, table)):
                 self.leaves_modes = (Assumed(
                     AssumedKind.MODES_LEFT, f"set back before the next run: {log.name} leaves {', '.join(left)}",
-                    f"otherwise the next run has {change.what} in line {change.line} (parameter 3402 of Fanuc and "
-                    "setting 56 of Haas decide over modes)", "state them at the beginning of the program"),)
+                    f"otherwise the next run has {change.what} in line {change.line} (LinuxCNC keeps these; else "
+                    "parameter 3402 of Fanuc, setting 56 of Haas, machine data of Siemens, MP7300 or clearMode of "
+                    "Heidenhain decide)",
+                    "state them at the beginning of the program, or set them back at its end"),)
 
     def _change(self, text: str, lines: list[str], table: F64) -> Change | None:
         """The first line at which this reader, which stands at the beginning, runs otherwise than ``table`` (m, 10)."""
@@ -306,6 +317,7 @@ class Reader(BlockMotion):
             for function in block.functions:
                 self.log.functions.setdefault(function, self.log.line)
             self._set_modes(block)
+            self._note_coordinates()
             self._move(block)
         except BlockError as problem:
             return self.log.error(str(problem), remedy=problem.remedy)
@@ -316,6 +328,16 @@ class Reader(BlockMotion):
         if 2 in block.ms or 30 in block.ms:
             self.s.ended = True
         return None
+
+    def _note_coordinates(self) -> None:
+        """Record shifts and frames that are in force now."""
+        frames = (None if self.control is None else self.control.frame, self.s.frame)
+        key = (*frames, *self.s.origin)
+        if key != self._noted:
+            self._noted = key
+            numbers = [n for f in frames if f is not None for n in (*f.matrix.flat, *f.shift)]
+            shift = self.s.origin if any(self.s.origin) else []
+            self.log.counts_in(tuple(round(float(n), 6) for n in (*shift, *numbers)))
 
     def _name_unused(self, block: Block) -> None:
         motion = self.s.motion

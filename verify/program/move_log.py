@@ -73,6 +73,8 @@ class Log:
         self.turned = TurnLog()
         self._remedy: str | None = None
         self._states: list[tuple[int, float, bool]] = [(0, 0.0, False)]
+        self.zeros: list[tuple[int, int]] = [(0, 0)]
+        self._coordinates: dict[tuple[float, ...], int] = {(): 0}
 
     def tap(self, left: bool, *, out: bool = True) -> None:
         """The line of the next move taps; left: a left-hand thread; out: the spindle turns back on the way out."""
@@ -139,6 +141,12 @@ class Log:
         """Record spindle speed, 1/min (0: it stands), and coolant from the next move on."""
         if (speed, coolant) != self._states[-1][1:]:
             self._states.append((self.count, speed, coolant))
+
+    def counts_in(self, coordinates: tuple[float, ...]) -> None:
+        """Record the coordinates of the next move on: shift, mm, and matrices of frames; () for those of the setup."""
+        number = self._coordinates.setdefault(coordinates, len(self._coordinates))
+        if number != self.zeros[-1][1]:
+            self.zeros.append((self.count, number))
 
     def states(self) -> tuple[F64, NDArray[np.bool_]]:
         """Spindle speed, (m,) float64, 1/min, and coolant, (m,) bool, of all moves."""

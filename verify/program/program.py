@@ -171,6 +171,7 @@ class Program:
     taps    : lines of tapping cycles and moves, and whether the spindle turns the other way on the way out
     unbounded : whether, somewhere, no word bounds the deviation from the path: ``leaves`` does not hold there
     pauses  : in order
+    zeros   : coordinates in force: number of moves before, and a number that is the same for the same coordinates
     """
 
     name: str
@@ -213,6 +214,7 @@ class Program:
     taps: Mapping[int, bool] = field(default_factory=dict)
     ways_told: frozenset[int] = frozenset()
     starts: tuple[RotaryStart, ...] = ()
+    zeros: tuple[tuple[int, int], ...] = ()
 
     def __len__(self) -> int:
         return len(self.start)

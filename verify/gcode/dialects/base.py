@@ -106,6 +106,15 @@ class DialectReader:
         """
         yield from enumerate(lines, 1)
 
+    def keep_frames(self, ended: DialectReader) -> bool:
+        """Take the coordinates over that parameters of the control may keep when a program ends.
+
+        ended : a reader of this kind at the end of a program
+
+        Returns whether any stay. Modes of Fanuc and Haas stay as a whole (``verify.gcode.flow.second_run``).
+        """
+        return False
+
     def function(self, number: int) -> None:
         """Take an M word without a meaning here as a function of the machine (``verify.gcode.machine_words``).
 

@@ -85,5 +85,5 @@ class FanucPlanes(DialectReader):
         if math.hypot(*axis) < 1e-6:
             raise BlockError("a tool vector of length 0")
         self.notes.append(CHOICE)
-        angles = angles_of(machine, axis, self.machine.s.turn)
+        angles = angles_of(machine, axis, self.machine.s.turn, limits=machine.limits)
         return [f"{c}{a:.9f}" for c, a in zip(machine.letters, angles, strict=True)]

@@ -80,13 +80,15 @@ def _wound(angle: float, limits: tuple[float, float]) -> float:
     return angle - 360.0 * math.ceil(max(angle - limits[1] - CLOSE, 0.0) / 360.0)
 
 
-def great_circle(machine: Kinematics, start: Sequence[float], end: Sequence[float] | None,
-                 axis: Sequence[float]) -> list[tuple[float, list[float]]]:
+def great_circle(machine: Kinematics, start: Sequence[float], end: Sequence[float], axis: Sequence[float], *,
+                 stated: bool = True) -> list[tuple[float, list[float]]]:
     """Shares of a block and the angles there, so that even turns between them keep to the great circle.
 
     start : (2,) deg, angles where the block begins
-    end   : (2,) deg, angles where it has to end, None for those that the circle leads to
+    end   : (2,) deg, angles where it ends
     axis  : (3,) dimensionless, tool axis at the end, setup frame
+    stated : whether it has to end there; else these are the angles to choose by where it begins upright, and it ends
+             where the circle leads to
 
     Returns shares in order, the last 1. A share of 0 is a turn in place before the block: the tool is upright, and only
     the turning axis moves.
@@ -104,20 +106,20 @@ def great_circle(machine: Kinematics, start: Sequence[float], end: Sequence[floa
     b = np.array(axis) / np.linalg.norm(axis)
     angle = math.atan2(float(np.linalg.norm(np.cross(a, b))), float(a @ b))
     if angle < POLE:
-        return [(1.0, list(start) if end is None else list(end))]
+        return [(1.0, list(end) if stated else list(start))]
     if math.pi - angle < 1e-6:
         raise BlockError("the tool axis turns to its opposite: the great circle between both is not determined")
     circle = a, b, angle
     out: list[tuple[float, list[float]]] = []
     turn = list(start)
     if math.hypot(a[0], a[1]) < POLE:
-        turn = [start[0], angles_of(machine, _on_circle(*circle, 0.5).tolist(), start if end is None else end)[1]]
+        turn = [start[0], angles_of(machine, _on_circle(*circle, 0.5).tolist(), end)[1]]
         if abs(turn[1] - start[1]) > 1e-9:
             out.append((0.0, list(turn)))
     last, steps = turn, math.ceil(angle / STEP)
     for k in range(1, steps + 1):
         last = angles_of(machine, _on_circle(*circle, k / steps).tolist(), last)
-    if end is not None:
+    if stated:
         off = max(abs(p - q) for p, q in zip(last, end, strict=True))
         upright = math.hypot(b[0], b[1]) < POLE
         if off > 0.01 and not (upright and abs(last[0] - end[0]) < 0.01):

@@ -81,7 +81,7 @@ class OrientedMoves(StatedPlaces):
             if not math.hypot(*vector) > 1e-6:
                 raise BlockError(f"{self.vector_words} of length 0")
             axis = np.array(vector) if self.frame is None else self.frame.matrix @ np.array(vector)
-            end = angles_of(machine, axis.tolist(), now)
+            end = angles_of(machine, axis.tolist(), now, limits=machine.limits)
         else:
             end = [angles.get(k, t) for k, t in zip(machine.letters, now, strict=True)]
             axis = machine.axis(np.radians([end]))[0]
@@ -89,7 +89,7 @@ class OrientedMoves(StatedPlaces):
         places = {k: start["XYZ".index(k)] for k in words}
         pieces = [(1.0, end)]
         if self.circle is not False and end != now and not any(math.isnan(v) for v in places.values()):
-            pieces = great_circle(machine, now, None if vector is not None else end, axis.tolist())
+            pieces = great_circle(machine, now, end, axis.tolist(), stated=vector is None)
         self.machine.log.room(len(pieces))
         out = []
         for n, (share, turn) in enumerate(pieces):

@@ -20,7 +20,9 @@ SAME = 1e-6  # mm: closer places are the same
 TABLES = ("zeros", "written", "lengths", "wear", "registers", "radius_wear")
 """Attributes of the reader that stay on a control when a program ends."""
 KEPT_MODES = ("fanuc", "haas")
-"""Controls that may keep modes at the end of a program; the others set them back."""
+"""Controls that may keep modes at the end of a program; the others set them back, but for these."""
+KEPT_BY_LINUXCNC = ("scale", "centre_absolute", "tcp_switch")
+"""Modes of the state that M2 and M30 of LinuxCNC leave as they are: G20 and G21, G90.1, M428."""
 
 
 class Change(NamedTuple):
@@ -62,14 +64,20 @@ def first_change(first: F64, second: F64, errors: list[tuple[int, str]]) -> Chan
     return None
 
 
-def left_modes(begin: State, end: State, assumed: tuple[str, ...] | None = None) -> list[str]:
+def left_modes(begin: State, end: State, assumed: tuple[str, ...] | None = None, tilted: bool = False) -> list[str]:
     """Modes of coordinates and feed that a program leaves otherwise than it found them, in words.
 
+    tilted  : whether a tilted plane is in force at the end
     assumed : G words that the program does not state before its first move; None: all modes count, stated or not
     """
     unsaid = {"G90", "G17", "G94", f"T{begin.tool} M6"} if assumed is None else set(assumed)
     left = {
         "a rotation, a scale or a mirror": end.frame is not None,
+        "a tilted plane": tilted,
+        f"G{21 if end.scale == 1.0 else 20}": end.scale != begin.scale,
+        "G90.1": end.centre_absolute and not begin.centre_absolute,
+        "tool centre point control": end.tcp and not begin.tcp,
+        end.work_offset: end.work_offset != begin.work_offset,
         "G91": end.relative and not begin.relative and "G90" in unsaid,
         f"G{end.plane}": end.plane != begin.plane and "G17" in unsaid,
         f"G{end.feed_mode}": end.feed_mode != begin.feed_mode and "G94" in unsaid,
@@ -86,4 +94,4 @@ def _others(a: F64, b: F64) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     return np.asarray(~(np.isclose(a, b, rtol=0.0, atol=SAME, equal_nan=True)).all(axis=1))
 
 
-__all__ = ["KEPT_MODES", "TABLES", "Change", "first_change", "left_modes"]
+__all__ = ["KEPT_BY_LINUXCNC", "KEPT_MODES", "TABLES", "Change", "first_change", "left_modes"]

@@ -77,6 +77,15 @@ def test_only_a_tool_in_air_throughout_cuts_nothing(number, lines, told):
     assert bool(found) is told and all(f.message.startswith(f"T{number}: ") for f in found)
 
 
+@pytest.mark.parametrize(("shift", "told"), [("Z40", True), ("X200", True), ("Z5", False)])
+def test_a_shift_that_takes_all_its_cuts_away_is_told(shift, told):
+    """The faces that it misses are not worked on, so no stock is left on an asked face; 5 mm is a layer above."""
+    found, _ = findings(*work(2, *faced(0.0)), f"G52 {shift}", *pocket(0.0), "G52 X0 Y0 Z0")
+    assert not findings(*work(1, *faced(0.0)), *pocket(0.0))[0]
+    assert bool(found) is told
+    assert all("in these shifted or turned coordinates" in f.message and f.line > 20 for f in found)
+
+
 def test_a_tool_that_stands_still_is_no_cutter():
     found, _ = findings(*work(2, *faced(0.0)), *work(1, "G0 X-15 Y-12", "Z8", "G1 Z2 F100", "X15", speed=0))
     assert not found

@@ -109,6 +109,12 @@ def test_drilling_cycles():
     assert (read("G73 X0 Y0 Z-3 R1 Q1 F80\nG80\n").kind == FEED).sum() == 4
 
 
+def test_a_drilling_cycle_in_inverse_time_is_refused():
+    """rs274 says: Cannot feed with zero feed rate."""
+    with pytest.raises(ProgramError, match="line 8: a drilling cycle in inverse time"):
+        read("G93\nG81 X0 Y0 Z-3 R1 F80\n")
+
+
 def test_machine_moves_leave_axes_unknown_until_programmed():
     p = read("G1 Z-1 F100\nG0 Z10\nG53 G0 Z0\nG0 X50\nG0 Z5\nG28\nG0 X1 Y1\nZ3\n")
     np.testing.assert_array_equal(p.end[-2:], [[50, 0, 5], [1, 1, 3]])

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from geometry.mesh import F64
-from verify.gcode.dialects.base import BlockError
+from verify.gcode.dialects.base import BlockError, DialectReader
 from verify.gcode.dialects.heidenhain.heidenhain_q import VALUE
 from verify.gcode.dialects.orientation import angles_of, needed
 from verify.gcode.dialects.oriented_moves import OrientedMoves
@@ -59,6 +59,11 @@ class HeidenhainFrames(OrientedMoves):
     def _reframe(self) -> None:
         """State the frame of the blocks that follow."""
         self.uncompensated("a change of the coordinates")
+        self.frame = self._whole()
+        self.forget()
+
+    def _whole(self) -> Frame | None:
+        """The transformations in force as one frame."""
         parts: list[Frame] = []
         if self.longer:
             axis = np.array([0.0, 0.0, 1.0]) if self.plane is None else self.plane[:, 2]
@@ -73,11 +78,18 @@ class HeidenhainFrames(OrientedMoves):
             parts.append(rotation(17, self.spun))
         if self.factor != 1.0:
             parts.append(scaling([self.factor] * 3))
-        whole = None
+        whole: Frame | None = None
         for part in parts:
             whole = part if whole is None else whole @ part
-        self.frame = whole
-        self.forget()
+        return whole
+
+    def keep_frames(self, ended: DialectReader) -> bool:
+        """Take shift, mirror, rotation, scale and plane over: MP7300 or clearMode decide whether M30 ends them."""
+        if isinstance(ended, HeidenhainFrames):
+            self.shift, self.spun, self.factor = list(ended.shift), ended.spun, ended.factor
+            self.mirrored, self.plane, self.swung, self.wanted = ended.mirrored, ended.plane, ended.swung, ended.wanted
+            self.frame = self._whole()
+        return self.frame is not None
 
     def reset_frames(self) -> None:
         """A preset ends datum shift, mirror, rotation and scale."""

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from geometry.mesh import F64
-from verify.gcode.dialects.base import BlockError
+from verify.gcode.dialects.base import BlockError, DialectReader
 from verify.gcode.dialects.orientation import angles_of, needed
 from verify.gcode.dialects.oriented_moves import OrientedMoves
 from verify.gcode.dialects.stated_places import digits, level
@@ -38,6 +38,13 @@ class SiemensFrames(OrientedMoves):
         self.swivel: Frame | None = None
         self.swung = False
         self.shifted: set[str] = set()
+
+    def keep_frames(self, ended: DialectReader) -> bool:
+        """Take the plane of CYCLE800 over: machine data decide whether M30 ends it."""
+        if isinstance(ended, SiemensFrames):
+            self.frame = self.swivel = ended.swivel
+            self.swung = ended.swung
+        return self.frame is not None
 
     def _reframe(self) -> None:
         """State the frame of the blocks that follow."""
