@@ -37,7 +37,7 @@ from benchmarks.five_axis.five_axis_sweep import SOURCES  # noqa: E402
 from benchmarks.jobs.parts_table import Stages  # noqa: E402
 from benchmarks.reach.family_score import digest_of  # noqa: E402
 
-ROWS = ROOT / "benchmarks" / "whole_job_rows"
+ROWS = ROOT / "benchmarks" / "jobs" / "whole_job_rows"
 PARTS: dict[str, dict[str, Any]] = {
     "demo:0": {}, "narrow:1": {}, "mixed_linear:0": {"walls": 2, "connections": 1}, "impeller:4": {}}
 AXES = {"3": None, "5": MACHINE}
