@@ -306,6 +306,7 @@ class Finish:
         if k > REFINEMENTS:
             return [touch_points.touches(self.field, self.checks.tips[failing])]
         every = np.arange(len(self.checks.points))
+        # a band has levels of its own, which go no deeper than it does
         whole = (k == 0 and not self.strategy.ordered and not self.settings.planes
                  and len(failing) > WHOLE * len(every))
         return self.strategy.rounds(k, every if whole else failing)
