@@ -408,7 +408,8 @@ def _way_in(piece: Piece, tool: ToolBody, settings: PlanSettings, around: Surrou
 
     The third value is the height, mm, above the beginning of that way down to which nothing stands near the tool. The
     tool comes down beside the beginning where there is room. Else it comes straight down: along a wall where its end is
-    round enough not to dig, and on its end where there is no more than a skin under it.
+    round enough not to dig, and on its end where there is no more than a skin under it. Beside a wall it comes down
+    into no more than a skin where no way is free of stock.
     """
     axis, thick = piece.axes[0], THICK * tool.diameter
     for way, stock, under in leads:
@@ -455,8 +456,9 @@ def _leads(piece: Piece, tool: ToolBody, thick: float, chord: float) -> list[Lea
     aside = piece.away[0] - (piece.away[0] @ axis) * axis
     aside /= np.linalg.norm(aside)
     down_the_wall = [(tip[None], thick, min(thick, skin))] if ROUND_END * tool.corner_radius >= thick else []
-    return [*((arc, 0.0, 0.0) for arc in _arcs_onto(piece, tool, aside, chord)), (straight(room * aside), 0.0, 0.0),
-            (straight(0.25 * room * aside), 0.0, 0.0), *down_the_wall]
+    ways = [*_arcs_onto(piece, tool, aside, chord), straight(room * aside), straight(0.25 * room * aside)]
+    # over a floor that is finished later the pass takes a skin under its end, and so does the way to it
+    return [*((way, 0.0, 0.0) for way in ways), *down_the_wall, *((way, 0.0, skin) for way in ways)]
 
 
 def _ahead(piece: Piece) -> F64 | None:

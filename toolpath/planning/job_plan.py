@@ -15,7 +15,6 @@ from itertools import pairwise
 from operator import itemgetter
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from geometry.cutting_mechanics import effective_diameter
@@ -43,6 +42,7 @@ from toolpath.planning.layouts_ahead import computed_ahead
 from toolpath.planning.zone_finishing import Finish, ZonePlan, motions_of, step_of, turned
 from toolpath.planning.zone_layout import ZoneLayout, layouts_of
 from toolpath.roughing.engagement_limited_clearing import Clearing
+from toolpath.roughing.layer_areas import at_or_under, cleared, layer_areas
 from toolpath.roughing.layers_over_floors import Columns, Floors, even_between, left_to_floors
 from toolpath.roughing.loose_pieces import loose_pieces
 from toolpath.roughing.sized_walls import SizedWalls
@@ -319,7 +319,7 @@ class _Layers:
         else:  # the stock is no longer that by which they were chosen
             heights = snapshot.heights.tolist()
             found = {z: t for z, t in floors.by_height if z in snapshot.floors}
-        places = _areas(field, tips, heights, step)
+        places = layer_areas(field, tips, heights, step)
         through = float(tips[:, 2].min())
         if snapshot is not None:
             self.loose = snapshot.loose
@@ -327,10 +327,11 @@ class _Layers:
             self.loose = loose_pieces(field, stock, heights[-1], places[-1].area)
         places = [p._replace(area=p.area | self.loose) for p in places]
         deeper = {z: places[next(k for k, h in enumerate(heights) if h < z)] for z in found}
-        own = [(z, LayerArea(_own(field, t, z), deeper[z].bare, floor=True)) for z, t in found.items()]
+        own = [(z, LayerArea(at_or_under(field, t, z), deeper[z].bare, floor=True)) for z, t in found.items()]
         if self.loose.any() and (snapshot is None or through in snapshot.floors):  # else a skin stays under them
             own.append((through, LayerArea(self.loose, floor=True)))
-        self.left = sorted([*zip(heights, places, strict=True), *own], key=itemgetter(0), reverse=True)
+        layers = sorted([*zip(heights, places, strict=True), *own], key=itemgetter(0), reverse=True)
+        self.left = cleared(field, layers, level)
 
     def _heights(self, ends: Sequence[float], under: float) -> list[float]:
         """Heights of the whole layers, mm, descending: even between ``ends``, and what else asks for one."""
@@ -395,7 +396,7 @@ class _Layers:
             return made
         linker = self._linker()
         for z in between:
-            self._walk(linker, z, LayerArea(_own(field, self.tips, z)))
+            self._walk(linker, z, LayerArea(at_or_under(field, self.tips, z)))
         return made + self._step(number + len(made), "semi_finishing", linker)
 
     def _rim_pace(self, deepest: float) -> Pace:
@@ -465,33 +466,3 @@ def _left_alone(faces: LeftAlone | None, field: TipField, tips: F64) -> tuple[F6
     wide = faces.spacing + 1.5 * field.lattice.step
     near = cKDTree(tips[:, :2]).query(touching[:, :2], distance_upper_bound=wide)[0]
     return touching[~np.isfinite(near)], wide
-
-
-def _own(field: TipField, tips: F64, z: float) -> NDArray[np.bool_]:
-    """(ny, nx) bool: nodes near tips (n, 3), mm, of finished samples that lie at a height or lower."""
-    lat = field.lattice
-    mask = lat.mask(tips[tips[:, 2] <= z + 1e-6, :2])
-    return dilated(mask, max(0.5 * field.tool.radius / lat.step, 1.5)) if mask.any() else mask
-
-
-def _areas(field: TipField, tips: F64, heights: Sequence[float], step: float) -> list[LayerArea]:
-    """For each layer, where stock is removed down to it.
-
-    That is where this tool has something to finish below, and where shank and holder come once the tool is down in
-    any deeper layer, since stock there would meet them.
-
-    tips    : (n, 3) float64, mm, of the samples to finish; heights : mm, of the layers, descending
-    """
-    lat = field.lattice
-    out: list[LayerArea] = []
-    rising = list(heights[::-1])
-    for z in rising:
-        own, met = _own(field, tips, z), lat.mask(np.zeros((0, 2)))
-        for disc in field.discs:
-            low = z + step - disc.height
-            deeper = [k for k in range(len(out)) if rising[k] <= low]
-            reach = _own(field, tips, low) | out[deeper[-1]].area if deeper else _own(field, tips, low)
-            if reach.any():
-                met = met | dilated(reach, field.disc_radius(disc, 0.0) / lat.step)
-        out.append(LayerArea(own | met, dilated(met, field.tool.radius / lat.step)))
-    return out[::-1]

@@ -81,8 +81,8 @@ class LayerArea(NamedTuple):
     """Where a layer removes stock.
 
     area : (ny, nx) bool on the lattice, where this tool has something to finish below, or shank or holder come
-    bare : (ny, nx) bool on the lattice, places of the tip within a radius of where shank or holder come in a deeper
-           layer: an island that stayed there would stop them; None: nowhere
+    bare : (ny, nx) bool on the lattice, places of the tip within a radius of where no island may stay: shank or holder
+           come there in a deeper layer, or no later layer comes to that floor; None: nowhere
     floor : whether it is a layer above a floor, between those of the whole depth
     """
 

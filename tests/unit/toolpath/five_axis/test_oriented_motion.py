@@ -7,10 +7,20 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, tool
-from toolpath.five_axis.oriented_motion import MIN_PACE, Surroundings, _begun_level, _descends, _steady, loaded, paced
+from toolpath.five_axis.oriented_motion import (
+    MIN_PACE,
+    Surroundings,
+    _begun_level,
+    _descends,
+    _steady,
+    loaded,
+    paced,
+    with_ways,
+)
 from toolpath.five_axis.oriented_piece import Piece
-from toolpath.plan_settings import RotaryAxes
-from toolpath.stock.stock_map import StockMap
+from toolpath.plan_settings import CutData, PlanSettings, RotaryAxes
+from toolpath.stock.stock_map import SKIN, StockMap
+from toolpath.workingsteps import TrajectoryKind
 from zones.reach.assembly import Clearances, Disc
 
 STEP, TOP = 0.1, 12.0
@@ -226,3 +236,24 @@ def test_axes_that_lie_are_left_and_cost_no_more_than_others():
     around = Surroundings(lambda tips, axes: np.zeros(len(tips), bool), free, stock, (), Clearances())
     lean = np.array([[np.sqrt(1.0 - z * z), 0.0, z] for z in (0.05, 0.3)])
     assert around.blocked(np.full((2, 3), 40.0), lean, tool(6.0, 1.0)).tolist() == [True, False]
+
+
+@pytest.mark.parametrize(("left", "cut"), [(0.0, True), (0.4, True), (0.7, False)])
+def test_a_flank_pass_begins_on_a_floor_that_is_finished_later(left, cut):
+    """The end takes a skin along the whole pass, and so it may on the way to it: on the demo part no flank pass began
+    once layers left 0.27 mm on floors."""
+    body, up = tool(6.0, 0.0, neck=20.0, stickout=30.0), np.array([0.0, 0.0, 1.0])
+    stock = block((0.0, 0.0), (30.0, 30.0, left))
+    free = RotaryAxes(lambda a: np.ones(len(a), bool), lambda t, a: (t, a, np.zeros(len(t) - 1)), up, -1e3)
+    around = Surroundings(lambda tips, axes: tips[:, 1] < 15.0 - 1e-9, free, stock, (), Clearances())
+    tips = np.column_stack([np.linspace(9.0, 21.0, 25), np.full(25, 15.0), np.full(25, 0.02)])
+    piece = Piece(tips, np.tile(up, (25, 1)), np.tile([0.0, 1.0, 0.0], (25, 1)), 8.0)
+    settings = PlanSettings(0.02, 0.004, 0.0, 0.002, 15.0, 14.0, np.radians(3.0))
+    made = with_ways(piece, body, CutData(10_000, 800, 200, 3000, 1.8), settings, around)
+    assert left < 0.5 * body.diameter and (left - 0.02 < SKIN * body.diameter) is cut
+    if not cut:
+        assert isinstance(made, str)
+        return
+    slow = [t for t in made if t.motion is TrajectoryKind.APPROACH and t.feed == 200]
+    assert slow[0].points[0, 2] > left + 0.3  # the feed of a plunge begins above the stock
+    assert any(t.motion is TrajectoryKind.CUT for t in made)
