@@ -23,7 +23,7 @@ from service.delivery.written_program import WrittenProgram
 from service.pictures.proof_picture import MAP_NAME, draw_proof
 from service.report import report as reporting
 from service.report.computed_ahead import ComputedAhead
-from service.setup_sheet.setup_sheet import sheet_files
+from service.setup_sheet.setup_sheet import clamp_pictures, sheet_files
 from service.stages.access_plan import ProofFrame, in_setup_frame
 from service.stages.access_settings import leaned
 from service.stages.cautions import (
@@ -89,6 +89,7 @@ def deliver_job(job: ProvedPlan, cautions: Sequence[JobCaution], out: Path, mesh
     with ThreadPoolExecutor(1, initializer=numba.set_num_threads, initargs=(1,)) as pool:
         deviation = pool.submit(deviation_map, ready, job.frame, job.samples, job.proof, job.conditions, report,
                                 out / MAP_NAME)
+        clampings = pool.submit(clamp_pictures, ready, reported.written)
         page = plan_view(ready, job.frame, job.scored, job.zone, reported.uncut, reported.remainder, job.proof,
                          programs, job.read(), job.conditions, report)
         if page:
@@ -100,7 +101,7 @@ def deliver_job(job: ProvedPlan, cautions: Sequence[JobCaution], out: Path, mesh
         files[MESH_NAME] = ("machined", "", None, data)
     if proved:
         files.update(stepnc.files(job.written, reported.written, job.frame.part, tools, job.conditions))
-    files.update(sheet_files(ready, reported.written, report, files))
+    files.update(sheet_files(ready, reported.written, report, files, clampings.result()))
     files.update(page)
     deliver(out, report, files)
     return report

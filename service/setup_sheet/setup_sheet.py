@@ -58,18 +58,21 @@ ZONE_WORDS = (
 HTML_NAME, PDF_NAME = "sheet.html", "sheet.pdf"
 
 
-def sheet_files(ready: Prepared, written: Sequence[WrittenProgram], report: Mapping[str, Any], files: Files) -> Files:
+def sheet_files(ready: Prepared, written: Sequence[WrittenProgram], report: Mapping[str, Any], files: Files,
+                clampings: Sequence[bytes]) -> Files:
     """Both forms of the sheet of a job.
 
-    written : the programs; of an unproved job the sheet gives only their heights
-    files   : the other files of the job; the sheet shows its deviation map
+    written   : the programs; of an unproved job the sheet gives only their heights
+    files     : the other files of the job; the sheet shows its deviation map
+    clampings : of ``clamp_pictures`` for the same programs
 
     Raises
     ------
     OutputError
         Code 'bad_epoch': SOURCE_DATE_EPOCH is no number.
     """
-    sheet = sheet_of(ready, written, {**report, "files": listed(files)}, _bytes_of(files, "deviation"))
+    sheet = sheet_of(ready, written, {**report, "files": listed(files)}, _bytes_of(files, "deviation"),
+                     clampings)
     return {HTML_NAME: ("sheet", "", None, html_of(sheet)), PDF_NAME: ("sheet", "", None, pdf_of(sheet))}
 
 
@@ -78,10 +81,11 @@ def _bytes_of(files: Files, kind: str) -> bytes | None:
 
 
 def sheet_of(ready: Prepared, written: Sequence[WrittenProgram], report: Mapping[str, Any],
-             deviation: bytes | None) -> SetupSheet:
+             deviation: bytes | None, clampings: Sequence[bytes]) -> SetupSheet:
     """The sheet of a job.
 
     deviation : PNG of the deviation map, or None
+    clampings : of ``clamp_pictures``
     """
     inputs = ready.inputs
     proved = report["state"] == "proved"
@@ -92,7 +96,7 @@ def sheet_of(ready: Prepared, written: Sequence[WrittenProgram], report: Mapping
     title = inputs.labels.get("order") or "zonemill job"
     findings = findings_section(report)
     sections = [job_section(report, inputs), *([] if proved else [findings]),
-                cautions_section(report), *_clampings(ready, written, report),
+                cautions_section(report), *_clampings(ready, written, report, clampings),
                 _tools(inputs, report), _steps(inputs, written, report),
                 SheetSection("zones", "Zones", (zones_table(report), Lines("How to read it", ZONE_WORDS))),
                 SheetSection("remainder", "Remainder", (remainder_table(report),)), *([findings] if proved else []),
@@ -106,29 +110,46 @@ def sheet_of(ready: Prepared, written: Sequence[WrittenProgram], report: Mapping
     return SetupSheet(f"Setup sheet: {title}", proved, verdict, foot, tuple(sections))
 
 
-def _clampings(ready: Prepared, written: Sequence[WrittenProgram], report: Mapping[str, Any]) -> list[SheetSection]:
-    """One section for each clamping of the part, or for the first access where nothing is cut."""
+def clamp_pictures(ready: Prepared, written: Sequence[WrittenProgram]) -> list[bytes]:
+    """Pictures of the clampings of a job, as PNG, in the order of the sheet; ``written`` : the programs."""
+    frames = _frames(ready, written)
+    return [clamp_picture(_clamped(ready, f), f"{f.id if len(frames) > 1 else 'Clamping'}: seen from the front right")
+            for f in frames]
+
+
+def _frames(ready: Prepared, written: Sequence[WrittenProgram]) -> list[ProofFrame]:
+    """The frame of each clamping of the part, or of the first access where nothing is cut."""
     names = list(dict.fromkeys(p.access for p in written)) or [ready.views[0].id]
-    frames = [proof_frame(ready)] if ready.inputs.turns else [ProofFrame.of(ready.view(n)) for n in names]
+    return [proof_frame(ready)] if ready.inputs.turns else [ProofFrame.of(ready.view(n)) for n in names]
+
+
+def _clamped(ready: Prepared, frame: ProofFrame) -> Clamped:
+    inputs, turns = ready.inputs, ready.inputs.turns
+    return Clamped(frame.part, _blank_mesh(ready, frame.rotation), not ready.blank.stands_alone,
+                   tuple(corners_of(box) @ frame.rotation.T for box in inputs.fixtures),
+                   access_of(ready, frame).work_offset,
+                   tuple((v.id, frame.rotation @ v.direction) for v in ready.views if turns or v.id == frame.id))
+
+
+def _clampings(ready: Prepared, written: Sequence[WrittenProgram], report: Mapping[str, Any],
+               pictures: Sequence[bytes]) -> list[SheetSection]:
+    """One section for each clamping of the part, or for the first access where nothing is cut."""
+    frames = _frames(ready, written)
     return [_clamping(ready, frame, [p for p in written if len(frames) == 1 or p.access == frame.id], report,
-                      len(frames) > 1) for frame in frames]
+                      len(frames) > 1, picture) for frame, picture in zip(frames, pictures, strict=True)]
 
 
 def _clamping(ready: Prepared, frame: ProofFrame, programs: Sequence[WrittenProgram], report: Mapping[str, Any],
-              several: bool) -> SheetSection:
+              several: bool, picture: bytes) -> SheetSection:
     inputs, turns = ready.inputs, ready.inputs.turns
-    access = access_of(ready, frame)
-    held = Clamped(frame.part, _blank_mesh(ready, frame.rotation), not ready.blank.stands_alone,
-                   tuple(corners_of(box) @ frame.rotation.T for box in inputs.fixtures),
-                   access.work_offset,
-                   tuple((v.id, frame.rotation @ v.direction) for v in ready.views if turns or v.id == frame.id))
+    held, offset = _clamped(ready, frame), access_of(ready, frame).work_offset
     names, listed_names = [n for p in programs for _, n, _ in p.files()], {f["name"] for f in report["files"]}
     blank = ready.blank.corners(frame.rotation)
     axes = frame.rotation @ _setup_axes(inputs.placement)
     frame_name = "the frame of the setup" if turns else f"the frame of access {frame.id}"
     pairs = [
         ("Programs", ", ".join(n for n in names if n in listed_names) or "none written"),
-        ("Work offset", access.work_offset),
+        ("Work offset", offset),
         ("Program zero", f"{place(inputs.placement.origin)} in the coordinates of the part's file, in which X of the "
                          f"program is {_direction(axes[0].tolist())} and Z is {_direction(axes[2].tolist())}"),
         *([] if turns else [("Tool axis", f"{frame.id}: {_direction(frame.rotation[2].tolist())} of the setup is Z of "
@@ -138,7 +159,6 @@ def _clamping(ready: Prepared, frame: ProofFrame, programs: Sequence[WrittenProg
             "" if ready.blank.stands_alone else f": the part grown by {number(ready.blank.margin)}") + (
             f"; the real one may stand {number(ready.blank.uncertainty)} beyond" if ready.blank.uncertainty else "")),
         *_heights([p.work for p in programs])]
-    picture = clamp_picture(held, f"{frame.id if several else 'Clamping'}: seen from the front right")
     blocks: list[Block] = [Picture(picture, _seen(held, blank)), Facts(tuple(pairs))]
     if turns:
         blocks.append(_turned(report, (inputs.machine.kinematics or "")[-2:]))
@@ -286,4 +306,4 @@ def html_of(sheet: SetupSheet) -> bytes:
     return (_template().render(sheet=sheet).rstrip() + "\n").encode()
 
 
-__all__ = ["HTML_NAME", "PDF_NAME", "html_of", "sheet_files", "sheet_of"]
+__all__ = ["HTML_NAME", "PDF_NAME", "clamp_pictures", "html_of", "sheet_files", "sheet_of"]

@@ -173,8 +173,10 @@ def mesh_chunks(f: Facets, low: F64) -> tuple[list[Chunk], list[Chunk]]:
 def clustered(f: Facets) -> Facets:
     """The facets with all corners of a face in one grid cell merged; facets that lose a corner are left out."""
     cell = max(float(np.linalg.norm(np.ptp(f.place, axis=0))) / CELLS, 1e-9)
-    key = np.column_stack([np.floor((f.place - f.place.min(axis=0)) / cell).astype(np.int64), f.face])
-    _, first, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    x, y, z = (np.floor((f.place - f.place.min(axis=0)) / cell).astype(np.int64) + 1).T
+    # no coordinate has more than CELLS + 1 of them; one number is sorted several times faster than a row
+    key = ((x * (CELLS + 3) + y) * (CELLS + 3) + z) * (int(f.face.max()) + 1) + f.face
+    _, first, group = np.unique(key, return_index=True, return_inverse=True)
     group = group.reshape(-1)
     count = np.bincount(group).astype(np.float64)[:, None]
     mean = [np.stack([np.bincount(group, weights=v[:, k]) for k in range(3)], axis=1) / count
@@ -189,14 +191,16 @@ def _by_label(f: Facets, low: F64, lod: int) -> list[Chunk]:
     out = []
     for label in np.unique(f.label).tolist():
         corners = f.corners[f.label == label]
-        used, place = np.unique(corners, return_inverse=True)
+        is_used = np.zeros(len(f.place), np.bool_)
+        is_used[corners] = True
+        used, row = np.flatnonzero(is_used), np.cumsum(is_used) - 1
         left = np.clip(np.rint(f.left[used] / LEFT_UNIT), -MAX_LEFT_UNITS, MAX_LEFT_UNITS)
         out.append(Chunk("mesh", {"label": int(label), "lod": lod}, {
             "place": Column(np.rint((f.place[used] - low) / GRID), 4, "steps"),
             "normal": Column(np.rint(f.normal[used] * UNIT), 1, "signed"),
             "face": Column(f.face[used], 4, "steps"), "left": Column(left, 2, "signed"),
             "judged": Column(f.judged[used], 1),
-            "corners": Column(place.reshape(-1, 3), 4, "steps")}))
+            "corners": Column(row[corners], 4, "steps")}))
     return out
 
 

@@ -15,9 +15,8 @@ from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 from OCP.TopTools import TopTools_IndexedMapOfShape
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
+from geometry.joined_pairs import groups
 from geometry.mesh import F64, TriangleMesh
 from geometry.step_import.occ.deviation import face_deviations, node_gaps
 from geometry.step_import.occ.holes import extend_parameters, fill_slivers
@@ -152,7 +151,7 @@ def _join(solid: Shape, faces: list[FaceMesh]) -> tuple[TriangleMesh, F64, list[
     """
     offsets = np.concatenate([[0], np.cumsum([len(f.nodes) for f in faces])])
     pairs, edge_nodes = _shared_nodes(solid, offsets)
-    label = _components(pairs, int(offsets[-1]))
+    label = groups(pairs, int(offsets[-1]))
     nodes = np.concatenate([f.nodes for f in faces])
     corners = np.concatenate([f.triangles + offsets[i] for i, f in enumerate(faces)])
     ids = np.repeat(np.arange(1, len(faces) + 1), [len(f.triangles) for f in faces])
@@ -161,7 +160,7 @@ def _join(solid: Shape, faces: list[FaceMesh]) -> tuple[TriangleMesh, F64, list[
     sides = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
     short = np.linalg.norm(nodes[sides[:, 0]] - nodes[sides[:, 1]], axis=1) < WELD
     if short.any():
-        label = _components(np.concatenate([pairs, sides[short]]), int(offsets[-1]))
+        label = groups(np.concatenate([pairs, sides[short]]), int(offsets[-1]))
         triangles = label[corners]
     first = np.full(label.max() + 1, -1, np.int64)
     first[label[::-1]] = np.arange(len(label))[::-1]
@@ -174,11 +173,6 @@ def _join(solid: Shape, faces: list[FaceMesh]) -> tuple[TriangleMesh, F64, list[
     cuts = np.cumsum([triangles.size, *[len(e) for e in edge_nodes]])
     edges = [packed[cuts[i]:cuts[i + 1]] for i in range(len(edge_nodes))]
     return TriangleMesh(nodes[first[used]], corners_packed.astype(np.int32), ids.astype(np.int32)), uv, edges
-
-
-def _components(pairs: np.ndarray, count: int) -> np.ndarray:
-    graph = coo_matrix((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def _shared_nodes(solid: Shape, offsets: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:

@@ -11,7 +11,6 @@ from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE
 from OCP.TopExp import TopExp
 from OCP.TopoDS import TopoDS
 from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape
-from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
 from geometry.step_import.occ.topology import Shape
@@ -30,6 +29,8 @@ def free_edge_gap(edges: Sequence[Shape]) -> float:
     """
     if len(edges) < 2:
         return float("inf") if edges else 0.0
+    from scipy.spatial import cKDTree  # few parts have free edges, and it takes a fifth of a second
+
     lines = [_points(e) for e in edges]
     owner = np.repeat(np.arange(len(lines)), [SAMPLES - 1] * len(lines))
     start = np.concatenate([p[:-1] for p in lines])

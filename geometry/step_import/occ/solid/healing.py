@@ -16,10 +16,9 @@ from OCP.ShapeFix import ShapeFix_Shape
 from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
 from OCP.TopoDS import TopoDS
 from OCP.TopTools import TopTools_ListOfShape
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from geometry.errors import PartError
+from geometry.joined_pairs import groups
 from geometry.step_import.occ.solid.consistency import check_edges
 from geometry.step_import.occ.solid.gaps import free_edge_gap, free_edges
 from geometry.step_import.occ.solid.meetings import FUSE_TOLERANCE, Meeting, Share, box_groups, meetings, split_bodies
@@ -185,9 +184,7 @@ def _united(bodies: list[Body], solid: int | None, fuse: bool,
             met += [Meeting(group[m.first], group[m.second], m.share, m.place) for m in meetings(shapes, split)]
             splits |= dict.fromkeys(group, split)
     pairs = [(m.first, m.second) for m in met if _belong(bodies[m.first], bodies[m.second], m.share, fuse)]
-    ends = np.array(pairs, np.int64).reshape(-1, 2)
-    graph = coo_matrix((np.ones(len(ends), np.int8), (ends[:, 0], ends[:, 1])), shape=(len(bodies),) * 2)
-    label = connected_components(graph, directed=False)[1]
+    label = groups(np.array(pairs, np.int64), len(bodies))
     out: list[Body] = []
     place = np.full(len(bodies), -1, np.int64)
     for k in dict.fromkeys(label.tolist()):

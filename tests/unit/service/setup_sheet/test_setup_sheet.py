@@ -21,7 +21,7 @@ from service.from_wire import parse_setup
 from service.pictures.clamping_picture import box_mesh, corners_of
 from service.setup_sheet.model import Facts, SetupSheet, SheetSection
 from service.setup_sheet.pdf import latin, pdf_of
-from service.setup_sheet.setup_sheet import sheet_files
+from service.setup_sheet.setup_sheet import clamp_pictures, sheet_files
 from service.stages.blank_model import blank_of
 from service.stages.job_inputs import JobInputs
 from tests.synthetic_plan import plan, step
@@ -136,7 +136,7 @@ def made(state: str = "proved", findings: list[dict[str, Any]] | None = None, cu
     if state == "proved":
         files["program.linuxcnc.ngc"] = ("program", "linuxcnc", "A1", b"G21\n")
     written = [WrittenProgram("A1", work, "G21 (not to be seen)\n")] if cut else []
-    got = sheet_files(ready, written, report, files)  # type: ignore[arg-type]
+    got = sheet_files(ready, written, report, files, clamp_pictures(ready, written))  # type: ignore[arg-type]
     assert {name: f[0] for name, f in got.items()} == {"sheet.html": "sheet", "sheet.pdf": "sheet"}
     return {name: data for name, (*_, data) in got.items() if isinstance(data, bytes)}
 
@@ -246,7 +246,7 @@ def test_a_part_that_is_turned_by_hand_is_shown_as_it_lies_each_time():
                WrittenProgram("A2", plan(third, clearance_plane=33.0), "G21\n", ".A2.part2")]
     report = report_of("proved", [])
     files: Files = {name: ("program", "linuxcnc", p.access, b"G21\n") for p in written for _, name, _ in p.files()}
-    for name, (*_, data) in sheet_files(ready, written, report, files).items():  # type: ignore[arg-type]
+    for name, (*_, data) in sheet_files(ready, written, report, files, clamp_pictures(ready, written)).items():  # type: ignore[arg-type]
         text = " ".join(" ".join(Page(data.decode()).words).split()) if name.endswith("html") else pdf_text(data)
         standing = text.split("Clamping and program zero, A2")[-1]
         assert "-X of the setup is Z of the program" in standing and "X of the program is +Y and Z is -X" in standing
@@ -266,7 +266,7 @@ def test_each_control_has_its_own_label():
                          'N200, STEP_S02, LBL "S02"'), ({"haas": ""}, "N200")):
         written = [WrittenProgram("A1", plan(*steps(), restart=True), "G21\n", dialect="fanuc", others=others)]
         files: Files = {name: ("program", d, "A1", b"G21\n") for d, name, _ in written[0].files()}
-        got = sheet_files(ready, written, report_of("proved", []), files)  # type: ignore[arg-type]
+        got = sheet_files(ready, written, report_of("proved", []), files, clamp_pictures(ready, written))  # type: ignore[arg-type]
         words = " ".join(" ".join(Page(got["sheet.html"][3].decode()).words).split())
         assert told in words and ("STEP_S02" in words) == ("STEP" in told)
         assert "when all steps before it have been cut" in words

@@ -11,6 +11,7 @@ from geometry.step_import.reader import read_part
 from service.viewer.view_data import tool_shape
 from service.viewer.view_file import read_view, write_view
 from service.viewer.view_mesh import (
+    CELLS,
     JUDGED,
     LEFT_UNIT,
     NOBODY,
@@ -106,6 +107,19 @@ def test_the_rough_level_is_smaller_and_near(facets):
     assert 0 < len(rough.corners) <= len(facets.corners)
     assert np.abs(rough.place.min(axis=0)).max() < 0.4 and np.abs(rough.place.max(axis=0) - [20, 10, TOP]).max() < 0.4
     assert set(rough.label.tolist()) <= set(facets.label.tolist())
+
+
+def test_corners_of_one_cell_and_face_become_one(facets):
+    """Against groups by whole rows of cell and face, also where a face has a high number."""
+    for high in (0, 4711):
+        f = replace(facets, face=facets.face + np.int32(high))
+        cell = float(np.linalg.norm(np.ptp(f.place, axis=0))) / CELLS
+        rows = np.column_stack([np.floor((f.place - f.place.min(axis=0)) / cell).astype(np.int64), f.face])
+        _, first, group = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+        rough = clustered(f)
+        assert np.array_equal(rough.face, f.face[first])
+        mean = [f.place[group.reshape(-1) == k].mean(axis=0) for k in range(len(first))]
+        np.testing.assert_allclose(rough.place, mean, atol=1e-9)
 
 
 def test_names_stand_at_the_upper_end(part):
