@@ -13,7 +13,7 @@ from geometry.tool_body import HolderFrustum
 from tests.hand_parts import as_part, ball, box_mesh, field_of, joined, samples_of, terraces, tool, view_of
 from zones.model import Connection, Decomposition
 from zones.reach.tip_field import touchable
-from zones.remainder.remainder import explain
+from zones.remainder.remainder import MAX_SAMPLES, _examined, explain
 from zones.remainder.tool_catalogue import DIAMETERS, catalogue
 
 NOTHING = Decomposition((), (), ())
@@ -159,6 +159,22 @@ def test_many_samples_are_asked_by_a_share_and_areas_still_sum():
     found = stays(mesh, [ball(3.0, neck=1.0, shank=9.0)], s)
     assert sum(r.area for r in found) == pytest.approx(s.area.sum())
     assert found == sorted(found, key=lambda r: -r.area)
+
+
+@pytest.mark.parametrize("wide", [0, 40, 900, 5000])
+def test_no_sample_that_stands_for_much_is_left_to_chance(wide):
+    """Samples of 0.01 mm² with squares of 0.25 among them: at random some squares more or less changed a face of the
+    demo part from 78 to 70 mm²."""
+    area = np.full(40_000, 0.01)
+    area[np.random.default_rng(wide).choice(20_000, wide, replace=False)] = 0.25  # in the first half
+    rows, stands_for = _examined(area)
+    assert len(rows) == len(np.unique(rows)) == len(stands_for) == MAX_SAMPLES
+    assert stands_for.sum() == pytest.approx(area.sum())
+    first = rows < 20_000
+    few_are_wide = wide <= MAX_SAMPLES // 2
+    assert stands_for[first].sum() == pytest.approx(area[:20_000].sum(), rel=0.03 if few_are_wide else 0.1)
+    if 0 < wide and few_are_wide:
+        assert (area[rows] == 0.25).sum() == wide and (stands_for[area[rows] == 0.25] == 0.25).all()
 
 
 def clamped_channel():
