@@ -131,8 +131,10 @@ class Reader(BlockMotion):
             left = left_modes(begin.s, self.s, tilted=tilted)
             why = f" ({', '.join(left)})" if left else ""
             if change := curved or again._change(text, lines, table):
-                log.remark("second_run", f"M99 begins the program again with what it has left{why}: the second round "
-                           f"has {change.what} in line {change.line}; set it back before M99", line=log.repeats)
+                word = "GOTOS" if "GOTOS" in lines[log.repeats - 1].upper() else "M99"
+                log.remark("second_run", f"{word} begins the program again with what it has left{why}: the second "
+                           f"round has {change.what} in line {change.line}; set it back before {word}",
+                           line=log.repeats)
             return
         if self.tables_written:
             again = begin._copy()

@@ -173,4 +173,14 @@ def too_many_jumps(log: Log, limit: int) -> ProgramError:
                         limit=limit, remedy="correct the condition of the loop or jump, or split the program")
 
 
-__all__ = ["NUMBER", "ZEROS", "BlockError", "DialectReader", "too_many_jumps", "zero_word"]
+def endless(log: Log, rounds: int) -> ProgramError:
+    """The error of a jump back, in the line that is read, that finds all values and modes as they were before.
+
+    rounds : jumps so far
+    """
+    return ProgramError(f"{log.name}, line {log.line}: the jump back finds all values and modes as they were the time "
+                        "before, so the loop has no end", code="program_too_long", subjects=(f"line {log.line}",),
+                        measured=rounds, remedy="correct the condition of the loop or jump")
+
+
+__all__ = ["NUMBER", "ZEROS", "BlockError", "DialectReader", "endless", "too_many_jumps", "zero_word"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from verify.gcode.dialects.base import BlockError, Machine, too_many_jumps
+from verify.gcode.dialects.base import BlockError, Machine, endless, too_many_jumps
 from verify.gcode.dialects.heidenhain.heidenhain_q import QParameters
 
 MAX_JUMPS = 200_000
@@ -57,6 +57,7 @@ class HeidenhainFlow:
         self._back: list[int] = []
         self._left: dict[int, int] = {}
         self._jumps = 0
+        self._before: dict[int, str] = {}  # the state at the latest jump back from each line
 
     def run(self) -> Iterator[tuple[int, str]]:
         """Line numbers from 1 and blocks, in order; a block over several lines (~) comes whole.
@@ -66,7 +67,7 @@ class HeidenhainFlow:
         BlockError
             A jump or call cannot be followed.
         ProgramError
-            Code program_too_long: more than ``MAX_JUMPS`` jumps.
+            Code program_too_long: more than ``MAX_JUMPS`` jumps, or a loop without end.
         """
         at, lines = 0, self.lines
         while at < len(lines):
@@ -117,7 +118,7 @@ class HeidenhainFlow:
             raise BlockError(f"'{text[:50]}' runs a program that is not in this file",
                              "copy it into the file as a subprogram (LBL to LBL 0) and call it by CALL LBL")
         if text.startswith("FN") and (label := self.q.jump(text)) is not None:
-            return self._jump(self._find(label)) if label else at
+            return self._jump(self._find(label), at) if label else at
         return at
 
     def _call(self, label: str, times: str | None, at: int) -> int:
@@ -149,8 +150,17 @@ class HeidenhainFlow:
             raise BlockError(f"the label {label} is not in the program")
         return self._labels[label]
 
-    def _jump(self, to: int) -> int:
+    def _jump(self, to: int, at: int | None = None) -> int:
+        """Count a jump, and give where it goes to; ``at`` is the line behind an FN.
+
+        A jump back that finds everything as it was the time before has no end.
+        """
         self._jumps += 1
+        if at is not None and to < at:
+            now = repr((self.q.held, self.machine.s, self._left, self._back))
+            if self._before.get(at) == now:
+                raise endless(self.machine.log, self._jumps)
+            self._before[at] = now
         if self._jumps > MAX_JUMPS:
             raise too_many_jumps(self.machine.log, MAX_JUMPS)
         return to

@@ -11,7 +11,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from verify.gcode.block_words import BlockError
-from verify.gcode.dialects.base import Machine, too_many_jumps
+from verify.gcode.dialects.base import Machine, endless, too_many_jumps
 from verify.gcode.dialects.siemens.siemens_expressions import Value, ValueReader, Variables, same
 
 MAX_JUMPS = 200_000
@@ -31,6 +31,7 @@ _KEYWORD = re.compile(r"(IF|ELSE|ENDIF|WHILE|ENDWHILE|FOR|ENDFOR|LOOP|ENDLOOP|RE
                       r"(IF|WHILE|UNTIL|CASE|EXTCALL|PCALL|RET|CALLPATH)(?=\()")
 _CALL = re.compile(r"(L[0-9]+|[A-Z_]{2}[A-Z_0-9]*)\s*(\(|P\b|P[0-9=]|$)")
 _RETURN = re.compile(r"(?<![A-Z_0-9$\"])(M17|M0?2|M30|RET)(?![A-Z_0-9=(])")
+_DECIDES = re.compile(r"(?<![A-Z_0-9$])(IF|CASE|WHILE|UNTIL|GOTO[FBC]?)(?![A-Z_0-9=])", re.IGNORECASE)
 Steps = Generator[tuple[int, str], None, int]
 """Lines to run, and the line that follows them."""
 _OPENS = {"WHILE": "ENDWHILE", "FOR": "ENDFOR", "LOOP": "ENDLOOP", "REPEAT": "UNTIL", "IF": "ENDIF"}
@@ -96,6 +97,7 @@ class SiemensFlow:
         self.pairs: dict[int, dict[str, int]] = {}
         self.modal = ""  # the call that MCALL repeats after each move
         self._jumps = 0
+        self._before: dict[int, str] = {}  # the state at the latest jump back from each line
         self._calls: list[_Frame] = []
         self._paired: set[int] = set()
         self._labels: dict[str, list[int]] | None = None
@@ -113,7 +115,7 @@ class SiemensFlow:
         BlockError
             A jump, loop or call cannot be followed.
         ProgramError
-            Code program_too_long: more than ``MAX_JUMPS`` jumps.
+            Code program_too_long: more than ``MAX_JUMPS`` jumps, or a loop without end.
         """
         main = self.sections[""]
         self._calls = [_Frame(main, -1)]
@@ -182,6 +184,12 @@ class SiemensFlow:
             if not isinstance(name, str) or reader.text[reader.at:].strip():
                 raise BlockError(f"{body[:60]}: CALL is followed with the name of a program alone")
             return self._call(re.sub(r"^_N_|_[MS]PF$", "", name.upper().rsplit("/", 1)[-1]), at + 1)
+        if word == "GOTOS" and len(self._calls) == 1 and not any(_DECIDES.search(line) for line in self.lines):
+            log = self.machine.log
+            log.note(f"line {at + 1}: GOTOS begins the main program again without end; the proof reads it once")
+            log.repeats = at + 1
+            yield at + 1, "M30"
+            return len(self.lines)
         if word.startswith("GOTO"):
             return self._goto(word, reader, at)
         return self._structure(word, reader, at)
@@ -203,7 +211,7 @@ class SiemensFlow:
             rest = name.upper()
         first, end = self.frame.section.first, self.frame.section.end
         if word == "GOTOS":
-            return self._jump(first)
+            return self._jump(first, at)
         if not re.fullmatch(r"[A-Z_]{2}[A-Z_0-9]*|N[0-9]+", rest):
             raise BlockError(f"cannot read the destination '{rest[:40]}' of {word}")
         ahead, behind = range(at + 1, end), range(at, first - 1, -1)
@@ -212,7 +220,7 @@ class SiemensFlow:
             if word == "GOTOC":
                 return at + 1
             raise BlockError(f"{word} {rest}: there is no such label in that direction")
-        return self._jump(found)
+        return self._jump(found, at)
 
     def _find(self, name: str, ranges: Sequence[range]) -> int | None:
         """The line of a label or block number that comes first in one of the ranges."""
@@ -225,8 +233,18 @@ class SiemensFlow:
                 return found[0] if lines.step > 0 else found[-1]
         return None
 
-    def _jump(self, to: int) -> int:
+    def _jump(self, to: int, at: int | None = None) -> int:
+        """Count a jump, and give where it goes to; ``at`` is the line of a GOTO.
+
+        A GOTO back that finds everything as it was the time before has no end.
+        """
         self._jumps += 1
+        if at is not None and to <= at:
+            now = repr((self.variables.r, self.variables.frames, self.machine.s, self.modal,
+                        [(f.back, f.left, f.repeats, f.returns) for f in self._calls]))
+            if self._before.get(at) == now:
+                raise endless(self.machine.log, self._jumps)
+            self._before[at] = now
         if self._jumps > MAX_JUMPS:
             raise too_many_jumps(self.machine.log, MAX_JUMPS)
         return to

@@ -143,8 +143,14 @@ def test_what_is_not_followed_is_named_with_its_line(line, said):
 def test_a_loop_without_end_is_bounded(monkeypatch):
     monkeypatch.setattr(heidenhain_flow, "MAX_JUMPS", 1000)
     with pytest.raises(ProgramError, match="jumps") as refused:
-        read("LBL 1\nFN 9: IF +1 EQU +1 GOTO LBL 1", "heidenhain")
+        read("Q1 = 0\nLBL 1\nQ1 = Q1 + 1\nFN 9: IF +1 EQU +1 GOTO LBL 1", "heidenhain")
     assert refused.value.code == "program_too_long"
+
+
+def test_a_jump_back_that_finds_all_as_it_was_has_no_end():
+    with pytest.raises(ProgramError, match="as they were the time before") as refused:
+        read("LBL 1\nL X+10 F100\nL X+0\nFN 9: IF +1 EQU +1 GOTO LBL 1", "heidenhain")
+    assert refused.value.code == "program_too_long" and refused.value.measured <= 3
 
 
 def plane_of(a, b, c):

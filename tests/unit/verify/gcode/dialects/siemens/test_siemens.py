@@ -103,8 +103,34 @@ def test_what_is_not_followed_is_named_with_its_line(line, said):
 def test_a_loop_without_end_is_bounded(monkeypatch):
     monkeypatch.setattr(siemens_flow, "MAX_JUMPS", 1000)
     with pytest.raises(ProgramError, match="jumps") as refused:
-        read("AA: R1=1\nGOTOB AA", "siemens")
+        read("R1=1\nAA: R1=R1+1\nGOTOB AA", "siemens")
     assert refused.value.code == "program_too_long" and refused.value.limit == 1000
+
+
+@pytest.mark.parametrize("loop", ["AA: R1=1\nGOTOB AA", "AA: G1 X10 F100\nG1 X0\nGOTOB AA",
+                                  "R1=1\nGOTOS\nIF R1==2 GOTOS"])
+def test_a_jump_back_that_finds_all_as_it_was_has_no_end(loop):
+    """200,000 rounds of a short loop took minutes."""
+    with pytest.raises(ProgramError, match="as they were the time before") as refused:
+        read(loop, "siemens")
+    assert refused.value.code == "program_too_long" and refused.value.measured <= 3
+
+
+def test_a_loop_that_goes_on_in_steps_is_read_to_its_end():
+    """No variable changes, but the place does: a loop asks for it, and leaves."""
+    p = read("G91\nAA: G1 X2 F100\nIF $AA_IW[X]<9 GOTOB AA\nG90", "siemens")
+    assert p.end[-1][0] == 10.0 and (np.diff(p.end[:, 0])[-4:] == 2.0).all()
+
+
+def test_gotos_at_the_end_of_the_main_program_is_read_as_m99():
+    text = "G710 G17 G90 G94 G54\nT1 M6\nS900 M3\nG0 X0 Y0 Z9\nG1 Z1 F100\nX5\nG0 Z9\nGOTOS\nM30\n"
+    p = read_program(text, dialect="siemens")
+    once = read_program(text.replace("GOTOS\n", ""), dialect="siemens")
+    assert p.end.tolist() == once.end.tolist()
+    assert any("GOTOS begins the main program again without end" in note for note in p.notes)
+    left = read_program(text.replace("G0 X0 Y0 Z9\n", "G0 X0 Y0 Z9\nG91 G1 X1 F100\n").replace("G17 G90", "G17"),
+                        dialect="siemens")
+    assert any("GOTOS begins the program again with what it has left" in str(r) for r in left.remarks)
 
 
 def test_deep_calls_are_bounded():
