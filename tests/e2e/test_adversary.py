@@ -48,6 +48,7 @@ def test_closed_forms_are_those_of_the_twin(mechanism):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)  # that of the boss takes 160 s alone on two cores
 @pytest.mark.parametrize("part", PARTS)
 def test_the_right_programs_take_nothing_out_of_their_parts(part):
     cases = (case_of(s, "any dialect") for s in range(400))
