@@ -173,9 +173,9 @@ def mesh_chunks(f: Facets, low: F64) -> tuple[list[Chunk], list[Chunk]]:
 def clustered(f: Facets) -> Facets:
     """The facets with all corners of a face in one grid cell merged; facets that lose a corner are left out."""
     cell = max(float(np.linalg.norm(np.ptp(f.place, axis=0))) / CELLS, 1e-9)
-    x, y, z = (np.floor((f.place - f.place.min(axis=0)) / cell).astype(np.int64) + 1).T
+    x, y, z = (np.floor((f.place - f.place.min(axis=0)) / cell).astype(np.int64)).T
     # no coordinate has more than CELLS + 1 of them; one number is sorted several times faster than a row
-    key = ((x * (CELLS + 3) + y) * (CELLS + 3) + z) * (int(f.face.max()) + 1) + f.face
+    key = ((x * (CELLS + 1) + y) * (CELLS + 1) + z) * (int(f.face.max()) + 1) + f.face
     _, first, group = np.unique(key, return_index=True, return_inverse=True)
     group = group.reshape(-1)
     count = np.bincount(group).astype(np.float64)[:, None]

@@ -131,10 +131,8 @@ class Reader(BlockMotion):
             left = left_modes(begin.s, self.s, tilted=tilted)
             why = f" ({', '.join(left)})" if left else ""
             if change := curved or again._change(text, lines, table):
-                word = "GOTOS" if "GOTOS" in lines[log.repeats - 1].upper() else "M99"
-                log.remark("second_run", f"{word} begins the program again with what it has left{why}: the second "
-                           f"round has {change.what} in line {change.line}; set it back before {word}",
-                           line=log.repeats)
+                log.remark("second_run", f"the program begins again with what it has left{why}: the second round has "
+                           f"{change.what} in line {change.line}; set it back before this line", line=log.repeats)
             return
         if self.tables_written:
             again = begin._copy()

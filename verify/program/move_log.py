@@ -28,7 +28,7 @@ class Log:
     line : 1-based number of the current line
     cools   : whether a word says that the coolant is on or off
     path_stated : number of moves before the first word of a path mode (G61, G64), None without one
-    repeats : line of the M99 that begins the program again, 0 for none
+    repeats : line of the M99 or GOTOS that begins the program again, 0 for none
     lengths : mm by T number, the first length that the program gives a tool, and its line
     functions : first line of each M word that counts as a function of the machine
     speeds, unknown, stops, blend, leaves, changes, unbounded, pauses, places, dwells, swaps, unplaced,

@@ -16,7 +16,7 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 from OCP.TopTools import TopTools_IndexedMapOfShape
 
-from geometry.joined_pairs import groups
+from geometry.connected_components import connected_components
 from geometry.mesh import F64, TriangleMesh
 from geometry.step_import.occ.deviation import face_deviations, node_gaps
 from geometry.step_import.occ.holes import extend_parameters, fill_slivers
@@ -151,7 +151,7 @@ def _join(solid: Shape, faces: list[FaceMesh]) -> tuple[TriangleMesh, F64, list[
     """
     offsets = np.concatenate([[0], np.cumsum([len(f.nodes) for f in faces])])
     pairs, edge_nodes = _shared_nodes(solid, offsets)
-    label = groups(pairs, int(offsets[-1]))
+    label = connected_components(pairs, int(offsets[-1]))
     nodes = np.concatenate([f.nodes for f in faces])
     corners = np.concatenate([f.triangles + offsets[i] for i, f in enumerate(faces)])
     ids = np.repeat(np.arange(1, len(faces) + 1), [len(f.triangles) for f in faces])
@@ -160,7 +160,7 @@ def _join(solid: Shape, faces: list[FaceMesh]) -> tuple[TriangleMesh, F64, list[
     sides = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
     short = np.linalg.norm(nodes[sides[:, 0]] - nodes[sides[:, 1]], axis=1) < WELD
     if short.any():
-        label = groups(np.concatenate([pairs, sides[short]]), int(offsets[-1]))
+        label = connected_components(np.concatenate([pairs, sides[short]]), int(offsets[-1]))
         triangles = label[corners]
     first = np.full(label.max() + 1, -1, np.int64)
     first[label[::-1]] = np.arange(len(label))[::-1]

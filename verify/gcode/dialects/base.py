@@ -173,14 +173,42 @@ def too_many_jumps(log: Log, limit: int) -> ProgramError:
                         limit=limit, remedy="correct the condition of the loop or jump, or split the program")
 
 
-def endless(log: Log, rounds: int) -> ProgramError:
-    """The error of a jump back, in the line that is read, that finds all values and modes as they were before.
+class Jumps:
+    """Counts the jumps of a program, and ends loops without end.
 
-    rounds : jumps so far
+    log : record of the reading
     """
-    return ProgramError(f"{log.name}, line {log.line}: the jump back finds all values and modes as they were the time "
-                        "before, so the loop has no end", code="program_too_long", subjects=(f"line {log.line}",),
-                        measured=rounds, remedy="correct the condition of the loop or jump")
+
+    def __init__(self, log: Log) -> None:
+        self.log, self.count = log, 0
+        self._before: dict[int, str] = {}
+
+    def add(self, limit: int) -> None:
+        """Count a jump.
+
+        Raises
+        ------
+        ProgramError
+            Code program_too_long: more than ``limit``.
+        """
+        self.count += 1
+        if self.count > limit:
+            raise too_many_jumps(self.log, limit)
+
+    def back(self, at: int, state: object) -> None:
+        """A jump back from line ``at``, counted already; ``state`` has all that decides which lines run next.
+
+        Raises
+        ------
+        ProgramError
+            Code program_too_long: the state is that of the time before.
+        """
+        now, name = repr(state), f"line {self.log.line}"
+        if self._before.get(at) == now:
+            raise ProgramError(f"{self.log.name}, {name}: the jump back finds all values and modes as they were the "
+                               "time before, so the loop has no end", code="program_too_long", subjects=(name,),
+                               measured=self.count, remedy="correct the condition of the loop or jump")
+        self._before[at] = now
 
 
-__all__ = ["NUMBER", "ZEROS", "BlockError", "DialectReader", "endless", "too_many_jumps", "zero_word"]
+__all__ = ["NUMBER", "ZEROS", "BlockError", "DialectReader", "Jumps", "zero_word"]

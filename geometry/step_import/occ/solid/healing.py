@@ -17,8 +17,8 @@ from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
 from OCP.TopoDS import TopoDS
 from OCP.TopTools import TopTools_ListOfShape
 
+from geometry.connected_components import connected_components
 from geometry.errors import PartError
-from geometry.joined_pairs import groups
 from geometry.step_import.occ.solid.consistency import check_edges
 from geometry.step_import.occ.solid.gaps import free_edge_gap, free_edges
 from geometry.step_import.occ.solid.meetings import FUSE_TOLERANCE, Meeting, Share, box_groups, meetings, split_bodies
@@ -184,7 +184,7 @@ def _united(bodies: list[Body], solid: int | None, fuse: bool,
             met += [Meeting(group[m.first], group[m.second], m.share, m.place) for m in meetings(shapes, split)]
             splits |= dict.fromkeys(group, split)
     pairs = [(m.first, m.second) for m in met if _belong(bodies[m.first], bodies[m.second], m.share, fuse)]
-    label = groups(np.array(pairs, np.int64), len(bodies))
+    label = connected_components(np.array(pairs, np.int64), len(bodies))
     out: list[Body] = []
     place = np.full(len(bodies), -1, np.int64)
     for k in dict.fromkeys(label.tolist()):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from verify.gcode.dialects.base import BlockError, Machine, endless, too_many_jumps
+from verify.gcode.dialects.base import BlockError, Jumps, Machine
 from verify.gcode.dialects.heidenhain.heidenhain_q import QParameters
 
 MAX_JUMPS = 200_000
@@ -56,8 +56,7 @@ class HeidenhainFlow:
         self._labels: dict[str, int] | None = None
         self._back: list[int] = []
         self._left: dict[int, int] = {}
-        self._jumps = 0
-        self._before: dict[int, str] = {}  # the state at the latest jump back from each line
+        self._jumps = Jumps(machine.log)
 
     def run(self) -> Iterator[tuple[int, str]]:
         """Line numbers from 1 and blocks, in order; a block over several lines (~) comes whole.
@@ -151,18 +150,10 @@ class HeidenhainFlow:
         return self._labels[label]
 
     def _jump(self, to: int, at: int | None = None) -> int:
-        """Count a jump, and give where it goes to; ``at`` is the line behind an FN.
-
-        A jump back that finds everything as it was the time before has no end.
-        """
-        self._jumps += 1
+        """Count a jump, and give where it goes to; ``at`` is the line behind an FN."""
+        self._jumps.add(MAX_JUMPS)
         if at is not None and to < at:
-            now = repr((self.q.held, self.machine.s, self._left, self._back))
-            if self._before.get(at) == now:
-                raise endless(self.machine.log, self._jumps)
-            self._before[at] = now
-        if self._jumps > MAX_JUMPS:
-            raise too_many_jumps(self.machine.log, MAX_JUMPS)
+            self._jumps.back(at, (self.q.held, self.machine.s, self._left, self._back))
         return to
 
 

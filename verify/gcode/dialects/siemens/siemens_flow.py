@@ -11,7 +11,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from verify.gcode.block_words import BlockError
-from verify.gcode.dialects.base import Machine, endless, too_many_jumps
+from verify.gcode.dialects.base import Jumps, Machine
 from verify.gcode.dialects.siemens.siemens_expressions import Value, ValueReader, Variables, same
 
 MAX_JUMPS = 200_000
@@ -31,7 +31,7 @@ _KEYWORD = re.compile(r"(IF|ELSE|ENDIF|WHILE|ENDWHILE|FOR|ENDFOR|LOOP|ENDLOOP|RE
                       r"(IF|WHILE|UNTIL|CASE|EXTCALL|PCALL|RET|CALLPATH)(?=\()")
 _CALL = re.compile(r"(L[0-9]+|[A-Z_]{2}[A-Z_0-9]*)\s*(\(|P\b|P[0-9=]|$)")
 _RETURN = re.compile(r"(?<![A-Z_0-9$\"])(M17|M0?2|M30|RET)(?![A-Z_0-9=(])")
-_DECIDES = re.compile(r"(?<![A-Z_0-9$])(IF|CASE|WHILE|UNTIL|GOTO[FBC]?)(?![A-Z_0-9=])", re.IGNORECASE)
+_DECIDES = re.compile(r"(?<![A-Z_0-9$])(IF|CASE|WHILE|UNTIL|GOTO[FBC]?)(?![A-Z_0-9=])")
 Steps = Generator[tuple[int, str], None, int]
 """Lines to run, and the line that follows them."""
 _OPENS = {"WHILE": "ENDWHILE", "FOR": "ENDFOR", "LOOP": "ENDLOOP", "REPEAT": "UNTIL", "IF": "ENDIF"}
@@ -96,8 +96,7 @@ class SiemensFlow:
         self.sections = find_sections(lines)
         self.pairs: dict[int, dict[str, int]] = {}
         self.modal = ""  # the call that MCALL repeats after each move
-        self._jumps = 0
-        self._before: dict[int, str] = {}  # the state at the latest jump back from each line
+        self._jumps = Jumps(machine.log)
         self._calls: list[_Frame] = []
         self._paired: set[int] = set()
         self._labels: dict[str, list[int]] | None = None
@@ -184,7 +183,7 @@ class SiemensFlow:
             if not isinstance(name, str) or reader.text[reader.at:].strip():
                 raise BlockError(f"{body[:60]}: CALL is followed with the name of a program alone")
             return self._call(re.sub(r"^_N_|_[MS]PF$", "", name.upper().rsplit("/", 1)[-1]), at + 1)
-        if word == "GOTOS" and len(self._calls) == 1 and not any(_DECIDES.search(line) for line in self.lines):
+        if word == "GOTOS" and len(self._calls) == 1 and not self._decides():
             log = self.machine.log
             log.note(f"line {at + 1}: GOTOS begins the main program again without end; the proof reads it once")
             log.repeats = at + 1
@@ -193,6 +192,11 @@ class SiemensFlow:
         if word.startswith("GOTO"):
             return self._goto(word, reader, at)
         return self._structure(word, reader, at)
+
+    def _decides(self) -> bool:
+        """Whether a line of the main program decides which one is next."""
+        main = self.sections[""]
+        return any(_DECIDES.search(statement(line)) for line in self.lines[main.first:main.end])
 
     def _modal(self, body: str, at: int) -> Steps:
         """MCALL of a subprogram is kept here; that of a cycle by the reader of the words."""
@@ -234,19 +238,11 @@ class SiemensFlow:
         return None
 
     def _jump(self, to: int, at: int | None = None) -> int:
-        """Count a jump, and give where it goes to; ``at`` is the line of a GOTO.
-
-        A GOTO back that finds everything as it was the time before has no end.
-        """
-        self._jumps += 1
+        """Count a jump, and give where it goes to; ``at`` is the line of a GOTO."""
+        self._jumps.add(MAX_JUMPS)
         if at is not None and to <= at:
-            now = repr((self.variables.r, self.variables.frames, self.machine.s, self.modal,
-                        [(f.back, f.left, f.repeats, f.returns) for f in self._calls]))
-            if self._before.get(at) == now:
-                raise endless(self.machine.log, self._jumps)
-            self._before[at] = now
-        if self._jumps > MAX_JUMPS:
-            raise too_many_jumps(self.machine.log, MAX_JUMPS)
+            calls = [(f.back, f.left, f.repeats, f.returns) for f in self._calls]
+            self._jumps.back(at, (self.variables.r, self.variables.frames, self.machine.s, self.modal, calls))
         return to
 
     def _structure(self, word: str, reader: ValueReader, at: int) -> int:

@@ -1,4 +1,4 @@
-"""Groups of joined things against those that scipy finds, and the process that reads parts without scipy."""
+"""Connected components against those that scipy finds, and the process that reads parts without scipy."""
 
 from __future__ import annotations
 
@@ -8,31 +8,31 @@ import sys
 import numpy as np
 import pytest
 from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import connected_components as by_scipy
 
-from geometry.joined_pairs import groups
+from geometry.connected_components import connected_components
 
 
 def twin(pairs: np.ndarray, count: int) -> np.ndarray:
     graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    return connected_components(graph, directed=False)[1]
+    return by_scipy(graph, directed=False)[1]
 
 
 @pytest.mark.parametrize("share", [0.0, 0.2, 0.5, 0.9, 3.0])
 @pytest.mark.parametrize("count", [1, 2, 40, 3000])
-def test_groups_are_those_of_the_graph(count, share):
+def test_components_are_those_of_scipy(count, share):
     rng = np.random.default_rng(count)
     for _ in range(20 if count < 100 else 3):
         pairs = rng.integers(0, count, (round(share * count), 2))
-        np.testing.assert_array_equal(groups(pairs, count), twin(pairs, count))
+        np.testing.assert_array_equal(connected_components(pairs, count), twin(pairs, count))
 
 
-def test_a_long_chain_is_one_group_however_it_is_numbered():
+def test_a_long_chain_is_one_component_however_it_is_numbered():
     rng = np.random.default_rng(3)
     for order in (np.arange(5000), np.arange(5000)[::-1], rng.permutation(5000)):
         pairs = np.stack([order[:-1], order[1:]], axis=1)
-        assert not groups(pairs, 5000).any()
-        assert groups(pairs[:2499], 5000).max() == 2500
+        assert not connected_components(pairs, 5000).any()
+        assert connected_components(pairs[:2499], 5000).max() == 2500
 
 
 def test_a_part_is_read_without_scipy():
