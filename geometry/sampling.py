@@ -132,8 +132,8 @@ def graded_samples(mesh: TriangleMesh, triangles: np.ndarray, spacing: float, pa
     low = np.floor(flat.min(axis=(0, 1)) / spacing).astype(np.int64) - 1
     size = np.floor(flat.max(axis=(0, 1)) / spacing).astype(np.int64) + 2 - low
     near = np.zeros((int(size[0]), int(size[1])), np.bool_)
-    mark_near(_border_places(flat, spacing / 4.0), spacing, int(np.ceil(margin / spacing)), int(low[0]), int(low[1]),
-              near)
+    # a border runs no farther than half their distance from one of its places
+    mark_near(_border_places(flat, spacing / 8.0), spacing, margin + spacing / 16.0, int(low[0]), int(low[1]), near)
     total = float(mesh.areas[triangles].sum())
     room = round(1.2 * (total / spacing**2 + float(near.sum()) * parts**2)) + 64
     while True:

@@ -85,13 +85,19 @@ def lattice_places(triangles, normals, h, out, area, owner):
 
 
 @njit(**KERNEL)
-def mark_near(places, h, grow, i0, j0, near):
-    """Mark the cells at most ``grow`` rows and columns from that of a place. places : (n, 2) float64, mm."""
+def mark_near(places, h, within, i0, j0, near):
+    """Mark the cells that come as near as ``within`` mm to a place.
+
+    places : (n, 2) float64, mm; h : mm, side of a cell; i0, j0 : number of the first row and column of ``near``
+    """
+    reach = within / h
     for m in range(len(places)):
-        i, j = math.floor(places[m, 0] / h) - i0, math.floor(places[m, 1] / h) - j0
-        for a in range(max(i - grow, 0), min(i + grow + 1, near.shape[0])):
-            for b in range(max(j - grow, 0), min(j + grow + 1, near.shape[1])):
-                near[a, b] = True
+        x, y = places[m, 0] / h - i0, places[m, 1] / h - j0
+        for a in range(max(math.floor(x - reach), 0), min(math.floor(x + reach) + 1, near.shape[0])):
+            beside = max(a - x, x - a - 1.0, 0.0)
+            for b in range(max(math.floor(y - reach), 0), min(math.floor(y + reach) + 1, near.shape[1])):
+                if beside**2 + max(b - y, y - b - 1.0, 0.0)**2 <= reach**2:
+                    near[a, b] = True
 
 
 @njit(**KERNEL)

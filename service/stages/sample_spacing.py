@@ -21,12 +21,12 @@ from service.stages.job_inputs import JobInputs
 from zones.machinable_area import LEVEL, SEEN, AreaForm
 from zones.zoning.zones import ZoneArea
 
-LEAST_AREA = 1500.0  # mm²: a smaller face has close samples everywhere
+LEAST_AREA = 500.0  # mm²: a smaller face has close samples everywhere
 WIDEST, LEAST = 0.5, 0.2  # mm between coarse samples: never more; where fewer would do, close ones are taken
 FLOOR_SHARE = 0.25  # of the radius of the flat bottom: the planner's lines over a floor reach that far round a sample
 WALL_SHARE = 0.5  # of the radius of the tool, the same along a wall
 UPRIGHT = 1e-7  # component of a unit normal along the access: less is upright
-MARGIN = 1.0  # coarse cells: this near to a border of the face all samples are close
+MARGIN = 0.25  # coarse cells: this near to a border of the face all samples are close
 NEIGHBOURS = 8  # planning samples round a coarse one that must have the same zone
 
 

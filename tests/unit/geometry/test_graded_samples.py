@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+import shapely
 from scipy.spatial import Delaunay, cKDTree
 
 from geometry.mesh import TriangleMesh
-from geometry.sampling import graded_samples, joined, sample_surface, split_cells
+from geometry.sampling import graded_samples, joined, lattice_axes, sample_surface, split_cells
 
 SPACING, PARTS, MARGIN = 0.5, 5, 1.0
 
@@ -51,6 +52,32 @@ def test_areas_fill_the_face_and_coarse_cells_keep_off_its_borders(normal):
     assert off[wide].min() > MARGIN and off[~wide].max() < MARGIN + 2.5 * SPACING
     assert 300 < wide.sum() < 1000
     assert set(samples.face.tolist()) == {7} and samples.normals == pytest.approx(np.broadcast_to(n, (len(off), 3)))
+
+
+@pytest.mark.parametrize("margin", [0.0, 0.125, 0.5])
+def test_exactly_the_cells_that_come_near_a_border_are_split(margin):
+    mesh = frame_with_hole()
+    samples = graded_samples(mesh, np.arange(len(mesh.faces)), SPACING, PARTS, margin)
+    wide = samples.covers > 0
+    n = np.array([0.0, 0.0, 1.0])
+    u = np.cross([0.3, -0.5, 0.8], n)
+    u /= np.linalg.norm(u)
+    middles = np.column_stack([(samples.points - [1, 2, 3]) @ u, (samples.points - [1, 2, 3]) @ np.cross(n, u)])[wide]
+    first, second = (np.array([axis[0] @ u, axis[0] @ np.cross(n, u)]) for axis in lattice_axes(n[None]))
+    outline = shapely.Polygon(np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * 10.0,
+                              [np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * 3.0])
+
+    def off(at):
+        """Distance of the cells round some places from the border; 0 where they meet it."""
+        corners = [at + SPACING / 2 * (a * first + b * second) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        return shapely.distance(shapely.polygons(np.stack(corners, axis=1)), outline.boundary)
+
+    assert off(middles).min() > margin
+    # cells beside them that are split come as near to the border as the places along it tell
+    beside = np.concatenate([middles + SPACING * step for step in (first, second, -first, -second)])
+    beside = beside[cKDTree(middles).query(beside)[0] > 1e-6]
+    inside = shapely.contains_xy(outline, beside)
+    assert inside.sum() > 100 and off(beside[inside]).max() <= margin + SPACING / 8
 
 
 def test_no_place_is_farther_from_a_sample_than_half_a_diagonal():
