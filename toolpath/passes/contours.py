@@ -312,14 +312,17 @@ class _WallDistance:
 
 
 def _chains_in(field: TipField, z: float, needed: NDArray[np.int64]) -> _Chains | None:
-    """The boundary at a height in a box, as ``box_of`` gives it, or in more; of the last height it is kept."""
-    at, box, chains = field.kept.get("walls", (math.nan, None, None))
-    if at != z or (needed < box).any():
-        box = np.minimum(needed, box) if at == z else needed
-        around = np.zeros((field.lattice.ny, field.lattice.nx), np.bool_)
-        around[box[0]:1 - box[2], box[1]:1 - box[3]] = True
-        chains = _chains(field, z, around)
-        field.kept["walls"] = z, box, chains
+    """The boundary at a height in a box, as ``box_of`` gives it, or in more; of the last two heights it is kept."""
+    kept: Sequence[tuple[float, NDArray[np.int64], _Chains | None]] = field.kept.get("walls", ())
+    for at, box, chains in kept:
+        if at == z:
+            if (needed >= box).all():
+                return chains
+            needed = np.minimum(needed, box)
+    around = np.zeros((field.lattice.ny, field.lattice.nx), np.bool_)
+    around[needed[0]:1 - needed[2], needed[1]:1 - needed[3]] = True
+    chains = _chains(field, z, around)
+    field.kept["walls"] = ((z, needed, chains), *[one for one in kept if one[0] != z][:1])
     return chains
 
 

@@ -45,12 +45,13 @@ from toolpath.roughing.engagement_limited_clearing import Clearing
 from toolpath.roughing.layer_areas import at_or_under, cleared, layer_areas
 from toolpath.roughing.layers_over_floors import Columns, Floors, even_between, left_to_floors
 from toolpath.roughing.loose_pieces import loose_pieces
+from toolpath.roughing.rings_ahead import RingsAhead
 from toolpath.roughing.sized_walls import SizedWalls
 from toolpath.stock.cut_history import Depths, Walked
 from toolpath.stock.engagement import SKIN_SHARE, UNBOUNDED
 from toolpath.stock.stock_map import SURE_RIM, StockMap
 from toolpath.strategies import curvature_matched, depth_layers
-from toolpath.strategies.depth_layers import LayerArea
+from toolpath.strategies.depth_layers import LayerArea, LayerRings
 from toolpath.tool_deflection import left_by_layers
 from toolpath.workingsteps import Workingstep
 from zones.machinable_area import AreaForm
@@ -126,7 +127,7 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields: 
                 work.acts = k + 1
                 keeper.done(work.snapshot)
             done += finished
-            if progress is not None and finished:
+            if progress is not None:
                 progress(AGAIN_SHARE * done / all_zones)
     if progress is not None:
         progress(1.0)
@@ -325,7 +326,8 @@ class _Layers:
             self.loose = snapshot.loose
         elif through <= settings.underside + THROUGH:
             self.loose = loose_pieces(field, stock, heights[-1], places[-1].area)
-        places = [p._replace(area=p.area | self.loose) for p in places]
+        if self.loose.any():
+            places = [p._replace(area=p.area | self.loose) for p in places]
         deeper = {z: places[next(k for k, h in enumerate(heights) if h < z)] for z in found}
         own = [(z, LayerArea(at_or_under(field, t, z), deeper[z].bare, floor=True)) for z, t in found.items()]
         if self.loose.any() and (snapshot is None or through in snapshot.floors):  # else a skin stays under them
@@ -358,37 +360,26 @@ class _Layers:
 
         Where even stock is required the cuts between them follow as another workingstep.
         """
-        field, cut, settings, tool, lat = self.field, self.cut, self.settings, self.field.tool, self.field.lattice
+        field, cut, settings, tool = self.field, self.cut, self.settings, self.field.tool
         linker = self._linker()
-        chord = settings.budget.chord
         between: list[float] = []
-        while self.left and self.left[0][0] >= lowest - 1e-9:
-            settle()
-            z, place = self.left.pop(0)
-            self.stock.settle()
-            if not place.floor:
-                between.extend(depth_layers.between(self.above, z, cut.step_down))
-                self.above = z
-            for line in depth_layers.strip_lines(field, self.stock, z, place.area, self.tips, self.allowance, chord):
-                linker.add(turned(line, settings))
-            self._walk(linker, z, place, 0.0 if settings.semi_finishing else ISLAND * cut.step_down)
-            if place.floor:
-                continue
-            finished = lat.mask(self.walls[np.abs(self.walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
-            unseen = z <= self.swept - self.rim_depth
-            if settings.finishing and not unseen and any(a >= lowest - 1e-9 and not p.floor for a, p in self.left):
-                continue  # flutes reach up to the rims of an earlier layer
-            self.swept = z if unseen else self.swept
-            deep = self.rim_depth + cut.step_down if unseen or settings.finishing else cut.step_down
-            at_size = sized.along(lat, z + tool.corner_radius, z + deep)
-            alone = lat.mask(self.alone[np.abs(self.alone[:, 2] - z) <= 2.0 * cut.step_down, :2])
-            rims = depth_layers.rim(field, self.stock, z, place.area, finished, self.allowance, chord, unseen,
-                              min(THIN * settings.scallop_height, 0.5 * self.allowance) if settings.finishing else 0.0,
-                              dilated(alone, self.alone_wide / lat.step) | at_size)
-            usual, linker.pace = linker.pace, self._rim_pace(deep)
-            for line in nearest_order(rims, linker.at, False):
-                linker.add(turned(line, settings))
-            linker.pace = usual
+        with RingsAhead(field, self.allowance, depth_layers.ring_spacing(tool)) as ahead:
+            while self.left and self.left[0][0] >= lowest - 1e-9:
+                settle()
+                z, place = self.left.pop(0)
+                self.stock.settle()
+                if not place.floor:
+                    between.extend(depth_layers.between(self.above, z, cut.step_down))
+                    self.above = z
+                for line in depth_layers.strip_lines(field, self.stock, z, place.area, self.tips, self.allowance,
+                                                     settings.budget.chord):
+                    linker.add(turned(line, settings))
+                laid = ahead.of(z)
+                if self.left and self.left[0][0] >= lowest - 1e-9 and not self.bounded:
+                    ahead.begin(*self.left[0], self.stock)
+                self._walk(linker, z, place, 0.0 if settings.semi_finishing else ISLAND * cut.step_down, laid)
+                if not place.floor:
+                    self._cut_rims(linker, z, place, lowest, sized)
         if not self.left:
             field.forget()
         made = self._step(number, "roughing", linker)
@@ -398,6 +389,28 @@ class _Layers:
         for z in between:
             self._walk(linker, z, LayerArea(at_or_under(field, self.tips, z)))
         return made + self._step(number + len(made), "semi_finishing", linker)
+
+    def _cut_rims(self, linker: Linker, z: float, place: LayerArea, lowest: float, sized: SizedWalls) -> None:
+        """Cut the rims of the layer at z, mm, unless the flutes reach up to them from a deeper layer of this band.
+
+        lowest, sized : as in ``down_to``
+        """
+        field, cut, settings, lat = self.field, self.cut, self.settings, self.field.lattice
+        finished = lat.mask(self.walls[np.abs(self.walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
+        unseen = z <= self.swept - self.rim_depth
+        if settings.finishing and not unseen and any(a >= lowest - 1e-9 and not p.floor for a, p in self.left):
+            return
+        self.swept = z if unseen else self.swept
+        deep = self.rim_depth + cut.step_down if unseen or settings.finishing else cut.step_down
+        at_size = sized.along(lat, z + field.tool.corner_radius, z + deep)
+        alone = lat.mask(self.alone[np.abs(self.alone[:, 2] - z) <= 2.0 * cut.step_down, :2])
+        rims = depth_layers.rim(field, self.stock, z, place.area, finished, self.allowance, settings.budget.chord,
+                                unseen, min(THIN * settings.scallop_height, 0.5 * self.allowance)
+                                if settings.finishing else 0.0, dilated(alone, self.alone_wide / lat.step) | at_size)
+        usual, linker.pace = linker.pace, self._rim_pace(deep)
+        for line in nearest_order(rims, linker.at, False):
+            linker.add(turned(line, settings))
+        linker.pace = usual
 
     def _rim_pace(self, deepest: float) -> Pace:
         """Feeds along a wall that is taken to size down to a depth, mm: deflecting the tool no more than a finish may.
@@ -430,14 +443,15 @@ class _Layers:
         return Linker(self.field, self.stock, motions_of(cut, self.settings), self.depths, self.settings.found, pace,
                       cut.engaged)
 
-    def _walk(self, linker: Linker, z: float, place: LayerArea, island: float = 0.0) -> None:
+    def _walk(self, linker: Linker, z: float, place: LayerArea, island: float = 0.0,
+              laid: LayerRings | None = None) -> None:
         """Cut the stock above a height, mm, in an area, down to it; ``island`` mm of it may stay between rings."""
         settings, side, fine = self.settings, depth_layers.ring_spacing(self.field.tool), 0.1 * self.field.lattice.step
         linker.go.loose = min(LOOSE * fine, LOOSE_SHARE * self.allowance)
         if self.bounded:
             Clearing(linker, z, place.area, self.allowance, side, settings.cut_direction,
                      depth_layers.STOCK_WORTH, fine).walk()
-        for lines in depth_layers.layer(self.field, self.stock, z, place, self.allowance, side, island):
+        for lines in depth_layers.layer(self.field, self.stock, z, place, self.allowance, side, island, laid):
             for line in nearest_order(lines, linker.at, False):
                 linker.add(turned(line, settings), fine)
         linker.go.loose = 0.0

@@ -35,7 +35,8 @@ def cleared(field: TipField, layers: Sequence[tuple[float, LayerArea]], level: F
     whole = between = lat.mask(np.zeros((0, 2)))
     for z, place in layers[::-1]:
         last = dilated(at_or_under(field, level, z) & ~(whole | between), radius / lat.step)
-        out.append((z, place._replace(bare=last if place.bare is None else place.bare | last)))
+        bare = last if place.bare is None else place.bare | last
+        out.append((z, place._replace(bare=_same(bare, [p.bare for _, p in out[-1:]]))))
         whole, between = (whole, between | place.area) if place.floor else (place.area, lat.mask(np.zeros((0, 2))))
     return out[::-1]
 
@@ -60,8 +61,14 @@ def layer_areas(field: TipField, tips: F64, heights: Sequence[float], step: floa
             reach = at_or_under(field, tips, low) | out[deeper[-1]].area if deeper else at_or_under(field, tips, low)
             if reach.any():
                 met = met | dilated(reach, field.disc_radius(disc, 0.0) / lat.step)
-        out.append(LayerArea(own | met, dilated(met, field.tool.radius / lat.step)))
+        bare = dilated(met, field.tool.radius / lat.step)
+        out.append(LayerArea(_same(own | met, [p.area for p in out[-1:]]), _same(bare, [p.bare for p in out[-1:]])))
     return out[::-1]
+
+
+def _same(mask: NDArray[np.bool_], known: Sequence[NDArray[np.bool_] | None]) -> NDArray[np.bool_]:
+    """The mask, or one of those known that equals it: layers between upright walls share theirs, not their memory."""
+    return next((k for k in known if k is not None and np.array_equal(k, mask)), mask)
 
 
 __all__ = ["at_or_under", "cleared", "layer_areas"]

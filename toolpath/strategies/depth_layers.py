@@ -91,8 +91,40 @@ class LayerArea(NamedTuple):
     floor: bool = False
 
 
+class LayerRings(NamedTuple):
+    """The rings of a layer, before any of them is cut.
+
+    standing : (ny, nx) bool on the lattice, nodes over which stock stands above the layer
+    rings    : lists of lines, those farthest from the walls first
+    between  : the same, half a step off
+    """
+
+    standing: NDArray[np.bool_]
+    rings: Sequence[Sequence[Line]]
+    between: Sequence[Sequence[Line]]
+
+
+def standing_above(field: TipField, stock: StockMap, z: float) -> NDArray[np.bool_]:
+    """(ny, nx) bool on the lattice: nodes over which a layer at tip height z, mm, finds stock."""
+    return stock.above(z + STOCK_WORTH, field.lattice)
+
+
+def layer_rings(field: TipField, z: float, place: LayerArea, standing: NDArray[np.bool_], allowance: float,
+                side_step: float) -> LayerRings:
+    """The rings of one layer; they depend on nothing else, so another thread may compute them.
+
+    standing : (ny, nx) bool on the lattice, nodes over which the layer finds stock
+    field, z, place, allowance, side_step : as in ``layer``
+    """
+    wide = field.tool.radius / field.lattice.step
+    active = dilated(place.area, wide) & dilated(standing, 2.0 * wide)
+    inwards, between = (list(rings(field, z, active, (first,), side_step))
+                        for first in (allowance, allowance + 0.5 * side_step))
+    return LayerRings(standing, inwards, between)
+
+
 def layer(field: TipField, stock: StockMap, z: float, place: LayerArea, allowance: float,
-          side_step: float, island: float = 0.0) -> Iterator[list[Line]]:
+          side_step: float, island: float = 0.0, laid: LayerRings | None = None) -> Iterator[list[Line]]:
     """Lines of one layer, ring by ring from the outside of the stock to ``allowance`` from the walls.
 
     field     : TipField
@@ -102,6 +134,7 @@ def layer(field: TipField, stock: StockMap, z: float, place: LayerArea, allowanc
     allowance : mm left beside walls
     side_step : mm between rings
     island    : mm, stock between the rings up to which it is left to the next layer, where ``place`` is not bare
+    laid      : the rings of this layer for the stock as it was before; used where that still stands
 
     Yields
     ------
@@ -109,16 +142,16 @@ def layer(field: TipField, stock: StockMap, z: float, place: LayerArea, allowanc
         The rings farthest from the walls first, so that the cutter comes from air where there is any.
     """
     lat, tool = field.lattice, field.tool
-    standing = dilated(stock.above(z + STOCK_WORTH, lat), 2.0 * tool.radius / lat.step)
-    active = dilated(place.area, tool.radius / lat.step) & standing
+    standing = standing_above(field, stock, z)
+    if laid is None or not np.array_equal(laid.standing, standing):
+        laid = layer_rings(field, z, place, standing, allowance, side_step)
     beyond = min((SURE_RIM + 0.8) * stock.lattice.step + lat.step, 0.6 * tool.radius)
     walled = field.nearest_blocked(z) is not None
-    lists = list(rings(field, z, active, (allowance,), side_step))
     worth = _Worth(lat, place.bare, max(STOCK_WORTH, island))
-    yield from filter(None, _outwards(stock, tool, lists, beyond, worth) if walled else
-                      (_in_stock(stock, tool, lines, _Worth(lat), beyond) for lines in lists))
+    yield from filter(None, _outwards(stock, tool, laid.rings, beyond, worth) if walled else
+                      (_in_stock(stock, tool, lines, _Worth(lat), beyond) for lines in laid.rings))
     # Where rings turn sharply, islands stay between them; rings half a step off take these.
-    for lines in rings(field, z, active, (allowance + 0.5 * side_step,), side_step):
+    for lines in laid.between:
         yield from filter(None, [_in_stock(stock, tool, lines, worth, beyond)])
 
 

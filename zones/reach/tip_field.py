@@ -89,7 +89,7 @@ class TipField:
         self.noncut = self._noncut(self.discs)
         self._cut: F64 | None = None
         self._height: F64 | None = None
-        self._off: tuple[float, tuple[F64, NDArray[np.int32]] | None] = (math.nan, None)
+        self._off: tuple[tuple[float, tuple[F64, NDArray[np.int32]] | None], ...] = ()
         self.kept: dict[str, Any] = {}
 
     def _noncut(self, discs: tuple[Disc, ...]) -> F64:
@@ -133,12 +133,12 @@ class TipField:
         out = copy.copy(self)
         out.lattice = Lattice.over(np.array([lower, upper]), 0.0, step)
         out._cut = out._height = None
-        out._off, out.kept = (math.nan, None), {}
+        out._off, out.kept = (), {}
         return out
 
     def forget(self) -> None:
-        """Drop what is kept of the last height."""
-        self._off, self.kept = (math.nan, None), {}
+        """Drop what is kept of the last heights."""
+        self._off, self.kept = (), {}
 
     @property
     def grown_radius(self) -> float:
@@ -247,17 +247,18 @@ class TipField:
     def nearest_blocked(self, z: float) -> tuple[F64, NDArray[np.int32]] | None:
         """Distance of each node, mm, from the nearest one that is blocked at tip height z, mm, and which that is.
 
-        Returns (ny, nx) float64, mm, and (2, ny, nx) int32, rows and columns; None where no node is blocked. The last
-        result is cached, since each layer uses it three times; do not write to it.
+        Returns (ny, nx) float64, mm, and (2, ny, nx) int32, rows and columns; None where no node is blocked. The
+        results of the last two heights are kept, since each layer uses its own three times while the next one is
+        laid out; do not write to them.
         """
-        off = self._off  # read and written as a whole: several threads ask a field
-        if off[0] != z:
-            free = self.height <= z + LEVEL_TOLERANCE
-            off = z, None
-            if not free.all():
-                off = z, blocked_beside(free, self.lattice.step)
-            self._off = off
-        return off[1]
+        known = self._off  # read and written as a whole: several threads ask a field
+        for at, found in known:
+            if at == z:
+                return found
+        free = self.height <= z + LEVEL_TOLERANCE
+        off = None if free.all() else blocked_beside(free, self.lattice.step)
+        self._off = (z, off), *known[:1]
+        return off
 
     def tips(self, xy: F64) -> F64:
         """Tip limit of the whole assembly, (n,) float64, mm; exact for the cutting part.
