@@ -101,7 +101,7 @@ def prove_plan(part_path: Path, setup: Setup, progress: Progress) -> Proof:
 def _proved_plan(part_path: Path, ready: Prepared, kept: Kept, planner: Planner, progress: Progress,
                  stepnc: StepncUnderWay | None = None,
                  known: ComputedAhead[dict[str, Any]] | None = None) -> ProvedPlan:
-    """The last plan of a prepared job, with its proof, during which ``stepnc`` and ``known`` begin."""
+    """The last plan of a prepared job, with its proof; ``known`` is computed beside it, ``stepnc`` beside the proof."""
     ready, trimmed, scored, first = _begun(part_path, ready)
     frame = proof_frame(ready)
     samples = frame.into(scored.samples, ready.views[0])
@@ -110,16 +110,19 @@ def _proved_plan(part_path: Path, ready: Prepared, kept: Kept, planner: Planner,
     if stepnc is not None:
         stepnc.expect()
 
+    def told(stage: str, share: float) -> None:
+        progress(stage, share)
+        if known is not None and stage == "plan":  # an act of the plan is done: its other threads need no core now
+            known.begin()
+
     def begin(written: Sequence[WrittenProgram]) -> None:
         if stepnc is not None:
             stepnc.begin(written, frame.part, ready.inputs.bodies, conditions)
-        if known is not None:
-            known.begin()
 
     def blank(view: View) -> StockMap:
         return first.stock if view is first.view else planning_stock(ready, view)
 
-    return plan_and_prove(resumed, scored, trimmed, frame, conditions, planner, progress, begin, blank)
+    return plan_and_prove(resumed, scored, trimmed, frame, conditions, planner, told, begin, blank)
 
 
 def _begun(part_path: Path, ready: Prepared) -> tuple[Prepared, Mapping[str, Sequence[Faces]], Score, FirstAccess]:
