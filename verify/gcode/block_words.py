@@ -68,8 +68,9 @@ _M_GROUPS: tuple[frozenset[float], ...] = (frozenset({0, 1, 2, 30, 60}), frozens
                                            frozenset({7, 8, 9}), _TCP_M, SAVES)
 _G_CODES = frozenset().union(*_G_GROUPS) - {_TCP_G} - FURTHER
 _HINTS = {
-    5: "a spline", 5.1: "a spline", 5.2: "a spline", 33: "threading", 38.2: "probing",
-    43.4: "tool centre point control", 43.5: "tool centre point control by vectors",
+    5: "a spline", 5.1: "a spline", 5.2: "a spline",
+    28.1: "the place of G28, written into the control", 30.1: "the place of G30, written into the control",
+    33: "threading", 38.2: "probing", 43.4: "tool centre point control", 43.5: "tool centre point control by vectors",
     65: "a macro call", 66: "a macro call", 68: "a rotated frame", 68.2: "a tilted plane", 76: "threading",
     87: "back boring", 88: "boring with a manual retract",
 }

@@ -299,11 +299,13 @@ class Modes(ToolChanges):
         q = values.get("Q", values.get("P", 0.0) if self.fits else 0.0) * self.s.scale
         self.log.blend, self.log.leaves = max(self.log.blend, p), max(self.log.leaves, p + max(q, 0.0))
         if p == 0:
-            self.log.remark("blending", f"G64 without a P above 0 lets the control leave the path by any amount (limit "
-                            f"P{limit:g} mm)", self.log.line)
+            word = "G64 without a P above 0" if self.fits else "a path mode without a tolerance"
+            self.log.remark("blending", f"{word} lets the control leave the path by any amount (limit {limit:g} mm)",
+                            self.log.line)
         elif not 0 < p <= limit + 1e-12:
-            self.log.remark("blending", f"G64 P{values['P']:g} lets the control leave the path by {p:g} mm (limit "
-                            f"{limit:g} mm)", self.log.line)
+            word = f"G64 P{values['P']:g}" if self.fits else "the path tolerance"
+            self.log.remark("blending", f"{word} lets the control leave the path by {p:g} mm (limit {limit:g} mm)",
+                            self.log.line)
         if "Q" in values and not 0 <= q <= limit + 1e-12:
             self.log.remark("line_fitting", f"G64 Q{values['Q']:g} lets the control leave the path by {q:g} mm (limit "
                             f"{limit:g} mm)", self.log.line)

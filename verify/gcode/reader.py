@@ -147,7 +147,7 @@ class Reader(BlockMotion):
         left = [*left_modes(begin.s, self.s, self.assumed, tilted), *(["G41 or G42"] if curved else [])]
         keeps = self.dialect in KEPT_MODES
         if not keeps:  # the tool stays on every control
-            stays = ("in the spindle", *(("G20", "G21", "G90.1", "point control") if self.fits else ()))
+            stays = ("in the spindle", *(("inches", "millimetres", "G90.1", "point control") if self.fits else ()))
             left = [word for word in left if word.endswith(stays)]
         if left or tilted:
             again = self._copy() if keeps else begin._copy()

@@ -74,7 +74,7 @@ def left_modes(begin: State, end: State, assumed: tuple[str, ...] | None = None,
     left = {
         "a rotation, a scale or a mirror": end.frame is not None,
         "a tilted plane": tilted,
-        f"G{21 if end.scale == 1.0 else 20}": end.scale != begin.scale,
+        "millimetres" if end.scale == 1.0 else "inches": end.scale != begin.scale,
         "G90.1": end.centre_absolute and not begin.centre_absolute,
         "tool centre point control": end.tcp and not begin.tcp,
         end.work_offset: end.work_offset != begin.work_offset,

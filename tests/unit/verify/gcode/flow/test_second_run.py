@@ -96,7 +96,7 @@ def test_a_tilted_plane_left_at_m30_is_an_assumption(dialect):
 @pytest.mark.parametrize("dialect", ["fanuc", "haas"])
 @pytest.mark.parametrize(("left", "word", "told"), [
     ("G91", "G90 ", "G91"), ("G18", "G17 ", "G18"), ("G95", "G94 ", "G95"),
-    ("G51 X0. Y0. P0.9", "", "a rotation, a scale"), ("G20", "G21 ", "G20")])
+    ("G51 X0. Y0. P0.9", "", "a rotation, a scale"), ("G20", "G21 ", "inches")])
 def test_modes_left_at_m30_are_an_assumption(left, word, told, dialect):
     p = read(f"{left}\nM30", modes=MODES.replace(word, "") if word else MODES, dialect=dialect)
     [a] = [a for a in p.open if a.what is AssumedKind.MODES_LEFT]
@@ -111,7 +111,7 @@ def test_controls_that_set_modes_back_leave_nothing_open():
 
 
 @pytest.mark.parametrize(("left", "head", "told"), [
-    ("G20", "", "G20"), ("G20", "G21 ", ""), ("G90.1", "", "G90.1"), ("G90.1", "G91.1 ", ""),
+    ("G20", "", "inches"), ("G20", "G21 ", ""), ("G90.1", "", "G90.1"), ("G90.1", "G91.1 ", ""),
     ("G91\nG18\nG95", "", "")])
 def test_modes_that_m2_of_linuxcnc_leaves(left, head, told):
     """The manual lists what M2 sets back: the plane, G90, G94 and others, neither the unit nor the arc centres."""
