@@ -304,7 +304,7 @@ class Finish:
 
     def _groups(self, k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
         if k > REFINEMENTS:
-            return [touch_points.touches(self.field, self.checks.tips[failing])]
+            return [touch_points.touches(self.field, self.checks.tips[failing], self.checks.normals[failing])]
         every = np.arange(len(self.checks.points))
         # a band has levels of its own, which go no deeper than it does
         whole = (k == 0 and not self.strategy.ordered and not self.settings.planes
