@@ -32,7 +32,7 @@ def touches(field: TipField, tips: F64, normals: F64) -> list[Line]:
 
     field   : TipField
     tips    : (n, 3) float64, mm, access frame, admissible
-    normals : (n, 3) float64, unit, of the surface each tip touches, out of the material
+    normals : (n, 3) float64, unit, access frame, of the surface each tip touches, out of the material
 
     Returns
     -------
