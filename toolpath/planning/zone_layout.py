@@ -231,7 +231,10 @@ def _strategy(zone: ZoneArea, checks: FinishTarget, field: TipField, cut: CutDat
     if _has_floor(zone, tool):
 
         def planes(k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
-            return planar_floor.planes(field, checks.tips[failing], chord, k) if k <= planar_floor.MAX_FINER else []
+            if k > planar_floor.MAX_FINER:
+                return []
+            covers = None if checks.covers is None else checks.covers[failing]
+            return planar_floor.planes(field, checks.tips[failing], chord, k, covers)
 
         return Strategy("planar_floor", 1.6 * (tool.radius - tool.corner_radius), planes, False)
     wide = float(side_step(np.zeros(1), tool.corner_radius, settings.budget.laid)[0]) or tool.radius

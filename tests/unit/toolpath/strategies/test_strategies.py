@@ -497,6 +497,32 @@ def test_what_a_finish_leaves_on_a_steep_wall_is_no_rim():
     assert lengths[1] == 0.0 and min(lengths[0], *lengths[2:]) > 5.0
 
 
+@pytest.mark.parametrize("wide", [8.5, 9.0, 9.5, 10.0, 10.8, 12.0, 14.5])
+@pytest.mark.parametrize("place", [0.0, 0.35])
+def test_rings_over_a_pocket_of_any_width_cover_its_middle(wide, place):
+    mesh = terraces([0, 4, 4 + wide, 8 + wide], [0, 4, 28, 32], [[8, 8, 8], [8, 2, 8], [8, 8, 8]])
+    field = field_of(mesh, tool(4.0, 0.0))
+    x, y = np.meshgrid(np.arange(6.0, 2.0 + wide + 1e-9, 0.25), np.arange(6.0, 26.01, 0.25))
+    tips = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 2.0)])
+    [lines] = planar_floor.planes(field, tips, CHORD, 0, np.full(len(tips), place))
+    way = np.vstack([dense(line.points, 0.1)[:, :2] for line in lines])
+    middle = tips[np.abs(tips[:, 1] - 16.0) < 4.0, :2]  # in the corners finer rounds take what rings leave
+    assert cKDTree(way).query(middle)[0].max() <= field.tool.radius - place
+    assert sum(line.length for line in lines) < 1.7 * wide * 24.0 / field.tool.radius  # and not many times over
+
+
+def test_places_that_stand_for_wide_squares_get_rings_and_no_line_each():
+    mesh = terraces([0, 40], [0, 30], [[2]])
+    field = field_of(mesh, tool(4.0, 0.0))
+    x, y = np.meshgrid(np.arange(10.0, 30.0, 0.5), np.arange(14.0, 16.6, 0.5))
+    tips = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 2.0)])
+    for finer in (1, 2):
+        [lines] = planar_floor.planes(field, tips, CHORD, finer, np.full(len(tips), 0.354))
+        assert 1 <= len(lines) <= 4
+        way = np.vstack([dense(line.points, 0.1)[:, :2] for line in lines])
+        assert cKDTree(way).query(tips[:, :2])[0].max() <= field.tool.radius - 0.354
+
+
 # -- places that no pass has finished -----------------------------------------------------------------------------
 
 
