@@ -26,6 +26,9 @@ CARBIDE = 600e3
 STRENGTH, ROD, SIZE_EXPONENT = 4000.0, 3.3, 0.25
 """N/mm2, bending stress at which rods of cemented carbide break (transverse rupture strength, ISO 3327); the diameter
 of such a rod, mm; and how the strength falls with the diameter: 3 / m for a Weibull modulus m of 12 [Weibull1951]."""
+CHIP_SHARE = 0.2
+"""Feed per tooth over the diameter that no cutter bears. High-feed mills reach 0.083 [HighFeed2026], router bits 0.064
+[CutterShop2026]."""
 CORE = 0.8
 """Diameter of a solid bar as stiff as the flutes, of the diameter of the cutter."""
 
@@ -191,5 +194,5 @@ def _chips(per_tooth: F64, depth: F64, width: F64, tool: ToolBody) -> tuple[F64,
     return edge, phi, per_tooth * depth / edge * (1.0 - np.cos(phi)) / phi
 
 
-__all__ = ["CARBIDE", "CORE", "bending_stress", "buckling", "compliance", "cutting_force", "cutting_forces",
-           "cutting_powers", "drill_loads", "effective_diameter", "engaged_angle", "strength"]
+__all__ = ["CARBIDE", "CHIP_SHARE", "CORE", "bending_stress", "buckling", "compliance", "cutting_force",
+           "cutting_forces", "cutting_powers", "drill_loads", "effective_diameter", "engaged_angle", "strength"]

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from itertools import pairwise
 
-from geometry.cutting_mechanics import compliance, effective_diameter
+from geometry.cutting_mechanics import CHIP_SHARE, compliance, effective_diameter
 from geometry.machine_rates import RATES, Rates
 from geometry.tool_body import ToolBody
 from schemas.machine import Machine
@@ -37,6 +37,8 @@ FINISHING_SPEED, LIGHT = 1.4, 0.1
 """Cutting speed of a finish over that of layers, where the stock before it is no more than ``LIGHT`` of the diameter.
 Table of solid end mills [Tungaloy2020], page 1084, middle of the speeds at a width of 0.05 to 0.1 D over that of slots:
 carbon steel 1.4, alloy steel 1.5, stainless 1.6, titanium 1.7, aluminium 1.2."""
+GRAZING = 0.95
+"""Feed of a move in air over that at which its chips would be thicker than the cutter bears."""
 MAX_CHIP_THINNING = 1.5
 """Largest increase of the feed per tooth for a thin chip. Where a cutter runs into a rib the chip is not thin."""
 
@@ -218,10 +220,15 @@ def layer_depth(setup: Setup, tool: Tool, body: ToolBody, engaged: float) -> flo
     return depth if model is None else model.bearable(data.feed, depth, width)
 
 
-def link_feed(setup: Setup) -> float:
-    """Feed of moves in air, mm/min: the highest of the machine, no faster than its rapids."""
-    machine = setup.machine
-    return min(machine.max_feed_mm_min or DEFAULT_MAX_FEED_MM_MIN, rates_of(setup).rapid)
+def link_feed(setup: Setup, tool: Tool, rpm: float) -> float:
+    """Feed of moves in air, mm/min: the highest of the machine, no faster than its rapids.
+
+    rpm : of the spindle, 1/min
+
+    Beside a wall such a move may graze stock that the planner does not see, so it is none that the cutter cannot bear.
+    """
+    machine, bears = setup.machine, GRAZING * CHIP_SHARE * tool.diameter_mm * tool.flutes * rpm
+    return min(machine.max_feed_mm_min or DEFAULT_MAX_FEED_MM_MIN, rates_of(setup).rapid, bears)
 
 
 def rates_of(setup: Setup) -> Rates:

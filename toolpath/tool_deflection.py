@@ -25,6 +25,9 @@ MIN_SHARE, MIN_CHIP = 0.2, 0.002
 edges rub and the tool wears without cutting."""
 THINNEST = 1.0 / 3.0
 """Of a depth, to which it is reduced where a tool bends too far at its least chip."""
+MAX_BENT_TIMES = 4.0
+"""Times its limit that a tool bends at its least chip, at most, at whatever depth. Where walls meet at an acute angle
+more stands in its way than beside them, up to twice the force; the proof refuses ten times the limit."""
 LAYER_LIMIT = 0.05
 """mm, largest deflection of a tool in layers, unless ``BENT_SHARE`` of the stock they leave is less."""
 BENT_SHARE = 0.55
@@ -107,16 +110,20 @@ class DeflectionModel:
         """The largest depth at which a cut with the least chip does not bend the tool too far, mm.
 
         feed         : mm/min, of which ``least_share`` is taken
-        depth, width : mm; the result is no more than this depth and no less than ``THINNEST`` of it
+        depth, width : mm; the result is no more than this depth. It is no less than ``THINNEST`` of it, unless that
+                       bends the tool ``MAX_BENT_TIMES`` times as far as its limit
 
         Too far is past the limit, and past what ``MIN_SHARE`` of the feed does at the full depth. A stiffer tool has
         less of both. Thinner cuts at more feed bend it as far and take as much time, since the force grows with the
         feed less than in proportion, and their chips are none too thin.
         """
-        least, limit = self.least_share(feed) * feed, max(self.limit, self.deflection(MIN_SHARE * feed, depth, width))
+        least, most = self.least_share(feed) * feed, MAX_BENT_TIMES * self.limit
+        limit = min(max(self.limit, self.deflection(MIN_SHARE * feed, depth, width)), most)
         if self.fixed or self.deflection(least, depth, width) <= limit:
             return depth
         low, high = THINNEST * depth, depth
+        if self.deflection(least, low, width) > most:
+            low, high, limit = 0.0, low, most
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if self.deflection(least, middle, width) <= limit else (low, middle)
@@ -132,5 +139,5 @@ def left_by_layers(step_down: float, spacing: float) -> float:
     return max(LEFT_SHARE * step_down, LEFT_STEPS * spacing, MIN_LEFT)
 
 
-__all__ = ["BENT_SHARE", "LAYER_LIMIT", "MIN_CHIP", "MIN_FEED", "MIN_SHARE", "THINNEST",
+__all__ = ["BENT_SHARE", "LAYER_LIMIT", "MIN_CHIP", "MIN_FEED", "MIN_SHARE", "MAX_BENT_TIMES", "THINNEST",
            "DeflectionEstimate", "DeflectionModel", "left_by_layers"]

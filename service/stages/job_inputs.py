@@ -212,11 +212,11 @@ def _cut_table(setup: Setup, bodies: Sequence[ToolBody]) -> dict[str, CutData]:
     """Speeds, feeds and layer depths by tool id; layers are slots, as far as the engaged angle is not bounded."""
     out = {}
     for tool, body in zip(setup.tools, bodies, strict=True):
-        link = link_feed(setup)
         engaged = math.radians(SLOT_DEG if tool.max_engagement_deg is None else tool.max_engagement_deg)
         depth = layer_depth(setup, tool, body, engaged)
         rough = cutting_data(setup.material, tool, setup.machine, depth)
         fine = cutting_data(setup.material, tool, setup.machine, light=lightly_finished(setup, tool, body))
+        link = link_feed(setup, tool, min(rough.spindle_rpm, fine.spindle_rpm))
         finish = CutData(fine.spindle_rpm, fine.feed, fine.plunge_feed, link, depth, engaged,
                          bending=bending(setup, tool, body, fine, None))
         layers = CutData(rough.spindle_rpm, rough.feed, rough.plunge_feed, link, depth, engaged, finish,

@@ -87,7 +87,7 @@ def _plane(field: TipField, z: float, tips: F64, tolerance: float, share: float,
 
 
 def _windows(field: TipField, tips: F64, finer: int, room: float) -> Iterator[tuple[TipField, F64]]:
-    """The field on a finer lattice round each group of tips (n, 3), mm, that lie nearer together than twice ``room``."""
+    """The field on a finer lattice round each group of tips (n, 3), mm, nearer together than twice ``room``."""
     lat = field.lattice
     cells = 2.0 * room / lat.step
     labels, count = ndimage.label(dilated(lat.mask(tips[:, :2]), 0.5 * cells), np.ones((3, 3)))

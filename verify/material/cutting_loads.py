@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.cutting_mechanics import (
+    CHIP_SHARE,
     bending_stress,
     buckling,
     compliance,
@@ -31,9 +32,6 @@ from verify.material.stock_pass import StockPass, parts
 from verify.model import Finding, FindingKind
 from verify.moves import Moves
 
-CHIP_SHARE = 0.2
-"""Feed per tooth over the diameter that no cutter bears. High-feed mills reach 0.083 [HighFeed2026], router bits 0.064
-[CutterShop2026]."""
 DRILL_SHARE = 0.1
 """Feed of a drill in a turn over its diameter that it does not bear. Tables have up to 0.04 [ProtoCutter2026]."""
 SPEED_TIMES = 30.0

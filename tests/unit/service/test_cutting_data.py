@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from dataclasses import replace
@@ -19,7 +20,7 @@ from service.stages.cautions import bent, dry, limited, uncut_centres
 from service.stages.job_inputs import JobInputs
 from tests.synthetic_plan import BALL as SLIM
 from tests.synthetic_plan import step
-from toolpath.tool_deflection import DeflectionEstimate, left_by_layers
+from toolpath.tool_deflection import MAX_BENT_TIMES, DeflectionEstimate, left_by_layers
 
 BALL = {"id": "T1", "number": 1, "kind": "ball", "diameter_mm": 3, "flutes": 2}
 FLAT = {"id": "T2", "number": 2, "kind": "flat", "diameter_mm": 4, "flutes": 4}
@@ -94,6 +95,32 @@ def test_an_own_figure_may_pass_the_caution_for_machines_that_state_no_limit():
     fast = setup({**BALL, "spindle_rpm": 40000, "feed_mm_min": 9000})
     cut = JobInputs.of(fast).cut_table["T1"]
     assert (cut.spindle_rpm, cut.feed) == (40000, 9000) and limited(JobInputs.of(fast)) == []
+
+
+def test_links_of_thin_tools_give_no_thicker_chip_than_a_cutter_bears():
+    thin = {**BALL, "diameter_mm": 0.6, "flute_length_mm": 1.8, "spindle_rpm": 18000}
+    cut = JobInputs.of(setup(thin)).cut_table["T1"]
+    assert cut.link_feed == pytest.approx(0.95 * 0.2 * 0.6 * 2 * 18000)
+    assert JobInputs.of(setup({**thin, "diameter_mm": 1.0})).cut_table["T1"].link_feed == 5000
+
+
+def test_no_depth_bends_a_tool_farther_than_the_proof_may_double():
+    """Bearable depths of slender tools: the bend at the least chip stays below four times the limit."""
+    seen = 0
+    for diameter, neck in itertools.product((0.4, 0.6, 1.0, 2.0), (3.0, 8.0, 12.0)):
+        tool = {**BALL, "diameter_mm": diameter, "flute_length_mm": 3.0 * diameter, "neck_diameter_mm": 0.9 * diameter,
+                "neck_length_mm": 3.0 * diameter + neck, "stickout_mm": 3.0 * diameter + neck + 12.0}
+        fine = JobInputs.of(setup(tool)).cut_table["T1"].finish
+        model, full = fine.bending, 2.4 * diameter
+        least = model.least_share(fine.feed) * fine.feed
+        depth = fine.bearable(full, 0.06)
+        bend = model.deflection(least, depth, 0.06)
+        assert 0.0 < depth <= full and bend <= MAX_BENT_TIMES * model.limit * (1.0 + 1e-6)
+        seen += model.deflection(least, full, 0.06) > MAX_BENT_TIMES * model.limit
+        # and no shallower than that asks for
+        assert depth >= full / 3.0 - 1e-9 or model.deflection(least, full / 3.0, 0.06) > MAX_BENT_TIMES * model.limit
+        assert depth >= full / 3.0 - 1e-9 or bend == pytest.approx(MAX_BENT_TIMES * model.limit, rel=1e-3)
+    assert seen > 2
 
 
 def test_figures_for_coolant_are_told_of_where_there_is_none():
