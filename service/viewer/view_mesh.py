@@ -21,7 +21,7 @@ from geometry.trimming.facet_sheet import FacetSheet, refined, sheet_of, sides_o
 from geometry.trimming.label_query import LabelQuery, bisect
 from service.viewer.view_file import Chunk, Column
 
-PITCH, MAX_FACETS = 0.8, 120_000  # mm between nodes, wider where they would make more facets than that
+PITCH, MAX_FACETS = 0.4, 120_000  # mm between nodes, wider where they would make more facets than that
 NEAR = 0.1  # mm, how near a border is to the change of label
 GRID, UNIT = 0.001, 127  # mm of places; length of normals
 LEFT_UNIT, MAX_LEFT_UNITS = 0.0002, 32_000  # mm, unit of deviations, and its largest number
