@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,19 @@ HERE = Path(__file__).resolve()
 WRITTEN_PARTS = os.environ.get("ZONEMILL_PARTS")  # set where the environment has no cadquery (make test-runtime)
 DRAWS = 'importorskip("cadquery")'
 SHARED_PARTS = Path(__file__).resolve().parents[2] / "shared" / "parts"
+
+
+@pytest.fixture
+def two_threads() -> Iterator[None]:
+    """Two threads of numba during the test, which is skipped where numba may not have them."""
+    import numba
+
+    before = numba.get_num_threads()
+    if numba.config.NUMBA_NUM_THREADS < 2:
+        pytest.skip("numba has one thread here (NUMBA_NUM_THREADS, or one core)")
+    numba.set_num_threads(2)
+    yield
+    numba.set_num_threads(before)
 
 
 @pytest.fixture(scope="session")

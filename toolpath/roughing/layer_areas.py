@@ -36,7 +36,7 @@ def cleared(field: TipField, layers: Sequence[tuple[float, LayerArea]], level: F
     for z, place in layers[::-1]:
         last = dilated(at_or_under(field, level, z) & ~(whole | between), radius / lat.step)
         bare = last if place.bare is None else place.bare | last
-        out.append((z, place._replace(bare=_same(bare, [p.bare for _, p in out[-1:]]))))
+        out.append((z, place._replace(bare=_same(bare, out[-1][1].bare if out else None))))
         whole, between = (whole, between | place.area) if place.floor else (place.area, lat.mask(np.zeros((0, 2))))
     return out[::-1]
 
@@ -62,13 +62,14 @@ def layer_areas(field: TipField, tips: F64, heights: Sequence[float], step: floa
             if reach.any():
                 met = met | dilated(reach, field.disc_radius(disc, 0.0) / lat.step)
         bare = dilated(met, field.tool.radius / lat.step)
-        out.append(LayerArea(_same(own | met, [p.area for p in out[-1:]]), _same(bare, [p.bare for p in out[-1:]])))
+        known = out[-1] if out else LayerArea(own)
+        out.append(LayerArea(_same(own | met, known.area), _same(bare, known.bare)))
     return out[::-1]
 
 
-def _same(mask: NDArray[np.bool_], known: Sequence[NDArray[np.bool_] | None]) -> NDArray[np.bool_]:
-    """The mask, or one of those known that equals it: layers between upright walls share theirs, not their memory."""
-    return next((k for k in known if k is not None and np.array_equal(k, mask)), mask)
+def _same(mask: NDArray[np.bool_], known: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+    """The known mask where both are equal: layers between upright walls share one, and its memory."""
+    return known if known is not None and np.array_equal(known, mask) else mask
 
 
 __all__ = ["at_or_under", "cleared", "layer_areas"]

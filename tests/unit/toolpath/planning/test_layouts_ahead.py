@@ -39,16 +39,6 @@ class Counted:
         self.borders()
 
 
-@pytest.fixture
-def two_threads():
-    before = numba.get_num_threads()
-    if numba.config.NUMBA_NUM_THREADS < 2:
-        pytest.skip("numba has one thread here (NUMBA_NUM_THREADS, or one core)")
-    numba.set_num_threads(2)
-    yield
-    numba.set_num_threads(before)
-
-
 def test_parts_are_computed_once_by_another_thread(two_threads):
     layouts = [Counted() for _ in range(3)]
     with computed_ahead(layouts):

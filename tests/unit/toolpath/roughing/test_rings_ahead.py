@@ -15,16 +15,6 @@ ALLOWANCE, SIDE, LOW, HIGH = 0.3, 2.4, 3.0, 4.0
 
 
 @pytest.fixture
-def two_threads():
-    before = numba.get_num_threads()
-    if numba.config.NUMBA_NUM_THREADS < 2:
-        pytest.skip("numba has one thread here (NUMBA_NUM_THREADS, or one core)")
-    numba.set_num_threads(2)
-    yield
-    numba.set_num_threads(before)
-
-
-@pytest.fixture
 def begun():
     """A field, stock around its part, and the area of its layers: everywhere."""
     mesh = walls()
