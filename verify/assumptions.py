@@ -17,6 +17,7 @@ class AssumedKind(StrEnum):
     ROTARY_SENSE = "rotary_sense"
     ROTARY_START = "rotary_start"
     ROTARY_WAY = "rotary_way"
+    AXIS_WAY = "axis_way"
     MODES_LEFT = "modes_left"
     TIP_CONTROL = "tip_control"
     LENGTH_AXIS = "length_axis"

@@ -83,6 +83,10 @@ class ContourMotion(Origins):
     def _zero_name(self, name: str) -> str:
         return name if self.control is None else self.control.zero_names.get(name, name)
 
+    def _turned_tip(self, was: Sequence[float]) -> None:
+        if self.control is not None and self.machine is not None:
+            self.control.tip_turned(self.machine, was, self.s.turn)
+
     @property
     def _foreign(self) -> bool:
         return self.control is not None

@@ -153,6 +153,8 @@ class Rotary:
             return
         if not (s.tcp or self.tip_told or self.by_axes):
             self.by_axes = log.line
+        if turning and s.tcp:
+            self._turned_tip(was)
         gauge = 0.0 if s.tcp else self._gauge()
         if gauge is None:
             self._no_tips()
@@ -198,6 +200,9 @@ class Rotary:
             log.turned.swing(log.count, turns[k], turns[k + 1], minutes / n)
             log.move(points[k], points[k + 1], kind, feed, s.tool, 0)
         return None
+
+    def _turned_tip(self, was: Sequence[float]) -> None:
+        """A block has turned the axes from ``was``, (2,) deg, while the control keeps the tip."""
 
     def _no_tips(self) -> None:
         """Refuse a move of the joints whose tip cannot be computed."""

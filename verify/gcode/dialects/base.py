@@ -132,6 +132,9 @@ class DialectReader:
         if all(a.what != assumed.what for a in self.assumed):
             self.assumed.append(assumed)
 
+    def tip_turned(self, machine: Kinematics, was: Sequence[float], turn: Sequence[float]) -> None:
+        """A block turns the axes from ``was`` to ``turn``, (2,) deg, evenly, while the control keeps the tip."""
+
     def bound(self, known: bool) -> None:
         """From here on a word bounds the deviation from the path (``known``), or none does."""
         self._free |= not known

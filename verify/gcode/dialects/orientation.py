@@ -23,6 +23,8 @@ CLOSE = 1e-5
 STEP = 0.02
 """rad, steps in which the angles are followed along a great circle."""
 MAX_HALVINGS = 14
+SAME_WAY = 1e-4
+"""rad, between two ways of the tool axis from which on they count as two: 0.01 mm at 100 mm."""
 
 
 def needed(machine: Kinematics | None, word: str) -> Kinematics:
@@ -130,6 +132,24 @@ def great_circle(machine: Kinematics, start: Sequence[float], end: Sequence[floa
     return out
 
 
+def ways_differ(machine: Kinematics, start: Sequence[float], end: Sequence[float]) -> bool:
+    """Whether even turns of the axes lead the tool axis elsewhere than the great circle between its ends.
+
+    start, end : (2,) deg, angles where the block begins and ends
+    """
+    a, b = (math.radians(abs(q - p)) for p, q in zip(start, end, strict=True))
+    if b * math.hypot(b, 2.0 * a) <= 8.0 * SAME_WAY:  # as ``verify.program.turn_subdivision`` has it
+        return False
+    share = np.linspace(0.0, 1.0, 9)
+    turns = np.radians(start) + share[:, None] * np.radians(np.subtract(end, start))
+    axes = machine.axis(turns)
+    angle = math.atan2(float(np.linalg.norm(np.cross(axes[0], axes[-1]))), float(axes[0] @ axes[-1]))
+    if angle > math.pi - POLE:
+        return True
+    circle = [_on_circle(axes[0], axes[-1], angle, s) if angle > POLE else axes[0] for s in share.tolist()]
+    return bool(np.abs(axes - circle).max() > SAME_WAY)
+
+
 def _on_circle(a: F64, b: F64, angle: float, share: float) -> F64:
     return np.asarray((math.sin((1 - share) * angle) * a + math.sin(share * angle) * b) / math.sin(angle))
 
@@ -149,4 +169,4 @@ def _halve(machine: Kinematics, circle: tuple[F64, F64, float], first: tuple[flo
     _halve(machine, circle, middle, last, out, depth + 1)
 
 
-__all__ = ["angles_of", "great_circle", "needed"]
+__all__ = ["angles_of", "great_circle", "needed", "ways_differ"]

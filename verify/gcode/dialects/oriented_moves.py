@@ -7,9 +7,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from verify.assumptions import Assumed, AssumedKind
 from verify.gcode.dialects.base import BlockError
-from verify.gcode.dialects.orientation import angles_of, great_circle, needed
+from verify.gcode.dialects.orientation import angles_of, great_circle, needed, ways_differ
 from verify.gcode.dialects.stated_places import StatedPlaces, digits
+from verify.kinematics import Kinematics
 
 STRAIGHT = 1e-9
 """mm, the shortest move that has a direction."""
@@ -32,6 +34,21 @@ class OrientedMoves(StatedPlaces):
         self.circle: bool | None = None
         self.heading: tuple[list[float], list[float]] | None = None
         self._places: list[list[float]] = []
+
+    def tip_turned(self, machine: Kinematics, was: Sequence[float], turn: Sequence[float]) -> None:
+        """As ``DialectReader.tip_turned``."""
+        self._leave_way(machine, was, turn, "even turns of the rotary axes")
+
+    def _leave_way(self, machine: Kinematics, was: Sequence[float], turn: Sequence[float], read: str) -> None:
+        """A block turns the axes, (2,) deg; ``read`` is how, taken for granted where the program leaves it open."""
+        if self.tcp and (words := self.open_way()) and ways_differ(machine, was, turn):
+            self.leave_open(Assumed(
+                AssumedKind.AXIS_WAY, f"{read}, first in line {self.machine.log.line}", "where machine data say "
+                "otherwise, the tool swings another way between the ends of the block, through part or fixture", words))
+
+    def open_way(self) -> str:
+        """Words that would state how the tool axis turns between two ends, where the program leaves it open; or ''."""
+        return ""
 
     def note_place(self) -> None:
         """Keep the latest two places, for the direction of a straight move."""
@@ -88,6 +105,8 @@ class OrientedMoves(StatedPlaces):
         start = self.here()
         places = {k: start["XYZ".index(k)] for k in words}
         pieces = [(1.0, end)]
+        if self.circle is not False:
+            self._leave_way(machine, now, end, "great circles of the tool axis")
         if self.circle is not False and end != now and not any(math.isnan(v) for v in places.values()):
             pieces = great_circle(machine, now, end, axis.tolist(), stated=vector is None)
         self.machine.log.room(len(pieces))

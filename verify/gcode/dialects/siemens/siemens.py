@@ -55,7 +55,9 @@ _DEF = re.compile(r"DEF\s+(?:(?:NCK|CHAN)\s+)?(?:SYNR\s+|SYNW\s+|SYNRW\s+)?"
 _HARMLESS = re.compile(r"\$(?:AC_TIMER|AC_MARKER|AC_PARAM|A_OUT|A_DB[BWDR]|A_DLB|AC_SYNA)")
 """Values of the control that move nothing: timers, counters and outputs."""
 _FRAMES = frozenset({"TRANS", "ATRANS", "ROT", "AROT", "MIRROR", "AMIRROR", "SCALE", "ASCALE"})
-_ORIENTS = {"ORIWKS": True, "ORIVECT": True, "ORIPLANE": True, "ORIMKS": False, "ORIAXES": False}
+_ORIENTS = {"ORIWKS": (25, True), "ORIMKS": (25, False), "ORIVECT": (51, True), "ORIPLANE": (51, True),
+            "ORIAXES": (51, False)}
+"""Group of each word, and whether it means great circles. Machine data 21104 decide which of the groups counts."""
 _M = {n: n for n in (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30)} | {19: 5, 70: 5}  # a spindle that takes a position stands
 
 
@@ -78,6 +80,7 @@ class SiemensReader(SiemensCalls):
         self.edge = 1
         self.lost = ""  # the word after which the program has not stated a work offset
         self.moved = False
+        self.ways: dict[int, bool] = {}  # by group of words, whether the last one means great circles
         self.variables = Variables(self._served)
 
     def order(self, lines: Sequence[str], machine: Machine) -> Iterator[tuple[int, str]]:
@@ -437,12 +440,14 @@ class SiemensReader(SiemensCalls):
 
     def _orients(self, word: str) -> None:
         """ORIMKS and ORIAXES turn the axes evenly, ORIWKS and ORIVECT the tool axis along a great circle."""
-        wanted = _ORIENTS[word]
-        if self.circle is not None and self.circle != wanted and {word} & {"ORIAXES", "ORIVECT", "ORIPLANE"}:
-            self.notes.append(f"{word} after {'ORIWKS' if self.circle else 'ORIMKS'}: machine data 21104 decide which "
-                              f"of both "
-                              "counts; the later one is read")
-        self.circle = wanted
+        group, self.circle = _ORIENTS[word]
+        self.ways[group] = self.circle
+
+    def open_way(self) -> str:
+        """As ``OrientedMoves.open_way``: the control has a word of each group in force, whatever the program says."""
+        if len(self.ways) == 2 and set(self.ways.values()) == {self.circle}:
+            return ""
+        return "ORIWKS with ORIVECT, or ORIMKS with ORIAXES, behind TRAORI"
 
     def _transform(self, word: str, line: Line) -> None:
         if self.programmed is not None:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from verify.gcode.dialects.orientation import ways_differ
 from verify.gcode.reader import read_program
 from verify.kinematics import Kinematics
 
@@ -28,3 +29,29 @@ def test_a_vector_takes_the_setting_within_the_range(dialect, text, tilt, turn):
     assert end == pytest.approx([30.0 if tilt[1] else -30.0, turn], abs=1e-4)
     assert p.poses.end_axis[-1] == pytest.approx([0.5, 0.0, 0.8660254], abs=1e-6)
     assert np.abs(p.poses.end_turn[:, 0]).max() <= np.radians(30.0) + 1e-6
+
+
+def ways_left_open(words, end="A30 C90"):
+    text = f"G710 G17 G90 G94\nT1 M6\nD1\nS6000 M3\nTRAORI\nG54\n{words}\nG0 X0 Y0 Z50 A30 C0\nG1 X10 {end} F500\nM30\n"
+    p = read_program(text, dialect="siemens", tools=[1], kinematics=Kinematics("table-table-AC"))
+    return [a.value for a in p.open if a.what == "axis_way"]
+
+
+def test_the_way_of_the_tool_axis_is_open_where_no_word_of_both_groups_states_it():
+    """ORIWKS and ORIMKS are of group 25, ORIVECT and ORIAXES of group 51; machine data 21104 decide which counts."""
+    for words, way in (("", "even"), ("ORIAXES", "even"), ("ORIMKS", "even"), ("ORIWKS", "great"), ("ORIVECT", "great"),
+                       ("ORIWKS ORIAXES", "even"), ("ORIMKS ORIVECT", "great")):
+        (value,) = ways_left_open(words)
+        assert value.startswith(way) and value.endswith("line 9")
+    (value,) = ways_left_open("", "A3=0.5 B3=0 C3=0.8660254")
+    assert value.startswith("great")
+    assert not ways_left_open("ORIMKS ORIAXES") and not ways_left_open("ORIWKS\nORIVECT")
+    assert not ways_left_open("", "A60 C0") and not ways_left_open("", "A30.1 C0.1")  # both ways are one
+
+
+@pytest.mark.parametrize(("start", "end", "differ"), [
+    ((30, 0), (30, 90), True), ((30, 0), (60, 0), False), ((-30, 0), (60, 0), False), ((0, 0), (0, 170), False),
+    ((30, 0), (30, 360), True), ((90, 0), (90, 90), False), ((30, 0), (-30, 180), True), ((90, 0), (90, 180), True),
+    ((30, 0), (30.5, 1), False), ((30, 0), (32, 3), True)])
+def test_where_even_turns_are_no_great_circle(start, end, differ):
+    assert ways_differ(Kinematics("head-head-BC"), start, end) is differ
