@@ -67,7 +67,11 @@ class HaasReader(FanucReader):
                 raise BlockError(f"{letter}{digits} of a peck cycle without a decimal point counts thousandths or not, "
                                  "depending on a setting", f"write {letter}{digits}.")
             return [letter + digits]
-        if (self.hole and letter == "J") or (letter == "P" and 103 in codes):
+        if self.hole and letter == "J":
+            speed = float(values.get("S", self.machine.s.speed))
+            self.machine.log.turns(self.machine.s.tool, float(digits) * speed)  # on the way out of a tapped hole
+            return []
+        if letter == "P" and 103 in codes:
             return []
         return super()._word(letter, digits, codes, values)
 

@@ -136,6 +136,8 @@ def _ways(call: CycleCall, machine: Machine, surface: float, depth: float, feed:
         machine.log.tap(call.get("Q239") < 0)
         if not speed > 0 or not pitch > 0:
             raise BlockError(f"cycle {n} needs a spindle speed and a pitch (Q239)")
+        if n == 209:
+            machine.log.turns(machine.s.tool, speed * call.get("Q403", 1.0))  # on the way out
         rate = f"F{digits(pitch * speed / unit)}"
         return {"feed": rate, "out": rate}
     if n == 206:

@@ -70,6 +70,8 @@ def drilling_blocks(call: DrillingCall, here: Sequence[float], machine: Machine)
         if pitch is not None:
             if not speed > 0:
                 raise BlockError(f"{call.name} without a spindle speed")
+            if call.name == "CYCLE84":
+                machine.log.turns(s.tool, call.number(11))  # on the way out
             rate = pitch if s.feed_mode == 95 else pitch * speed
             hole = DrilledHole(hole.clear, hole.bottom, hole.back, hole.pecks, hole.surface, hole.lift,
                                f"F{digits(rate / s.scale)}", f"F{digits(rate / s.scale)}", hole.dwell)
