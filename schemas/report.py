@@ -157,8 +157,8 @@ class Assumption(ReportModel):
 
     what: Annotated[str, Field(
         description="dialect, travel, max_rpm, rotary_sense, rotary_start, rotary_way, axis_way, modes_left, "
-                    "tip_control, length_axis, length_register, radius_register, tap_diameter, gauge_length, flute_length, "
-                    "holder, above_holder, table, loose_stock, other_solids, rapid_path, path_mode, "
+                    "tip_control, length_axis, length_register, radius_register, tap_diameter, gauge_length, "
+                    "flute_length, holder, above_holder, table, loose_stock, other_solids, rapid_path, path_mode, "
                     "change_position, coolant, cutting_force or between_samples.",
         examples=["travel"])]
     value: Annotated[str | float, Field(description="What the proof takes it to be.", examples=["long enough"])]

@@ -42,7 +42,8 @@ def read_one(nc: NcProgram, tools: Sequence[ToolBody], *, work_offset: str = "G5
     if is_exchange_file(nc.text):
         from verify.stepnc.reader import read_stepnc  # its tables take a tenth of a second to import
 
-        return read_stepnc(nc.text, name=nc.name, tools=tools, kinematics=kinematics, report=report)
+        stated = {n: g for n, g in (gauge_length or {}).items() if n in gauge_given}
+        return read_stepnc(nc.text, name=nc.name, tools=tools, kinematics=kinematics, lengths=stated, report=report)
     return read_program(
         nc.text, name=nc.name, tools=frozenset(t.number for t in tools), work_offset=nc.work_offset or work_offset,
         blend_limit=max(BLEND, BLEND_SHARE * gouge_tolerance), kinematics=kinematics,

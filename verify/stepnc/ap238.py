@@ -15,6 +15,8 @@ import numpy as np
 
 from geometry.errors import ProgramError
 from geometry.mesh import F64
+from verify.program.program import Remark
+from verify.program.turn_subdivision import TURN
 from verify.stepnc.ap238_attributes import EXECUTABLES, RECORDS, REPRESENTATIONS, SHAPES, TABLE, UNITS
 from verify.stepnc.attribute_checks import FARTHEST, Checked, shown
 from verify.stepnc.curves import curve_points
@@ -30,7 +32,7 @@ _BASE = {"METRE": ("length", 1000.0), "SECOND": ("time", 1.0 / 60.0), "RADIAN": 
 _SMALLEST, _LARGEST, _MAX_POWER = 1e-12, 1e12, 3.0  # sizes of units, and exponents; real units are far within
 _FEED, _SPEED = {"length": 1.0, "time": -1.0}, {"turn": 1.0, "time": -1.0}
 _SYMBOLS = {
-    "priority": ("required", "suggested"),
+    "priority": ("required",),
     "trajectory type": ("approach", "lift", "connect", "non-contact", "contact", "trajectory path"),
     "direction": ("beginning to end", "end to beginning"),
     "speed profile": ("rapid",),
@@ -56,6 +58,8 @@ _NAMES = {
                                   "leading line", "forward direction", "sideward direction"),
 }
 _TOOLS = {"ballnose endmill": "ball", "ball endmill": "ball", "bullnose endmill": "bull", "endmill": "flat"}
+DEVIATION = 0.001
+"""mm, from the path, that a file may allow; the error bound includes it, as it does that of G64."""
 _NC_STOPS = ("program stop", "optional stop")
 _NC_QUIET = ("display message", "set mark")
 _ITEMS = ("effective cutting diameter", "maximum depth of cut", "overall assembly length", "hand of cut",
@@ -250,10 +254,24 @@ class Ap238Reader:
             axes = np.tile([0.0, 0.0, 1.0], (len(tips), 1))
         if self._setting(number, "direction") == "end to beginning":
             tips, axes, lines = tips[::-1], axes[::-1], lines[::-1]
+        self._check_deviation(number, named)
         rapid = self._setting(number, "speed profile") is not None
         feed, speed = self._rates(own[0] if own else technology)
         self.recorder.follow(tips @ place[:3, :3].T + place[:3, 3], axes @ place[:3, :3].T, rapid=rapid, feed=feed,
                            speed=speed, lines=lines)
+
+    def _check_deviation(self, number: int, named: dict[str, tuple[int, int]]) -> None:
+        """Take a deviation that the file allows the control into the error bound; more is a finding."""
+        for name, unit, most in (("path maximum deviation", "length", DEVIATION),
+                                 ("tool axis maximum deviation", "angle", TURN)):
+            if name not in named:
+                continue
+            size = self._measure(number, name, {unit: 1.0})
+            if unit == "length" and 0.0 <= size <= most:
+                self.recorder.blend = max(self.recorder.blend, size)
+            elif not 0.0 <= size <= most:
+                self.recorder.remarks.append(Remark(self.file.line(number), f"'{name}' lets the control leave the way "
+                                                    "of the file, and nothing simulates that"))
 
     def _curve(self, number: int, name: str, *, lengths: bool) -> tuple[F64, F64]:
         """Points (n, 3) of a property, mm of a curve where they are lengths, else of a polyline; their lines (n,)."""

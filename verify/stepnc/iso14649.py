@@ -289,6 +289,7 @@ class Iso14649Reader:
         self._take(self.data.ref(number, entity, "its_tool"), self.file.line(number))
         technology = self.data.ref(number, entity, "its_technology")
         functions = self.data.ref(number, entity, "its_machine_functions")
+        self._check_functions(functions)
         self.recorder.coolant = self.data.one(functions, "MILLING_MACHINE_FUNCTIONS", "coolant") == "T"
         self._paths(paths, place, self._direction(number, entity), number, technology,
                     rapid=False)
@@ -296,6 +297,15 @@ class Iso14649Reader:
         if height is not None:
             turn = self.place @ place
             self.recorder.retract_to(turn[:3, 3] + height * turn[:3, 2], turn[:3, 2], self.file.line(number))
+
+    def _check_functions(self, number: int) -> None:
+        """Refuse functions that hold an axis, stop the spindle or are not known."""
+        entity = "MILLING_MACHINE_FUNCTIONS"
+        for attribute, what in (("axis_clamping", "clamped axes do not move"), ("other_functions", "it is not read")):
+            if self.data.one(number, entity, attribute) != []:
+                raise self.file.error(number, f", {attribute}: an empty list expected; {what}")
+        if self.data.one(number, entity, "oriented_spindle_stop") is not None:
+            raise self.file.error(number, ", oriented_spindle_stop: $ expected; the spindle would stand")
 
     def _direction(self, number: int, entity: str) -> F64 | None:
         """(3,): the tool axis of paths without axes; None where paths must have axes."""
@@ -321,6 +331,9 @@ class Iso14649Reader:
     def _trajectory(self, number: int, place: F64, direction: F64 | None, owner: int, technology: int | None,
                     rapid: bool) -> None:
         entity = "CUTTER_LOCATION_TRAJECTORY"
+        if self.data.one(number, entity, "its_priority") != "T":
+            raise self.file.error(number, ", its_priority: .T. expected; a control may leave a path that is only "
+                                          "suggested")
         tips, lines = curve_points(self.data, self.data.ref(number, entity, "basiccurve"))
         leaning = self.data.maybe(number, entity, "its_toolaxis")
         if leaning is not None:
@@ -334,6 +347,8 @@ class Iso14649Reader:
         if self.data.one(number, entity, "its_direction") == "F":
             tips, axes, lines = tips[::-1], axes[::-1], lines[::-1]
         fast = rapid or isinstance(self.data.one(number, entity, "its_speed"), Typed)
+        if (functions := self.data.maybe(number, entity, "its_machine_functions")) is not None:
+            self._check_functions(functions)
         own = self.data.maybe(number, entity, "its_technology")
         feed, speed = self._rates(number, own if own is not None else technology, fast)
         turn = self.place @ place
@@ -355,6 +370,10 @@ class Iso14649Reader:
         for own, other in (("feedrate", "feedrate_per_tooth"), ("spindle", "cutspeed")):
             if None not in (self.data.real(technology, entity, own), self.data.real(technology, entity, other)):
                 raise self.file.error(technology, f", {other}: $ expected beside {own}; one of both may stand")
+        for attribute, right in (("synchronize_spindle_with_feed", "F"), ("its_adaptive_control", None)):
+            if self.data.one(technology, entity, attribute) != right:
+                raise self.file.error(technology, f", {attribute}: {'$' if right is None else '.F.'} expected; the "
+                                                  "feed would be another")
         if not rapid and self.data.one(technology, entity, "feedrate_reference") != "TCP":
             raise self.file.error(technology, ", feedrate_reference: .TCP. expected, the feed of the tip")
         return sane_rates(self.data, technology, math.nan if feed is None else feed * MM_MIN, -RPM * spindle)
@@ -377,8 +396,11 @@ class Iso14649Reader:
         if edge is not None and abs(edge - corner) > 1e-6 or corner > 0.5 * wide + 1e-9:
             raise self.file.error(size, f", edge_radius: {0.5 * wide:g} (half of the diameter) expected, or less on a "
                                         f"bull nose, not {edge}")
+        edges = {float(self.data.real(n, "CUTTING_COMPONENT", "tool_offset_length") or 0.0)
+                 for n in self.data.refs(number, "MILLING_CUTTING_TOOL", "its_cutting_edge")}
         return CutterRecord(tool_number(name), name, shape_of(wide, corner), wide, corner, long,
-                      self.data.real(number, "MILLING_CUTTING_TOOL", "overall_assembly_length"), number)
+                            self.data.real(number, "MILLING_CUTTING_TOOL", "overall_assembly_length"), number,
+                            tuple(sorted(edges)))
 
     def _plane(self, number: int) -> tuple[F64, F64]:
         """Point and unit normal of a security plane in the setup frame, mm."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from geometry.errors import ProgramError
 from geometry.tool_body import ToolBody
@@ -14,6 +14,7 @@ from verify.stepnc.part21 import Part21File, is_exchange_file
 from verify.stepnc.tool_motion import CutterMoves, CutterRecord, MotionRecorder
 
 SAME_SIZE = 1e-4  # mm, between sizes of a tool in the file and in the setup
+SAME_LENGTH = 1.0  # mm, between lengths from the spindle to the tip, which are measured at the machine
 
 is_stepnc = is_exchange_file
 """Whether a text is STEP-NC and not NC code."""
@@ -25,12 +26,14 @@ def read_moves(text: str, *, name: str = "program") -> CutterMoves:
 
 
 def read_stepnc(text: str, *, name: str = "program", tools: Sequence[ToolBody] | None = None,
-                kinematics: Kinematics | None = None, report: Report = silent) -> Program:
+                kinematics: Kinematics | None = None, lengths: Mapping[int, float] | None = None,
+                report: Report = silent) -> Program:
     """Read a STEP-NC file: AP238 [ISO10303-238] or ISO 14649 [ISO14649-10], by the FILE_SCHEMA of its header.
 
     tools      : tools of the setup. A tool of the file is matched by its number, or by its size where its id has no
                  number; other sizes give a remark. None: the numbers of the file are used.
     kinematics : rotary axes of the machine, or None
+    lengths    : mm by T number, spindle face to tip, of the tools whose length the setup states; others give a remark
     report     : called with 0 to 1; an exception from it ends the reading
 
     Returns
@@ -53,6 +56,7 @@ def read_stepnc(text: str, *, name: str = "program", tools: Sequence[ToolBody] |
             numbers.append(cutter.number if cutter.number is not None else place + 1)
         else:
             numbers.append(_known(recorder, cutter, tools))
+            _compare_lengths(recorder, cutter, numbers[-1], (lengths or {}).get(numbers[-1]))
     program = recorder.program(numbers, kinematics)
     report(1.0)
     return program
@@ -96,6 +100,15 @@ def _known(recorder: MotionRecorder, cutter: CutterRecord, tools: Sequence[ToolB
         recorder.remarks.append(Remark(0, f"T{body.number}, #{cutter.instance}, has {difference}: use the tool of the "
                                           "file in the setup"))
     return body.number
+
+
+def _compare_lengths(recorder: MotionRecorder, cutter: CutterRecord, number: int, stated: float | None) -> None:
+    """Find lengths of a tool of the file that contradict the one that the setup states: the tip would go elsewhere."""
+    for word, there in [("assembly length", cutter.assembly_length), *(("tool offset", v) for v in cutter.offsets)]:
+        if stated is not None and there is not None and abs(there - stated) > SAME_LENGTH:
+            recorder.remarks.append(Remark(0, f"T{number}, #{cutter.instance}, has {word} {there:g} mm in the file and "
+                                              f"gauge length {stated:g} mm in the setup: use one of both in file, "
+                                              "setup and machine"))
 
 
 def _differs(cutter: CutterRecord, body: ToolBody) -> str:

@@ -41,6 +41,7 @@ class CutterRecord:
     kind          : 'ball', 'bull' or 'flat'
     diameter, corner_radius, flute_length, assembly_length : mm
     instance      : number of its instance
+    offsets       : mm, lengths from the spindle to the cutting edges
     """
 
     number: int | None
@@ -51,6 +52,7 @@ class CutterRecord:
     flute_length: float | None
     assembly_length: float | None
     instance: int
+    offsets: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +100,7 @@ class MotionRecorder:
     """Record of the motion so far, in mm, in the setup frame.
 
     name : of the file; lines : number of its lines
-    coolant : whether it is on from here on
+    coolant : whether it is on from here on; blend : mm, by which the control may leave the paths
     """
 
     def __init__(self, name: str, lines: int) -> None:
@@ -112,7 +114,7 @@ class MotionRecorder:
         self._stops: list[tuple[int, str, int, F64]] = []
         self._over: tuple[F64, F64, int] | None = None
         self._planes: dict[tuple[object, ...], TravelPlane] = {}
-        self.dwell = 0.0
+        self.dwell = self.blend = 0.0
         self.coolant = False
         self.notes: list[str] = []
         self.remarks: list[Remark] = []
@@ -239,8 +241,8 @@ class MotionRecorder:
         return Program(
             name=self.name, start=m.start, end=m.end, kind=np.where(m.rapid, RAPID, FEED).astype(np.int8), feed=m.feed,
             tool=tool, line=m.line, dwell=self.dwell, speeds=speeds, lines=self._lines, remarks=tuple(remarks),
-            unknown=np.array(unknown, np.int64).reshape(-1, 2), stops=stops, assumed=(), blend=0.0, minutes=minutes,
-            poses=poses, notes=tuple(notes), speed=np.maximum(m.speed, 0.0), coolant=m.coolant,
+            unknown=np.array(unknown, np.int64).reshape(-1, 2), stops=stops, assumed=(), blend=self.blend,
+            minutes=minutes, poses=poses, notes=tuple(notes), speed=np.maximum(m.speed, 0.0), coolant=m.coolant,
             changes=sum(event == "tool change" for _, event, _, _ in self._stops), planes=tuple(self._planes.values()))
 
     def _last(self) -> list[tuple[int, str, int, F64]]:

@@ -98,6 +98,53 @@ def test_a_fresh_cutter_stops_the_program_at_the_clearance_plane(write):
     assert "Fresh cutter in T1" in write(job)
 
 
+@pytest.mark.parametrize(("was", "is_now", "name"), [
+    ("TRAJECTORY(.T.,.TRAJ", "TRAJECTORY(.F.,.TRAJ", "its_priority"),
+    ("$,.F.,.F.,.F.,$)", "$,.T.,.F.,.F.,$)", "synchronize_"),
+    ("$,.F.,.F.,.F.,$)", "$,.F.,.F.,.F.,#12)", "its_adaptive_control"),
+    ("(),.F.,$,$,()", "('X'),.F.,$,$,()", "axis_clamping"), ("(),.F.,$,$,()", "(),.F.,$,$,(#4)", "other_functions"),
+    ("(),.F.,$,$,()", "(),.F.,#4,$,()", "oriented_spindle_stop")])
+def test_what_lets_a_control_do_otherwise_is_refused(was, is_now, name):
+    """A suggested path, a feed that the control changes, held axes and a spindle that stands."""
+    text = write_stepnc_arm(tiny())
+    assert was in text
+    with pytest.raises(ProgramError, match=name):
+        read_stepnc(text.replace(was, is_now), tools=tiny().tools)
+
+
+def test_a_path_that_is_only_suggested_is_refused_in_ap238_too():
+    with pytest.raises(ProgramError, match="'suggested'"):
+        read_stepnc(write_stepnc_aim(tiny()).replace("'required'", "'suggested'"), tools=tiny().tools)
+
+
+@pytest.mark.parametrize(("size", "allowed"), [(0.0005, True), (0.5, False)])
+def test_a_deviation_that_the_file_allows_is_counted_or_found(size, allowed):
+    text = write_stepnc_aim(tiny())
+    path = re.search(r"#(\d+)=MACHINING_TOOLPATH\('S01 cut", text) or re.search(r"#(\d+)=MACHINING_TOOLPATH\(", text)
+    context = re.search(r"#(\d+)=\(GEOMETRIC_REPRESENTATION_CONTEXT|#(\d+)=\(GLOBAL_UNIT", text)
+    assert path is not None and context is not None
+    more = (f"#900001=MEASURE_REPRESENTATION_ITEM('',LENGTH_MEASURE({size}),#6);\n"
+            f"#900002=REPRESENTATION('',(#900001),#{context[1] or context[2]});\n"
+            f"#900003=ACTION_PROPERTY('path maximum deviation','',#{path[1]});\n"
+            "#900004=ACTION_PROPERTY_REPRESENTATION('','',#900003,#900002);\n")
+    read = read_stepnc(text.replace("ENDSEC;\nEND-ISO", more + "ENDSEC;\nEND-ISO"), tools=tiny().tools)
+    assert (read.blend == size and not read.remarks) if allowed else "leave the way" in read.remarks[0].message
+
+
+@both
+def test_lengths_of_the_file_are_held_against_those_that_the_setup_states(write):
+    text, tools = write(tiny()), tiny().tools
+    assert not read_stepnc(text, tools=tools, lengths={1: 75.4}).remarks
+    assert not read_stepnc(text.replace("(75.", "(50."), tools=tools).remarks  # not stated
+    assert "75 mm in the file" in read_stepnc(text, tools=tools, lengths={1: 50.0}).remarks[0].message
+
+
+def test_the_offset_of_a_cutting_edge_is_a_length_too():
+    text = write_stepnc_arm(tiny()).replace("CUTTING_COMPONENT(75.", "CUTTING_COMPONENT(50.")
+    (remark,) = read_stepnc(text, tools=tiny().tools, lengths={1: 75.0}).remarks
+    assert "tool offset 50 mm in the file and gauge length 75 mm" in remark.message
+
+
 @pytest.mark.parametrize("stream", [stream_stepnc_aim, stream_stepnc_arm])
 def test_pieces_are_small_and_make_the_file(stream):
     pieces: list[str] = []

@@ -32,11 +32,13 @@ def test_heidenhain(cycle, taps, left):
     assert p.taps == taps and any("left-hand" in r.message for r in p.remarks) == left
 
 
+BORE = "G710 G17 G90 G94\nT1 M6\nD1\nS400 M3\nG0 X0 Y0 Z50\nCYCLE84(50,12,3,-1,,0,3,,0.8,0,400{})\nM30\n"
+
+
 @pytest.mark.parametrize(("dialect", "text", "speed"), [
-    ("siemens", "G710 G17 G90 G94\nT1 M6\nD1\nS400 M3\nG0 X0 Y0 Z50\nCYCLE84(50,12,3,-1,,0,3,,0.8,0,400,900)\nM30\n", 900),
-    ("siemens", "G710 G17 G90 G94\nT1 M6\nD1\nS400 M3\nG0 X0 Y0 Z50\nCYCLE84(50,12,3,-1,,0,3,,0.8,0,400)\nM30\n", 400),
-    ("haas", "%\nO1\nG21 G17 G90 G94 G54\nT1 M6\nS400 M3\nG0 G43 H1 Z50.\nG0 X0. Y0.\nG84 Z-1. R15. F320. J3\nG80\nM30\n%\n",
-     1200),
+    ("siemens", BORE.format(",900"), 900), ("siemens", BORE.format(""), 400),
+    ("haas", "%\nO1\nG21 G17 G90 G94 G54\nT1 M6\nS400 M3\nG0 G43 H1 Z50.\nG0 X0. Y0.\nG84 Z-1. R15. F320. J3\n"
+     "G80\nM30\n%\n", 1200),
     ("heidenhain", "BEGIN PGM 1 MM\nTOOL CALL 1 Z S400\nL X+0 Y+0 Z+50 R0 FMAX M3\nCYCL DEF 209 Q200=+3 Q201=-13 "
      "Q239=+0.8 Q203=+12 Q204=+38 Q257=+3 Q256=+1 Q336=+0 Q403=+2.5\nCYCL CALL\nM30\nEND PGM 1 MM\n", 1000)])
 def test_a_tap_that_comes_out_faster_turns_faster(dialect, text, speed):
