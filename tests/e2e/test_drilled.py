@@ -100,6 +100,30 @@ def test_a_hole_that_is_not_deep_enough_is_stock_left_as_high_as_the_drill_is_sh
 
 
 @pytest.mark.slow
+def test_a_countersink_too_high_is_told_by_the_depth_it_misses(tmp_path):
+    """A spot drill of 90 degrees leaves stock of one depth along its cone, at the rim as at the bottom."""
+    import cadquery as cq
+
+    block = cq.Workplane("XY").box(16, 16, 8, centered=(True, True, False)).translate((0, 0, -8))
+    block = block.cut(cq.Workplane("XY").circle(1.5).extrude(-8))
+    cone = cq.Solid.makeCone(1.5, 4.0, 2.5, pnt=cq.Vector(0, 0, -2.5), dir=cq.Vector(0, 0, 1))
+    path = write_step(block.cut(cq.Workplane(cone)), tmp_path / "countersink.step")
+    spot = {"id": "T5", "kind": "drill", "diameter_mm": 8, "point_angle_deg": 90, "flute_length_mm": 20,
+            "shank_diameter_mm": 8, "stickout_mm": 30}
+    setup = parse_setup(json.dumps(SETUP | {"tools": [*SETUP["tools"], spot], "stock": {
+        "kind": "box", "box_mm": [[-8, -8, -8], [8, 8, 0]], "uncertainty_mm": 0}}))
+    job = read_job_part(path, setup, lambda _stage, _share: None)
+    for short in (0.0, 0.05, 0.1, 1.0):
+        text = "\n".join(["%", "G21 G90 G17 G94 G40 G49 G54 G64 P0.001", "T1 M6", "S3000 M3", "G0 X0 Y0", "G43 H1 Z20",
+                          "G98 G83 X0 Y0 Z-9.2 R2 Q1.5 F150", "G80", "T5 M6", "S1500 M3", "G0 X0 Y0", "G43 H5 Z20",
+                          f"G82 X0 Y0 Z{short - 4.0:.3f} R2 P0.1 F80", "G80", "M5", "M30", "%"])
+        report = proved_program(job, read_first(setup, text, ending=".ngc"), lambda _share: None).report
+        found = [f["depth"] for f in report["findings"]]
+        assert report["state"] == ("clean" if short else "proved"), report["findings"]
+        assert found == ([pytest.approx(short, rel=0.03, abs=0.003)] if short else [])
+
+
+@pytest.mark.slow
 def test_a_tap_that_stays_short_leaves_as_much(verify):
     report = verify(program(tapped_at=(4.0, -6.0)))
     assert kinds(report).keys() == {"stock_left"}

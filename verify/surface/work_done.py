@@ -44,6 +44,7 @@ MAX_WAYS = 1500  # samples whose shortest way out is looked for; the same for th
 MAX_WAY = 12.0  # mm, longest such way
 LIFT_SHARE = 0.1  # of h: distance at which a tool on an open face touches a sample
 CORNER_SHARE = 0.5  # of h: the same in a corner
+UPRIGHT = float(np.sin(np.radians(3.0)))  # share of the axis in the normal up to which a face counts as a wall
 MAX_AXES = 24
 SAME_AXIS = float(np.radians(0.01))
 NOT_IN_PROGRAM, LEFT = "not_in_program", "pass"  # words of the remainder
@@ -222,7 +223,9 @@ class _MissingDepths:
     """How much deeper a drill or tap must go, at n samples, where that is known.
 
     found  : (n,) bool
-    length : (n,) float64, mm over the allowance; direction : (n, 3) float64, unit, setup frame, of its axis
+    length : (n,) float64, mm over the allowance
+    direction : (n, 3) float64, unit, setup frame: its axis along walls, where the stock ends at one height; the normal
+              elsewhere, as the point of the tool leaves stock of one depth along it
     mover  : (n,) int32, index, the move that is too short
     """
 
@@ -261,7 +264,8 @@ def _missing_depths(few: SurfaceSamples, rows: INT, mover: I32, axes: F64, lift:
     up = np.einsum("ij,ij->i", normals, axis)
     slope = np.array([t.cone_height / t.corner_width if t.cone_height > 0.0 else 0.0 for t in cutting.tools])[tool]
     length = length + lift * (up + slope * np.sqrt(np.clip(1.0 - up * up, 0.0, 1.0)))
-    return _MissingDepths(np.isfinite(length) & (end >= 0) & alone[tool] & own, length, axis, end)
+    way = np.where((np.abs(up) > UPRIGHT)[:, None], normals, axis)
+    return _MissingDepths(np.isfinite(length) & (end >= 0) & alone[tool] & own, length, way, end)
 
 
 def _reached(asked: Asked, few: SurfaceSamples, tools: Sequence[ToolBody], axes: F64,
