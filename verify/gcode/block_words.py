@@ -82,11 +82,12 @@ class BlockError(ValueError):
     """A block that cannot be read, or could be read in two ways; the reader adds the line.
 
     remedy : remedy of the error, or None where the message suffices
+    line   : line of the word that cannot be read, from 1, where it is another one than that of the block; or None
     """
 
-    def __init__(self, message: str, remedy: str | None = None) -> None:
+    def __init__(self, message: str, remedy: str | None = None, line: int | None = None) -> None:
         super().__init__(message)
-        self.remedy = remedy
+        self.remedy, self.line = remedy, line
 
 
 @dataclass

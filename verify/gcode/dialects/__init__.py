@@ -52,7 +52,7 @@ def translated_blocks(lines: Sequence[str], control: DialectReader, machine: Mac
             try:
                 blocks = control.blocks(raw)
             except BlockError as problem:
-                log.error(str(problem), number, remedy=problem.remedy)
+                log.error(str(problem), problem.line or number, remedy=problem.remedy)
                 if len(log.errors) >= MAX_ERRORS:
                     return
                 continue

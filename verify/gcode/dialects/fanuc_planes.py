@@ -15,6 +15,9 @@ from verify.gcode.frames import Frame
 CHOICE = ("G53.1 and tool vectors leave the control two settings of the rotary axes: the proof takes the one that "
           "turns less, and even turns between two vectors")
 
+UPRIGHT = 1.0 - 1e-12
+"""Share of Z in a unit tool axis from which on it is upright."""
+
 
 class FanucPlanes(DialectReader):
     """The plane and the vectors in force.
@@ -52,14 +55,17 @@ class FanucPlanes(DialectReader):
         Raises
         ------
         BlockError
-            No plane is in force, or the machine has no rotary axes.
+            No plane is in force, or the machine has no rotary axes and the plane is tilted.
         """
         if self.frame is None:
             raise BlockError("G53.1 without G68.2")
+        axis = self.frame.matrix[:, 2]
+        if self.machine.machine is None and axis[2] > UPRIGHT:  # nothing turns
+            return []
         machine = needed(self.machine.machine, "G53.1")
         s = self.machine.s
         sign = {1.0: 1, 2.0: -1}.get(float(values.get("P", "0")), 0)
-        angles = angles_of(machine, self.frame.matrix[:, 2].tolist(), s.turn, sign, machine.limits)
+        angles = angles_of(machine, axis.tolist(), s.turn, sign, machine.limits)
         self.notes.append(CHOICE)
         self.tilted = True
         words = " ".join(f"{c}{a:.9f}" for c, a in zip(machine.letters, angles, strict=True))

@@ -53,6 +53,13 @@ def test_orders_of_turns_scales_and_mirrors_that_controls_read_differently_are_r
         read(f"G1 X1. Y1. F100.\n{words}G1 X1. Y2.\n")
 
 
+def test_a_level_plane_needs_no_rotary_axes():
+    level = "G68.2 X10. Y5. Z1. I0. J0. K90.\nG53.1\nG1 X3. Y0. Z2. F100.\nG69\nX0.\n"
+    np.testing.assert_allclose(ends(level), [[10, 8, 3], [0, 8, 3]], atol=1e-9)
+    with pytest.raises(ProgramError, match="G53.1 turns the tool axis, and the machine has no rotary axes"):
+        read(level.replace("J0.", "J5."))
+
+
 def test_mirrors_of_haas():
     np.testing.assert_allclose(ends("G101 X0.\nG1 X3. Y4. F100.\nG100 X0.\nX3.\n", "haas"), [[-3, 4, 10], [3, 4, 10]])
 

@@ -51,6 +51,7 @@ _CHANGES = re.compile(r"[XYZABCGTFS]|M0*(?:2|3|4|5|6|19|30)(?![0-9.])")
 """Words that move the tool, or that a later move depends on."""
 SMALL = 0.01
 """deg, deviation of a rotary axis that needs no note."""
+_RESET = re.compile(r"TRANS (MIRROR|ROTATION|SCALE) RESET")
 _DEF = re.compile(rf"TOOL DEF\s+(\"[^\"]*\"|{NUMBER}|QS?[0-9]+)((?:\s+[LR]\s*{VALUE})*)")
 _SIZE = re.compile(rf"([LR])\s*({VALUE})")
 _IDLE = ("BLK FORM", "* -", "*", "FUNCTION PROG PATH", "FUNCTION MODE MILL", "FUNCTION FEED DWELL",
@@ -172,6 +173,8 @@ class HeidenhainReader(HeidenhainPaths):
             return [self.zero(int(m[1]), f"preset {m[1]}")]
         if text.startswith("TRANS DATUM"):
             return self._datum(text)
+        if (m := _RESET.fullmatch(text)) and not self.is_set(m[1]):
+            return []
         if re.fullmatch(r"(?:STOP)?\s*(?:M.*)?", text):
             out = self.machine_words(text)
             called, self.calls = self.calls and not self.modal_call, False

@@ -41,7 +41,10 @@ class HeidenhainEdges(HeidenhainWords):
             held, corner, self.held, self.corner = self.held, self.corner, None, None
             if corner is None:
                 raise BlockError("a move that a corner follows, and the corner is missing")
-            held, between, move = self._joined(held, corner, move)
+            try:
+                held, between, move = self._joined(held, corner, move)
+            except BlockError as problem:
+                raise BlockError(str(problem), problem.remedy, corner[3]) from None
             out += self._written(held)
             for piece in between:
                 out += self._written(piece)

@@ -97,6 +97,10 @@ class HeidenhainFrames(OrientedMoves):
             self.shift, self.spun, self.factor, self.mirrored = [0.0] * 3, 0.0, 1.0, ""
             self._reframe()
 
+    def is_set(self, kind: str) -> bool:
+        """Whether a MIRROR, ROTATION or SCALE is in force."""
+        return {"MIRROR": bool(self.mirrored), "ROTATION": self.spun != 0.0, "SCALE": self.factor != 1.0}[kind]
+
     def shift_datum(self, places: dict[str, tuple[float, bool]]) -> None:
         """Cycle 7 or TRANS DATUM: shifts of X, Y, Z, mm, and whether each adds to the one in force.
 
@@ -276,7 +280,7 @@ class HeidenhainFrames(OrientedMoves):
                 needed(None, "PLANE")
             self.plane = matrix if np.abs(matrix - np.eye(3)).max() > 1e-12 else None
             self._reframe()
-            return []
+            return self._lifted(options) if way != "STAY" else []
         now = self.machine.s.turn
         angles = angles_of(machine, axis.tolist(), now, {"+": 1, "-": -1}.get(options.get("seq", ""), 0),
                            machine.limits)
@@ -360,8 +364,10 @@ class HeidenhainFrames(OrientedMoves):
         kept = self.swung
         self.plane, self.wanted, self.swung = None, None, False
         self._reframe()
-        if way == "STAY" or machine is None:
+        if way == "STAY":
             return ["M429"] if kept else []
+        if machine is None:
+            return self._lifted(options)
         if self.tcp:
             raise BlockError(f"PLANE RESET {way} while M128 is on", "program M129 before it, or STAY")
         out = self._lifted(options)

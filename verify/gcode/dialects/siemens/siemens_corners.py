@@ -124,7 +124,10 @@ class SiemensCorners(SiemensPaths):
             if any(w.startswith(("G40", "G41", "G42")) for w in move.head):
                 raise BlockError("a corner (RND, CHF, CHR) where cutter radius compensation begins or ends")
             held, self.held = self.held, None
-            between, move = self._between(held, move)
+            try:
+                between, move = self._between(held, move)
+            except BlockError as problem:
+                raise BlockError(str(problem), problem.remedy, held.number) from None
             out += between
         t = leg.tangent(True)
         way = [0.0] * 3

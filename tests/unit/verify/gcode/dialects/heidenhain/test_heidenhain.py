@@ -32,6 +32,35 @@ def test_turns_over_a_full_circle():
     assert way[-1] == pytest.approx(-5 * math.tau) and np.allclose(p.end[p.line == 8, 2], 5 * way / math.tau / 5)
 
 
+@pytest.mark.parametrize(("moves", "line"), [
+    ("L X+20\nRND R3\nL X+20\nL Y+20", 2), ("L X+20\nL X+20\nCHF 3\nL Y+20", 3), ("L X+20\nRND R50\nL Y+20", 2)])
+def test_a_corner_that_does_not_go_is_told_with_its_own_line(moves, line):
+    with pytest.raises(ProgramError, match=f"line {len(HEIDENHAIN) + line}: a "):
+        read(moves, "heidenhain")
+
+
+@pytest.mark.parametrize("plane", ["PLANE SPATIAL SPA+0 SPB+0 SPC+0", "PLANE SPATIAL SPA+0 SPB+0 SPC+90",
+                                   "PLANE RESET"])
+def test_a_level_plane_retracts_on_a_machine_without_rotary_axes(plane):
+    p = read(f"L Z-1 F100\n{plane} TURN MB20 FMAX\nL X+5 Y+0", "heidenhain")
+    np.testing.assert_allclose(p.end[-3:, 2], [-1, 19, 19], atol=1e-9)
+    far = read(f"L Z-1 F100\n{plane} MOVE MB MAX FMAX\nL X+5 Y+0 FMAX\nL Z+2", "heidenhain")
+    assert [r.message for r in far.remarks] == [] and len(far) == len(p)
+    assert read(f"L Z-1 F100\n{plane} STAY\nL X+5 Y+0", "heidenhain").end[-1, 2] == -1.0
+
+
+@pytest.mark.parametrize("kind", ["MIRROR", "ROTATION", "SCALE"])
+def test_a_reset_of_what_is_not_set_moves_nothing(kind):
+    assert apart(read(f"TRANS {kind} RESET\nL X+5", "heidenhain"), read("L X+5", "heidenhain")) == 0.0
+    for text in ("CYCL DEF 8.1 X", "CYCL DEF 10.1 ROT+30", "CYCL DEF 11.1 SCL 2"):
+        both = f"{text}\nTRANS {kind} RESET\nL X+5 Y+0"
+        if {"8": "MIRROR", "10": "ROTATION", "11": "SCALE"}[text.split()[2].split(".")[0]] != kind:
+            read(both, "heidenhain")
+            continue
+        with pytest.raises(ProgramError, match=f"TRANS {kind} RESET"):
+            read(both, "heidenhain")
+
+
 def test_a_rounding_between_a_line_and_an_arc_touches_both():
     q = read("L X+30 Y+0\nRND R3\nCC X+30 Y+12\nC X+42 Y+12 DR+\nRND R2\nL X+60", "heidenhain")
     assert q.end[-1].tolist() == [60.0, 12.0, 50.0]

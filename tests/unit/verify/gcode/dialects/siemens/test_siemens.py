@@ -92,6 +92,13 @@ REFUSED = [
 ]
 
 
+@pytest.mark.parametrize("corner", ["X20 RND=3\nX20\nY20", "X20\nX20 CHF=3\nY20", "X20\nX21 RND=9\nY20"])
+def test_a_corner_that_does_not_go_is_told_with_its_own_line(corner):
+    line = 3 + next(k for k, text in enumerate(corner.split("\n")) if "=" in text)
+    with pytest.raises(ProgramError, match=f"line {line}: a "):
+        read_program(f"G710 G17 G90 G54\nG0 X0 Y0 Z9\nG1 F99 {corner}\nM30\n", dialect="siemens", radii=RADII)
+
+
 @pytest.mark.parametrize(("line", "said"), REFUSED)
 def test_what_is_not_followed_is_named_with_its_line(line, said):
     with pytest.raises(ProgramError, match=re.escape(said)) as refused:
