@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from verify.gcode.dialects.base import NUMBER, BlockError, Machine
 from verify.gcode.dialects.heidenhain.heidenhain_cycles import (
@@ -296,7 +297,10 @@ class HeidenhainReader(HeidenhainPaths):
         call = defined(text, self.q.value)
         if call is None:
             raise BlockError(f"cannot read '{text[:60]}'")
-        self.q.held.update({k: v for k, v in call.values.items() if math.isfinite(v)})
+        for name, number in call.values.items():
+            self.q.held.pop(name, None)
+            if math.isfinite(number):
+                self.q.held[name] = number
         n = call.number
         if n == 247:
             row = call.values.get("Q339")
@@ -452,7 +456,8 @@ class HeidenhainReader(HeidenhainPaths):
         """
         self.uncompensated("a drilling cycle")
         here = self.here() if place is None else place
-        call = self.cycle
+        call = None if self.cycle is None else replace(self.cycle, values={
+            k: self.q.held.get(k, v) for k, v in self.cycle.values.items()})  # the program may have changed them since
         if call is None:
             number = max((n for n in self.dotted if n in OLD and self.dotted[n]), default=0)
             if not number:

@@ -49,6 +49,18 @@ def test_a_level_plane_retracts_on_a_machine_without_rotary_axes(plane):
     assert read(f"L Z-1 F100\n{plane} STAY\nL X+5 Y+0", "heidenhain").end[-1, 2] == -1.0
 
 
+def test_a_cycle_takes_the_values_that_its_parameters_have_when_it_is_called():
+    """As in the manual's group of holes with several tools: FN 0 gives the depth and the peck of the next tool."""
+    cycle = "CYCL DEF 200 DRILLING Q200=2 Q201={} Q206={} Q202={} Q210=0 Q203={} Q204=10 Q211=0\n"
+    holes = "L X+10 Y+10 R0 FMAX M99\nL X+20 Y+10 FMAX M99\n"
+    given = cycle.format(-3, "AUTO", 3, "+0") + holes + (
+        "TOOL CALL 2 Z S1000 F250\nM3\nFN 0: Q201 = -25\nQ202 = 5\n" + holes + "FN 0: Q203 = -4\nQ206 = 80\n" + holes)
+    plain = cycle.format(-3, "AUTO", 3, "+0") + holes + "TOOL CALL 2 Z S1000 F250\nM3\n" + cycle.format(
+        -25, "AUTO", 5, "+0") + holes + cycle.format(-25, 80, 5, -4) + holes
+    first, second = read(given, "heidenhain"), read(plain, "heidenhain")
+    assert apart(first, second) < 1e-9 and same_feeds(first, second)
+
+
 @pytest.mark.parametrize("kind", ["MIRROR", "ROTATION", "SCALE"])
 def test_a_reset_of_what_is_not_set_moves_nothing(kind):
     assert apart(read(f"TRANS {kind} RESET\nL X+5", "heidenhain"), read("L X+5", "heidenhain")) == 0.0
