@@ -100,9 +100,23 @@ def dialect_of(text: str, ending: str = "", wanted: Collection[str] = ()) -> str
 
 
 def likeliest(may: Sequence[str], wanted: Collection[str]) -> str:
-    """The dialect to read a text in that ``candidates`` leaves these for; ``wanted`` as for ``dialect_of``."""
+    """The dialect to read a text in that ``candidates`` leaves these for; ``wanted`` as for ``dialect_of``.
+
+    >>> likeliest(candidates("G21 G90", "nc"), ["siemens"]), likeliest(candidates("G21 G90", "ngc"), ["siemens"])
+    ('siemens', 'linuxcnc')
+    """
+    left = _left(may, wanted)
+    return left[0] if len(left) == 1 or not set(left).isdisjoint(wanted) else LINUXCNC
+
+
+def _left(may: Sequence[str], wanted: Collection[str]) -> list[str]:
+    """The dialects that nothing decides against, the likeliest first.
+
+    A machine without any of ``may`` runs what it is for, unless the name of the file says otherwise.
+    """
     named = [d for d in wanted if d in may]
-    return named[0] if named else may[0] if len(may) == 1 else LINUXCNC
+    own = [d for d in wanted if d in ("siemens", "heidenhain")] if len(may) > 1 and LINUXCNC not in wanted else []
+    return named or own or list(may)
 
 
 def others(may: Sequence[str], wanted: Collection[str]) -> tuple[str, ...]:
@@ -112,9 +126,12 @@ def others(may: Sequence[str], wanted: Collection[str]) -> tuple[str, ...]:
     ((), ())
     >>> others(candidates("G21 G90", "nc"), []), others(candidates("G21 G90", "nc"), ["fanuc", "haas"])
     (('fanuc', 'haas'), ('haas',))
+    >>> others(candidates("G21 G90", "nc"), ["siemens"]), others(candidates("G21 G90", ""), ["siemens"])
+    (('fanuc', 'haas'), ())
     """
-    left = [d for d in wanted if d in may] or may
-    return () if len(left) == 1 else tuple(d for d in left if d != likeliest(may, wanted))
+    taken = likeliest(may, wanted)
+    named = may if taken not in may and LINUXCNC not in may else []  # by the name of the file
+    return tuple(d for d in dict.fromkeys([*_left(may, wanted), *named]) if d != taken)
 
 
 def candidates(text: str, ending: str) -> list[str]:

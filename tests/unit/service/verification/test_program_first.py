@@ -94,10 +94,14 @@ def test_the_header_of_every_control_is_understood(dialect, sense):
 @pytest.mark.parametrize(("ending", "dialects", "taken", "others"), [
     (".ngc", None, "linuxcnc", None), (".nc", None, "linuxcnc", "fanuc or haas"), (".nc", ["haas"], "haas", None),
     (".nc", ["fanuc", "haas"], "fanuc", "haas"), (".tap", None, "linuxcnc", "fanuc or haas"),
-    ("", ["fanuc"], "fanuc", None), (".nc", ["siemens"], "linuxcnc", "fanuc or haas")])
+    ("", ["fanuc"], "fanuc", None),
+    (".nc", ["siemens"], "siemens", "fanuc or haas"), ("", ["siemens"], "siemens", None),
+    (".txt", ["heidenhain", "siemens"], "heidenhain", "siemens"), (".ngc", ["siemens"], "linuxcnc", None)])
 def test_a_dialect_is_not_guessed_in_silence(ending, dialects, taken, others):
     machine = {} if dialects is None else {"dialects": dialects}
-    read = read_first(setup(**machine), PLAIN, ending=ending)
+    text = {"siemens": "G17 G90 G54 G71\nT1 D1 M6\nG0 X1 Y1 Z9\nM30\n",
+            "heidenhain": "TOOL CALL 1 Z S900\nL X+1 Y+1 Z+9 R0 FMAX M30\n"}.get(taken, PLAIN)
+    read = read_first(setup(**machine), text, ending=ending)
     assert read.nc.dialect == taken
     told = [a for a in read.assumed if a.what == AssumedKind.DIALECT]
     assert [(a.value, f"for {others}," in a.effect) for a in told] == ([] if others is None else [(taken, True)])

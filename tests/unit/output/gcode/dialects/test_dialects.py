@@ -362,6 +362,11 @@ def test_whose_program_a_text_is():
     assert dialect_of("G21\nM30\n", "NC", ["linuxcnc", "haas"]) == "haas"
     assert dialect_of("G21\nM30\n", "", ["siemens", "fanuc"]) == "fanuc"
     assert dialect_of("G21\nM30\n", "tap") == "linuxcnc"
+    for ending in ("", "nc", "txt"):  # the machine runs nothing else
+        assert dialect_of("G17 G90 G54\nT1 D1\nM30\n", ending, ["siemens"]) == "siemens"
+        assert dialect_of("L X+5 F100\n", ending, ["heidenhain"]) == "heidenhain"
+    assert dialect_of("G21\nM30\n", "nc", ["linuxcnc", "siemens"]) == "linuxcnc"
+    assert dialect_of("G21\nM30\n", "ngc", ["siemens"]) == "linuxcnc"
     with pytest.raises(VerificationError) as unknown:
         read_program("M30\n", dialect="fagor")
     assert unknown.value.code == "unknown_dialect"
