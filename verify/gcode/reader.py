@@ -231,10 +231,7 @@ class Reader(BlockMotion):
         end = self.log.line
         bare = (lines[k - 1].split("(")[0].split(";")[0].strip() for k in range(end + 1, len(lines) + 1))
         texts = [(k, text) for k, text in enumerate(bare, end + 1) if text and not _CLOSES.match(text)]
-        ran = [bool(seen[k]) for k, _ in texts]
-        rest = [line for n, line in enumerate(texts) if not ran[n]
-                and not (_OPENS.match(line[1]) and any(ran[n + 1:n + 2]))  # the head and the return of a subprogram
-                and not (_RETURNS.search(line[1]) and n and ran[n - 1])]
+        rest = _unread(texts, [bool(seen[k]) or k in self.log.passed for k, _ in texts])
         if not rest:
             return 0
         first = rest[0][0]
@@ -348,6 +345,31 @@ class Reader(BlockMotion):
         idle = [f"{letter}{number:g}" for letter, number in block.values.items() if letter not in used]
         if idle:
             self.log.remark("unused", f"no code of this block uses {', '.join(idle)}", self.log.line)
+
+
+def _unread(texts: Sequence[tuple[int, str]], ran: Sequence[bool]) -> list[tuple[int, str]]:
+    """The lines of which neither they nor another one of their subprogram ran.
+
+    texts : lines behind the end of a program, with their numbers; ran : of each whether it ran
+
+    A subprogram goes from its head to its return: lines that a condition left out belong to it.
+    """
+    rest: list[tuple[int, str]] = []
+    begin = 0
+    while begin < len(texts):
+        end = begin
+        while end < len(texts) and _OPENS.match(texts[end][1]):
+            end += 1
+        opened = end > begin
+        while end < len(texts) and not _OPENS.match(texts[end][1]) and not (
+                end > begin and _RETURNS.search(texts[end - 1][1])):
+            end += 1
+        part = range(begin, end)
+        if not (opened and any(ran[begin:end])):
+            rest += [texts[n] for n in part if not ran[n]
+                     and not (_RETURNS.search(texts[n][1]) and n > begin and ran[n - 1])]
+        begin = end
+    return rest
 
 
 def _reported(blocks: Iterable[tuple[int, str]], lines: int, report: Report) -> Iterator[tuple[int, str]]:

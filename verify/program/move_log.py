@@ -26,6 +26,7 @@ class Log:
 
     name : of the program
     line : 1-based number of the current line
+    passed : numbers of lines that ran without a block of their own: jumps, calls, values
     cools   : whether a word says that the coolant is on or off
     path_stated : number of moves before the first word of a path mode (G61, G64), None without one
     repeats : line of the M99 or GOTOS that begins the program again, 0 for none
@@ -42,6 +43,7 @@ class Log:
     def __init__(self, name: str) -> None:
         self.name = name
         self.line = 0
+        self.passed: set[int] = set()
         self.rows: list[Row] = []
         self.errors: list[tuple[int, str]] = []
         self.notes: list[str] = []
@@ -75,6 +77,11 @@ class Log:
         self._states: list[tuple[int, float, bool]] = [(0, 0.0, False)]
         self.zeros: list[tuple[int, int]] = [(0, 0)]
         self._coordinates: dict[tuple[float, ...], int] = {(): 0}
+
+    def pass_line(self, line: int) -> None:
+        """Go to a line that runs, though it may have no block of its own."""
+        self.line = line
+        self.passed.add(line)
 
     def tap(self, left: bool, *, out: bool = True) -> None:
         """The line of the next move taps; left: a left-hand thread; out: the spindle turns back on the way out."""

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.pocket_case import TOOL
+from verify.gcode.reader import read_program
 from verify.model import NcProgram
 from verify.program_reading import read_on, read_one
 
@@ -56,3 +57,23 @@ def test_chords_of_arcs_are_finer_than_the_gouge_tolerance(tolerance, off):
     middle = 0.5 * (read.start[arc, :2] + read.end[arc, :2])
     most = float((20.0 - np.linalg.norm(middle, axis=1)).max())
     assert 0.8 * off < most <= off * (1.0 + 1e-6)
+
+
+SUBPROGRAMS = {
+    "siemens": "G17 G90 G54 G71\nT1 D1 M6\nS900 M3 F99\nG0 X0 Y0 Z9\nUP1(3)\nG0 Z50\nM30\n%_N_UP1_SPF\n"
+               "PROC UP1(REAL A)\nDEF REAL B\nB=A*2\nG1 Y=B\nIF B>100\nG1 X9\nENDIF\nM17\n",
+    "heidenhain": "BEGIN PGM A MM\nTOOL CALL 1 Z S900 F99\nL Z+9 FMAX M3\nCALL LBL 1\nL X+5 Y+0 FMAX M99\n"
+                  "L Z+50 FMAX M30\nLBL 1\nCYCL DEF 200 DRILLING ~\nQ200=2 Q201=-2 ~\n"
+                  "Q206=150 Q202=5 Q210=0 ~\nQ203=+0 Q204=20\n"
+                  "FN 9: IF +1 EQU +1 GOTO LBL 9\nL X+9 Y+9\nLBL 9\nQ1 = 3\nLBL 0\nEND PGM A MM\n",
+    "fanuc": "%\nO1\nG21 G90 G17 G94 G54\nT1 M6\nS900 M3\nG0 G43 H1 Z9.\nX0. Y0.\nG65 P10 A5.\nG0 Z50.\nM30\n"
+             "O10\nG90\n#3=#1\nIF [#3 GT 3.] GOTO 5\nG1 X3. F99.\nN5\nG1 Y#3 F99.\nM99\n%\n",
+    "linuxcnc": "G21 G90 G17 G94 G54 G61\nT1 M6\nS900 M3\nG43 H1\nG0 X0 Y0 Z9\nF99\no1 call\nG0 Z50\nM2\n"
+                "o1 sub\n#1=3\no2 if [#1 gt 5]\nG1 X1\no2 endif\nG1 Y#1\no1 endsub\n"}
+
+
+@pytest.mark.parametrize("dialect", SUBPROGRAMS)
+def test_a_called_subprogram_behind_the_end_is_read_whole(dialect):
+    """Its values, its jumps, and what a condition leaves out are no lines behind the end of the program."""
+    read = read_program(SUBPROGRAMS[dialect], dialect=dialect)
+    assert not read.cut_off and not [n for n in read.notes if "ends the program" in n]

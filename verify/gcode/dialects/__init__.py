@@ -62,6 +62,8 @@ def translated_blocks(lines: Sequence[str], control: DialectReader, machine: Mac
             if control.notes or control.remarks or control.functions:
                 _report(control, number, log)
             log.unbounded = control.unbounded
+            if not blocks:
+                log.passed.add(number)
             elements = machine.elements
             for block in blocks:
                 yield block if isinstance(block, tuple) else (number, block)

@@ -108,7 +108,7 @@ class Flow:
                 self._endless(at + 1)
             if plain[at] and self._programs and _CALL.search(self.lines[at]) and (
                     call := _CALL.search(_COMMENT.sub(" ", self.lines[at]))):
-                self.machine.log.line = at + 1
+                self.machine.log.pass_line(at + 1)
                 try:
                     goal = self._fanuc_call(at, call[1])
                 except BlockError as problem:
@@ -122,7 +122,7 @@ class Flow:
                 at += 1
                 yield at, self.lines[at - 1]
                 continue
-            self.machine.log.line = at + 1
+            self.machine.log.pass_line(at + 1)
             try:
                 if at in steps:
                     at = self._runs[steps[at].word.keyword](steps[at])
@@ -188,7 +188,7 @@ class Flow:
         """Line of the first branch whose condition holds."""
         while step.word.keyword in ("if", "elseif") and not self._holds(step):
             step = self.structure.steps[step.other]
-            self.machine.log.line = step.at + 1
+            self.machine.log.pass_line(step.at + 1)
         return step.at + 1
 
     def _while(self, step: OWordStep) -> int:

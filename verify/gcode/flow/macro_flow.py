@@ -164,7 +164,7 @@ class MacroFlow:
                 yield at + 1, raw
                 at += 1
                 continue
-            self.machine.log.line = at + 1
+            self.machine.log.pass_line(at + 1)
             step = self._step(at)
             if step is None:
                 yield at + 1, raw

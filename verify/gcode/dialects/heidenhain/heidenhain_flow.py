@@ -74,11 +74,12 @@ class HeidenhainFlow:
             at += 1
             if raw.rstrip().endswith("~"):
                 raw, at = self._joined(at - 1)
+                self.machine.log.passed.update(range(number, at + 1))
             self.ahead = self._following(at)
             if not _MAYBE.search(raw):
                 yield number, raw
                 continue
-            self.machine.log.line = number
+            self.machine.log.pass_line(number)
             text = block_text(raw)
             if text.startswith("END PGM"):
                 yield number, raw

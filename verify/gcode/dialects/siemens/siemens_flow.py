@@ -134,7 +134,7 @@ class SiemensFlow:
                 at = self._repeated(moved, at)
                 continue
             text = statement(raw)
-            self.machine.log.line = at + 1
+            self.machine.log.pass_line(at + 1)
             head, body = _body(text)
             if body and (m := _KEYWORD.match(body)):
                 word = m[1] or m[2]
