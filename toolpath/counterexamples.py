@@ -13,7 +13,7 @@ its profile. Where an estimate is wrong the proof reports the place. The next pl
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,20 @@ MIN_BARRED = 0.2  # mm
 CROWDED = 0.75  # radii: a line this near a place in ``packed`` is skimmed first
 CLOSER = 0.7  # factor on the thickness of a wall, each time it was found without support
 STRICTER = 0.5  # factor on the aimed residual where more stayed than the plan had measured
+ROW = 2**32  # cells of a row
+
+
+@dataclass(frozen=True)
+class HighWall:
+    """A thin wall that needs support while it is finished.
+
+    top, bottom : mm, heights between which it stands, access frame
+    thickness   : mm
+    """
+
+    top: float
+    bottom: float
+    thickness: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +74,7 @@ class Counterexamples:
         """
         if tool.id not in self.dug:
             return 1.0
-        way = dense(points, 0.25 * tool.radius) if len(points) > 1 else points
-        return CARE if _near(self.dug[tool.id], way, CAREFUL * tool.radius, plan=True).any() else 1.0
+        return CARE if _near(self.dug[tool.id], _way(tool, points), CAREFUL * tool.radius, plan=True).any() else 1.0
 
     def bars(self, tool: ToolBody, points: F64) -> NDArray[np.bool_]:
         """Whether tips lie where the tool must not go, (n,) bool.
@@ -91,8 +104,135 @@ class Counterexamples:
         out[self.lost.get(zone, [])] = -np.inf
         return out
 
+    def since(self, before: Counterexamples) -> NewExamples:
+        """What these have and earlier ones of the same job had not; all of both where these do not begin with those."""
+        tools = {*self.dug, *self.barred, *self.packed, *before.dug, *before.barred, *before.packed}
+        tips = {t: np.vstack([_added(now.get(t), old.get(t)) for now, old in (
+            (self.dug, before.dug), (self.barred, before.barred), (self.packed, before.packed))]) for t in tools}
+        zones = {z for now, old in ((self.left, before.left), (self.lost, before.lost)) for z, rows in now.items()
+                 if not np.array_equal(rows, old.get(z, []))}
+        return NewExamples({t: places for t, places in tips.items() if len(places)}, frozenset(zones),
+                           self.unheld != before.unheld)
+
 
 NONE = Counterexamples()
+
+
+@dataclass(frozen=True, eq=False)
+class NewExamples:
+    """Counterexamples that the last proof of a job added.
+
+    tips   : (n, 3) float64, mm, tip places by tool id, in the frame of the plan
+    zones  : ids of zones with samples where more material stayed than allowed
+    unheld : whether a wall was finished without support
+    """
+
+    tips: Mapping[str, F64]
+    zones: frozenset[str]
+    unheld: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """Places and zones that counterexamples were asked about.
+
+    sizes : mm, side of the cells in plan by tool id, no less than a counterexample reaches
+    cells : (n,) int64, ascending, cells with such places, by tool id
+    zones : ids
+    """
+
+    sizes: Mapping[str, float]
+    cells: Mapping[str, NDArray[np.int64]]
+    zones: frozenset[str]
+
+    def meets(self, new: NewExamples) -> bool:
+        """Whether new counterexamples may have changed an answer."""
+        return bool(self.zones & new.zones) or any(
+            self._meets(t, tips) for t, tips in new.tips.items() if t in self.cells)
+
+    def _meets(self, tool: str, tips: F64) -> bool:
+        row, column = np.moveaxis(_cells(tips, self.sizes[tool]), -1, 0)
+        around = [_key(row + a, column + b) for a in (-1, 0, 1) for b in (-1, 0, 1)]
+        return bool(np.isin(np.concatenate(around), self.cells[tool]).any())
+
+
+class _Questions:
+    """Questions since the last ``taken``; several threads may ask at once."""
+
+    def __init__(self) -> None:
+        self._asked: list[tuple[ToolBody, F64]] = []
+        self._zones: list[str] = []
+
+    def about(self, tool: ToolBody, points: F64) -> None:
+        """Note places (n, 3) float64, mm, of the tip of a tool."""
+        self._asked.append((tool, points[:, :2]))
+
+    def about_zone(self, zone: str) -> None:
+        """Note a zone by its id."""
+        self._zones.append(zone)
+
+    def taken(self) -> Asked:
+        """All questions since the last call."""
+        asked, zones = self._asked, self._zones
+        self._asked, self._zones = [], []
+        tools = {t.id: t for t, _ in asked}
+        sizes = {name: max(t.radius, MIN_BARRED) for name, t in tools.items()}
+        cells = {name: np.unique(_key(*_cells(np.vstack([p for t, p in asked if t.id == name]), size).T))
+                 for name, size in sizes.items()}
+        return Asked(sizes, cells, frozenset(zones))
+
+
+@dataclass(frozen=True, eq=False)
+class WatchedExamples(Counterexamples):
+    """Counterexamples that note what they are asked."""
+
+    questions: _Questions = field(default_factory=_Questions)
+
+    @classmethod
+    def of(cls, found: Counterexamples) -> WatchedExamples:
+        """The same counterexamples, watched."""
+        return cls(**{f.name: getattr(found, f.name) for f in fields(Counterexamples)})
+
+    def care(self, tool: ToolBody, points: F64) -> float:
+        """As ``Counterexamples.care``; points : (n, 3) float64, mm, tips in the frame of the plan."""
+        self.questions.about(tool, _way(tool, points))
+        return super().care(tool, points)
+
+    def bars(self, tool: ToolBody, points: F64) -> NDArray[np.bool_]:
+        """As ``Counterexamples.bars``, (n,) bool; points : (n, 3) float64, mm, tips in the frame of the plan."""
+        self.questions.about(tool, points)
+        return super().bars(tool, points)
+
+    def crowds(self, tool: ToolBody, points: F64) -> NDArray[np.bool_]:
+        """As ``Counterexamples.crowds``, (n,) bool; points : (n, 3) float64, mm, tips in the frame of the plan."""
+        self.questions.about(tool, points)
+        return super().crowds(tool, points)
+
+    def aims(self, zone: str, aim: float, count: int) -> F64:
+        """As ``Counterexamples.aims``, (count,) float64, mm; aim : mm."""
+        self.questions.about_zone(zone)
+        return super().aims(zone, aim, count)
+
+
+def _added(now: F64 | None, old: F64 | None) -> F64:
+    """Places that follow on old ones, (n, 3) float64; all of both where the first are others."""
+    now, old = (np.zeros((0, 3)) if a is None else a for a in (now, old))
+    return now[len(old):] if np.array_equal(now[:len(old)], old) else np.vstack([now, old])
+
+
+def _way(tool: ToolBody, points: F64) -> F64:
+    """Places along a line at which care is asked for."""
+    return dense(points, 0.25 * tool.radius) if len(points) > 1 else points
+
+
+def _cells(points: F64, size: float) -> NDArray[np.int64]:
+    """Row and column of the cells of places in plan, (n, 2) int64."""
+    return np.floor(points[:, :2] / size).astype(np.int64)
+
+
+def _key(row: NDArray[np.int64], column: NDArray[np.int64]) -> NDArray[np.int64]:
+    """One number for each cell."""
+    return row * ROW + column
 
 
 def _near(places: F64 | None, points: F64, radius: float, plan: bool = False) -> NDArray[np.bool_]:
@@ -103,17 +243,4 @@ def _near(places: F64 | None, points: F64, radius: float, plan: bool = False) ->
     return out
 
 
-__all__ = ["NONE", "Counterexamples"]
-
-
-@dataclass(frozen=True)
-class HighWall:
-    """A thin wall that needs support while it is finished.
-
-    top, bottom : mm, heights between which it stands, access frame
-    thickness   : mm
-    """
-
-    top: float
-    bottom: float
-    thickness: float
+__all__ = ["NONE", "Asked", "Counterexamples", "HighWall", "NewExamples", "WatchedExamples"]

@@ -8,8 +8,8 @@ lattices, lines of passes and areas of layers.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import TypeVar
+from dataclasses import dataclass, replace
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,29 @@ from toolpath.stock.stock_map import StockSnapshot
 from toolpath.workingsteps import Workingstep
 
 T = TypeVar("T")
+
+
+class Lines(Protocol):
+    """Several lines, each (n, 3) float64, mm, access frame."""
+
+    def lines(self) -> list[F64]:
+        """The lines, each (n, 3) float64, mm, access frame."""
+
+
+@dataclass(frozen=True, eq=False)
+class SharedLines:
+    """Several lines that a state shares with the plan it is of; a plan only adds lines."""
+
+    kept: tuple[F64, ...]
+
+    @classmethod
+    def of(cls, lines: Sequence[F64]) -> SharedLines:
+        """Keeps lines, each (n, 3) float64, mm, access frame, as they are."""
+        return cls(tuple(lines))
+
+    def lines(self) -> list[F64]:
+        """The lines, each (n, 3) float64, mm, access frame."""
+        return list(self.kept)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +112,8 @@ class ToolSnapshot:
     """State of a tool: moves walked and cut, its layers with the ids of their workingsteps, and the zones it has
     begun."""
 
-    walked: PackedLines
-    depths: PackedLines
+    walked: Lines
+    depths: Lines
     layers: LayersSnapshot | None
     layered: tuple[str, ...]
     finishes: tuple[FinishSnapshot, ...]
@@ -104,6 +127,13 @@ class PlanSnapshot:
     steps: tuple[Workingstep, ...]
     stock: StockSnapshot
     tools: tuple[ToolSnapshot, ...]
+
+    def apart(self) -> PlanSnapshot:
+        """The same state in arrays of its own; lines stay shared."""
+        stock = replace(self.stock, top=self.stock.top.copy(), cover=self.stock.cover.copy())
+        tools = [replace(t, finishes=tuple(replace(f, residual=f.residual.copy(), met=f.met.copy())
+                                           for f in t.finishes)) for t in self.tools]
+        return replace(self, stock=stock, tools=tuple(tools))
 
 
 class CheckpointKeeper:
@@ -123,5 +153,5 @@ class CheckpointKeeper:
 
 NOTHING = CheckpointKeeper()
 
-__all__ = ["NOTHING", "CheckpointKeeper", "FinishSnapshot", "LayersSnapshot", "PackedLines", "PlanSnapshot",
-           "StockSnapshot", "ToolSnapshot"]
+__all__ = ["NOTHING", "CheckpointKeeper", "FinishSnapshot", "LayersSnapshot", "Lines", "PackedLines", "PlanSnapshot",
+           "SharedLines", "StockSnapshot", "ToolSnapshot"]

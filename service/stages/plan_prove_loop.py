@@ -33,6 +33,7 @@ from toolpath.passes.pass_family import FinishTarget
 from toolpath.passes.trimmed_faces import Faces
 from toolpath.plan_checkpoint import CheckpointKeeper
 from toolpath.planning.job_plan import Plan
+from toolpath.planning.plan_history import PlanHistory
 from toolpath.planning.zone_layout import ZoneLayout, layouts_of
 from toolpath.stock.stock_map import StockMap
 from verify.checks.program_sequence import read_each
@@ -182,7 +183,7 @@ class _Span:
 
 
 class _Accesses:
-    """Plans single accesses of a job. Keeps the blank along each and the layouts of its zones for the next plan.
+    """Plans single accesses of a job. Keeps the blank along each, layouts of zones and states for the next plan.
 
     checks  : what the passes of each zone are measured at, in the order of the zones
     trimmed : exact faces by zone, in the frame of its access
@@ -194,6 +195,7 @@ class _Accesses:
         self.ready, self.checks, self.trimmed, self.planner, self.blank = ready, checks, trimmed, planner, blank
         self.blanks: dict[str, StockMap] = {}
         self.layouts: dict[str, dict[str, ZoneLayout]] = {}
+        self.histories: dict[str, tuple[tuple[AccessPlan, ...], PlanHistory]] = {}  # with the plans before
 
     def planned(self, view: View, before: Sequence[AccessPlan], feedback: ProofFeedback,
                 report: Callable[[float], None], keeper: CheckpointKeeper) -> AccessPlan:
@@ -221,13 +223,21 @@ class _Accesses:
             self.layouts[view.id] = layouts_of(zones, checks, view.fields, cut_data, settings, self.trimmed)
         plan = self.planner(zones, checks, view.fields, cut_data, stock, settings, lambda share: report(0.98 * share),
                             first_step=step_count + 1, trimmed=self.trimmed, keeper=keeper,
-                            layouts=self.layouts[view.id])
+                            layouts=self.layouts[view.id], history=self._history(view, before))
         stock.settle(last=True)
         used = worn(t for a in before for t in a.plan.steps)
         steps = with_fresh_cutters(plan.steps, ready.inputs.tool_lives, settings.clearance, used)
         if turned:
             steps = [replace(s, access=view.id) for s in steps]
         return AccessPlan(view, Plan(tuple(steps), plan.zones), settings.clearance, stock if turned else None)
+
+    def _history(self, view: View, before: Sequence[AccessPlan]) -> PlanHistory:
+        """States of the last plan of an access; none where other plans stand before it: they leave other stock."""
+        known, history = self.histories.get(view.id, ((), PlanHistory()))
+        if len(known) != len(before) or any(a is not b for a, b in zip(known, before, strict=True)):
+            history = PlanHistory()
+        self.histories[view.id] = tuple(before), history
+        return history
 
 
 __all__ = ["PROVED", "Planner", "Progress", "ProvedPlan", "plan_and_prove"]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from operator import itemgetter
@@ -19,6 +19,7 @@ from scipy.spatial import cKDTree
 
 from geometry.cutting_mechanics import effective_diameter
 from geometry.mesh import F64
+from toolpath.counterexamples import WatchedExamples
 from toolpath.feeds.feed_scheduling import Pace
 from toolpath.five_axis.oriented_motion import THICK
 from toolpath.linking.linker import Linker
@@ -32,13 +33,16 @@ from toolpath.plan_checkpoint import (
     CheckpointKeeper,
     FinishSnapshot,
     LayersSnapshot,
+    Lines,
     PackedLines,
     PlanSnapshot,
+    SharedLines,
     ToolSnapshot,
 )
 from toolpath.plan_settings import CutData, LeftAlone, PlanSettings
 from toolpath.planning.depth_bands import largest_corner
 from toolpath.planning.layouts_ahead import computed_ahead
+from toolpath.planning.plan_history import PlanHistory
 from toolpath.planning.zone_finishing import Finish, ZonePlan, motions_of, step_of, turned
 from toolpath.planning.zone_layout import ZoneLayout, layouts_of
 from toolpath.roughing.engagement_limited_clearing import Clearing
@@ -82,7 +86,7 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields: 
              cut_data: dict[str, CutData], stock: StockMap, settings: PlanSettings,
              progress: Progress | None = None, first_step: int = 1,
              trimmed: Mapping[str, Sequence[Faces]] | None = None, keeper: CheckpointKeeper = NOTHING,
-             layouts: Mapping[str, ZoneLayout] | None = None) -> Plan:
+             layouts: Mapping[str, ZoneLayout] | None = None, history: PlanHistory | None = None) -> Plan:
     """Plan all zones.
 
     zones    : in machining order
@@ -97,6 +101,8 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields: 
                same result as without the interruption
     layouts  : ZoneLayout by zone id, of an earlier plan of the same zones, checks, fields, cut data, tolerances and
                faces; None: laid out here
+    history  : PlanHistory of an earlier plan of the same arguments but ``settings.found``, which only grows; this plan
+               continues from a state of it, with the same result as from the beginning; None: nothing is kept
 
     Returns
     -------
@@ -106,6 +112,9 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields: 
     check_of = {z.id: c for z, c in zip(zones, checks, strict=True)}
     if layouts is None:
         layouts = layouts_of(zones, checks, fields, cut_data, settings, trimmed or {})
+    found = WatchedExamples.of(settings.found)
+    settings = replace(settings, found=found)
+    history = history or PlanHistory(max_bytes=0)
     under = largest_corner(zones)  # below each plane: stouter tools take off what the tips of later ones need away
 
     def begin(snapshot: PlanSnapshot | None = None) -> _Work:
@@ -115,7 +124,8 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields: 
             job.before = jobs[:k]
         return _Work(jobs, stock, settings, snapshot)
 
-    work = keeper.taken(begin) or begin()
+    work = keeper.taken(begin) or history.taken(found, begin) or begin()
+    history.begin(found, work.acts)
     begun, all_zones, done = work.acts, len(zones) * (len(settings.planes) + 1), 0
     with computed_ahead([layouts[z.id] for z in zones] if settings.finishing and not begun else []) as settle:
         for job in work.jobs:
@@ -126,6 +136,7 @@ def plan_job(zones: Sequence[ZoneArea], checks: Sequence[FinishTarget], fields: 
                 work.steps.extend(act(len(work.steps) + first_step))
                 work.acts = k + 1
                 keeper.done(work.snapshot)
+                history.done(found.questions.taken(), work.state)
             done += finished
             if progress is not None:
                 progress(AGAIN_SHARE * done / all_zones)
@@ -159,6 +170,11 @@ class _Work:
         """State of the plan."""
         return PlanSnapshot(self.acts, tuple(self.steps), self.stock.snapshot(),
                             tuple(job.snapshot() for job in self.jobs))
+
+    def state(self) -> PlanSnapshot:
+        """State of the plan in arrays that later acts do not write into."""
+        return PlanSnapshot(self.acts, tuple(self.steps), self.stock.snapshot(),
+                            tuple(job.snapshot(SharedLines.of) for job in self.jobs)).apart()
 
     def to_do(self) -> Iterator[tuple[int, Act]]:
         """All acts in their order, done or not, and how many zones of a band are finished with each."""
@@ -256,9 +272,9 @@ class _ToolJob:
         f = self.finishes.get(zone.id)
         return [] if f is None else f.walk_again(f"S{number:02d}", min_left)
 
-    def snapshot(self) -> ToolSnapshot:
-        """State of the tool."""
-        return ToolSnapshot(PackedLines.of(self.walked.ways), PackedLines.of(self.depths.ways),
+    def snapshot(self, lines: Callable[[Sequence[F64]], Lines] = PackedLines.of) -> ToolSnapshot:
+        """State of the tool; lines : makes one value of several lines."""
+        return ToolSnapshot(lines(self.walked.ways), lines(self.depths.ways),
                        None if self.layers is None else self.layers.snapshot(), tuple(s.id for s in self.layered),
                        tuple(f.snapshot() for f in self.begun))
 
