@@ -122,7 +122,8 @@ def graded_samples(mesh: TriangleMesh, triangles: np.ndarray, spacing: float, pa
     Returns
     -------
     SurfaceSamples
-        A coarse sample is the middle of a cell that lies wholly in the face; ``covers`` is half its diagonal. Fine
+        A coarse sample is the middle of a cell that lies wholly in the face, and is farther from the borders of the
+        face than half a cell and ``margin``; ``covers`` is half the diagonal of the cell. Fine
         samples have equal areas that fill the rest of the face. No place of the face, borders apart, is farther than
         0.71 spacing from a coarse sample or 0.71 spacing / parts from a fine one.
     """

@@ -26,7 +26,9 @@ WIDEST, LEAST = 0.5, 0.2  # mm between coarse samples: never more; where fewer w
 FLOOR_SHARE = 0.25  # of the radius of the flat bottom: the planner's lines over a floor reach that far round a sample
 WALL_SHARE = 0.5  # of the radius of the tool, the same along a wall
 UPRIGHT = 1e-7  # component of a unit normal along the access: less is upright
-MARGIN = 0.25  # coarse cells: this near to a border of the face all samples are close
+# Sides of a coarse cell: this near to a border of the face all samples are close. Half a side is the least: the square
+# that the proof looks at holds the place of the cell, whichever way it is turned, and must not leave the face.
+MARGIN = 0.5
 NEIGHBOURS = 8  # planning samples round a coarse one that must have the same zone
 
 

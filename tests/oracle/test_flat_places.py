@@ -15,6 +15,8 @@ from scipy.spatial import cKDTree
 from geometry.mesh import TriangleMesh
 from geometry.sampling import SurfaceSamples, graded_samples
 from geometry.tool_body import ToolBody
+from service.stages.sample_spacing import MARGIN
+from tests.unit.geometry.test_graded_samples import frame_with_hole
 from verify.model import ProofSetup
 from verify.moves import Moves
 from verify.surface.between_samples import ClosePoints, close_points, judged_places, settled_samples
@@ -159,6 +161,25 @@ def test_samples_that_cover_nothing_have_no_close_points():
     way = moves(((0, 0, 0), (1, 0, 0)))
     assert len(between(samples, np.ones(len(samples)), way, [TOOLS["flat"]]).row) == 0
     assert settled_samples(samples, BOUNDS, way, [TOOLS["flat"]], SETUP, 1.5) is samples
+
+
+@pytest.mark.parametrize("turn", np.linspace(0.0, 1.5, 6))
+def test_a_move_along_the_border_of_a_face_is_no_suspect_however_the_lattice_is_turned(turn):
+    """Squares of coarse samples stay in the face, so what is cut beyond its border is no gouge."""
+    mesh = frame_with_hole()
+    samples = graded_samples(mesh, np.arange(len(mesh.faces)), STEP, 5, MARGIN * STEP)
+    u = np.cross([0.3, -0.5, 0.8], [0.0, 0.0, 1.0])
+    u /= np.linalg.norm(u)
+    v = np.cross([0.0, 0.0, 1.0], u)
+    flat = (samples.points - [1.0, 2.0, 3.0]) @ np.column_stack([u, v])  # the hole is the square from -3 to 3
+    way = np.array([np.cos(turn), np.sin(turn), 0.0]), np.array([-np.sin(turn), np.cos(turn), 0.0])
+    turned = replace(samples, points=np.ascontiguousarray(flat @ np.stack(way)))
+    ring = np.array([[2, 2], [-2, 2], [-2, -2], [2, -2], [2, 2]]) @ np.stack(way) - [0.0, 0.0, 1.0]
+    program = moves(*zip(ring[:-1], ring[1:], strict=True))
+    tool = ToolBody("T1", 1, 2.0, 0.0, 12.0, 2.0, 12.0, 2.0, 30.0)
+    left = np.zeros(len(turned))
+    places = judged_places(turned, left, BOUNDS, program, [tool], SETUP, 1.5)
+    assert len(places.row) > 500 and not places.suspect.any() and not len(places.pits)
 
 
 def lattice(apart=STEP) -> SurfaceSamples:
