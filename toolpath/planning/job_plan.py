@@ -172,9 +172,9 @@ class _Work:
                             tuple(job.snapshot() for job in self.jobs))
 
     def state(self) -> PlanSnapshot:
-        """State of the plan in arrays that later acts do not write into."""
+        """State of the plan, with the arrays that later acts write into."""
         return PlanSnapshot(self.acts, tuple(self.steps), self.stock.snapshot(),
-                            tuple(job.snapshot(SharedLines.of) for job in self.jobs)).apart()
+                            tuple(job.snapshot(SharedLines.of) for job in self.jobs))
 
     def to_do(self) -> Iterator[tuple[int, Act]]:
         """All acts in their order, done or not, and how many zones of a band are finished with each."""

@@ -18,7 +18,8 @@ from toolpath.counterexamples import NONE, Asked, Counterexamples
 from toolpath.plan_checkpoint import PlanSnapshot
 
 T = TypeVar("T")
-MAX_BYTES = 64_000_000  # of the arrays of the states of an access; a state of a plate of 0.3 m takes a quarter
+MAX_BYTES = 64_000_000  # of the arrays of the states of an access
+MAX_SHARE = 0.25  # of these, that one state may take: else so few would be kept that nothing is gained
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,13 +64,18 @@ class PlanHistory:
         """Note an act that was done.
 
         asked    : what it asked
-        snapshot : the state behind it, with arrays that later acts do not write into
+        snapshot : the state behind it; its arrays may be those of the plan
+
+        The state of a large blank takes too many bytes and is not kept: the next plan then begins from the beginning.
         """
         self._asked.append(asked)
         if not self._whole or not self._max_bytes:
             return
         now = snapshot()
-        self._states.append(_State(now, time.monotonic(), _bytes_of(now)))
+        size = _bytes_of(now)
+        if size > MAX_SHARE * self._max_bytes:
+            return
+        self._states.append(_State(now.apart(), time.monotonic(), size))
         while len(self._states) > 1 and sum(s.size for s in self._states) > self._max_bytes:
             at = [self._begun, *(s.reached for s in self._states)]
             del self._states[int(np.argmin(np.array(at)[2:] - np.array(at)[:-2]))]  # the others stay spread out

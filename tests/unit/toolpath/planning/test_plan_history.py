@@ -123,6 +123,10 @@ def test_states_stay_within_their_bytes_and_spread_out(monkeypatch):
     acts = [s.snapshot.acts for s in history._states]
     assert len(acts) == 5 and acts[-1] == 64 and np.diff([0, *acts]).max() <= 32
     assert kept_acts(history) == 64
+    small = PlanHistory(3 * 16_000)  # of which a state may take a quarter
+    small.begin(NONE, 0)
+    small.done(nothing.questions.taken(), lambda: state(1))
+    assert kept_acts(small) is None
 
 
 def test_what_is_not_known_from_the_first_act_on_is_not_gone_on_from():
