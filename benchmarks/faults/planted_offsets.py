@@ -33,6 +33,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import cadquery as cq  # noqa: E402
 import numpy as np  # noqa: E402
+from scipy.spatial import cKDTree  # noqa: E402
 
 from schemas.machine import DIALECT_ENDINGS  # noqa: E402
 from schemas.setup import Setup  # noqa: E402
@@ -234,15 +235,28 @@ def planted(case: Case, sizes: tuple[float, ...]) -> Iterator[tuple[str, np.ndar
         yield "G55", np.zeros(3), case.text.replace("G54", "G55")
 
 
+def good_there(right: ProgramProof, made: ProgramProof) -> np.ndarray:
+    """Whether the right program leaves the samples of ``made`` within tolerance, (n,) bool, by its nearest on the face.
+
+    Large planes have close samples only where a program needs them, so two programs may have different ones.
+    """
+    good, out = np.asarray(right.proof.proved, np.bool_), np.zeros(len(made.samples), np.bool_)
+    for face in np.unique(made.samples.face).tolist():
+        here, there = np.flatnonzero(made.samples.face == face), np.flatnonzero(right.samples.face == face)
+        if len(there):
+            out[here] = good[there[cKDTree(right.samples.points[there]).query(made.samples.points[here])[1]]]
+    return out
+
+
 def shown(right: ProgramProof, made: ProgramProof, out: np.ndarray, by: np.ndarray, drills: bool) -> list[float]:
     """What an offset (3,) mm makes on the faces that are asked: for each, the largest part of it along the normals of
-    its samples that went out of tolerance (n,); faces where it is more than the stock are left out. A drill leaves the
-    whole of an offset up, on walls too."""
+    those samples of ``made`` that went out of tolerance (n,); faces where it is more than the stock are left out. A
+    drill leaves the whole of an offset up, on walls too."""
     asked = {int(f[1:]) for f in right.report["asked"]["faces"]}
     faces = {}
-    for face in np.unique(right.samples.face[out]).tolist():
-        rows = np.flatnonzero(out & (right.samples.face == face))
-        s = right.samples.subset(rows)
+    for face in np.unique(made.samples.face[out]).tolist():
+        rows = np.flatnonzero(out & (made.samples.face == face))
+        s = made.samples.subset(rows)
         gouged, along = made.proof.residual[rows] < 0.0, s.normals @ by
         if drills and by[2] > 0.0:
             if face in asked and (~gouged).sum() > CHANGED:
@@ -260,14 +274,13 @@ def judge(case: Case, right: ProgramProof, where: str, by: np.ndarray, text: str
     """Prove a text with an offset and look for the finding that is nearest to what it makes."""
     begin, size = time.monotonic(), float(np.linalg.norm(by))
     made = case.proof(text)
-    good = np.asarray(right.proof.proved, np.bool_)
-    out = good & ~proved_samples(made.proof.residual, made.conditions)
+    out = good_there(right, made) & ~proved_samples(made.proof.residual, made.conditions)
     wanted = shown(right, made, out, by, case.drills)
     harm = bool((out & (made.proof.residual < 0.0)).sum() > CHANGED)
     depths = [(abs(f.depth), str(f.kind)) for f in made.proof.findings if str(f.kind) in ("gouge", "stock_left")]
     pairs = [(abs(d - w) / max(0.1 * w, 0.005), w, d, kind) for w in wanted for d, kind in depths]
     off, expected, nearest, kind = min(pairs, default=(math.inf, max(wanted, default=None), None, ""))
-    asked = np.isin(right.samples.face, [int(f[1:]) for f in right.report["asked"]["faces"]])
+    asked = np.isin(made.samples.face, [int(f[1:]) for f in right.report["asked"]["faces"]])
     changes = int((out & asked).sum()) > CHANGED or harm or where == "G55"
     return Row(case.name, where, size, changes, expected, made.report["state"], nearest, kind, off <= 1.0,
                round(time.monotonic() - begin, 2))
