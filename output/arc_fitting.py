@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from output.program_grid import GRID, I64, PER_MM
+from output.return_places import return_places
 from output.workplan import Workplan
 from toolpath.workingsteps import ArcSpan, Trajectory, TrajectoryKind, Workingstep
 
@@ -40,6 +41,7 @@ ROUNDED = (TrajectoryKind.CUT, TrajectoryKind.APPROACH, TrajectoryKind.LIFT)
 """Motions that may have arcs: cutting passes, and the lead-in and lead-out moves."""
 BLOCK = 256
 """Largest number of moves that one line or arc replaces."""
+NO_ROWS = np.zeros(0, np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +66,8 @@ def fitted(plan: Workplan, tolerance: float) -> Workplan:
     tolerance : float, mm, >= 0, added to the chordal tolerance of each step; ``Trajectory.loose`` comes on top
 
     Returns the plan. Cutting passes, lead-in and lead-out moves with a fixed tool axis change; links do not. Arcs occur
-    only in steps whose tool axis is Z of the written frame. All trajectories keep their ends.
+    only in steps whose tool axis is Z of the written frame. All trajectories keep their ends, and loose ones the places
+    where the tool comes down again (``output.return_places``).
 
     Notes
     -----
@@ -74,9 +77,11 @@ def fitted(plan: Workplan, tolerance: float) -> Workplan:
               for t, trajectory in enumerate(step.trajectories) if _can_refit(trajectory)]
     if not places or tolerance <= 0.0:
         return plan
+    through = return_places(plan)
     trajectories = [plan.steps[s].trajectories[t] for s, t in places]
+    rows = [through.get(place, (w.points, NO_ROWS)) for place, w in zip(places, trajectories, strict=True)]
     round_ = np.array([_axis_is_z(plan, plan.steps[s]) for s, _ in places])
-    new = dict(zip(places, _refitted_trajectories(trajectories, round_, tolerance), strict=True))
+    new = dict(zip(places, _refitted_trajectories(trajectories, rows, round_, tolerance), strict=True))
     steps = tuple(replace(step, chordal_tolerance=step.chordal_tolerance + tolerance + max(
                               (t.loose for t in step.trajectories), default=0.0),
                           trajectories=tuple(new.get((s, t), path) for t, path in enumerate(step.trajectories)))
@@ -97,11 +102,17 @@ def _axis_is_z(plan: Workplan, step: Workingstep) -> bool:
     return frame is not None and bool(np.abs(frame.rotation[2] - [0.0, 0.0, 1.0]).max() < 1e-9)
 
 
-def _refitted_trajectories(trajectories: Sequence[Trajectory], round_: BOOL, tolerance: float) -> list[Trajectory]:
-    points = np.concatenate([w.points for w in trajectories])
-    count = np.array([len(w.points) for w in trajectories])
+def _refitted_trajectories(trajectories: Sequence[Trajectory], rows_kept: Sequence[tuple[F64, I64]], round_: BOOL,
+                           tolerance: float) -> list[Trajectory]:
+    """The trajectories with arcs and longer lines.
+
+    rows_kept : the points of each, (n, 3) float64, mm, and rows (k,) of them that stay
+    """
+    points = np.concatenate([p for p, _ in rows_kept])
+    count = np.array([len(p) for p, _ in rows_kept])
     begin = np.cumsum([0, *count])
-    fit = stretches(points, count, round_, tolerance + np.array([w.loose for w in trajectories]))
+    kept = np.concatenate([rows + b for (_, rows), b in zip(rows_kept, begin.tolist(), strict=False)])
+    fit = stretches(points, count, round_, tolerance + np.array([w.loose for w in trajectories]), kept)
     rows, starts, per = _along(points, fit)
     out = []
     part = np.searchsorted(fit.first, begin)  # a stretch never goes from one pass to the next
@@ -124,21 +135,24 @@ def _left(points: F64, fit: FittedStretches, mine: slice) -> BOOL:
     return np.asarray(_cross(a, b) > 0.0)
 
 
-def stretches(points: F64, count: I64, round_: BOOL, tolerance: F64 | float) -> FittedStretches:
+def stretches(points: F64, count: I64, round_: BOOL, tolerance: F64 | float,
+              kept: I64 = NO_ROWS) -> FittedStretches:
     """The lines and arcs that replace paths.
 
     points : (n, 3) float64, mm, frame of the step; the points of all paths, one path after the other
     count  : (m,) int64, count of the points of each path, >= 2
     round_ : (m,) bool, whether the path may have arcs
     tolerance : (m,) float64 or float, mm, largest distance between a stretch and its path, in both directions
+    kept   : (k,) int64, index, ascending, rows of ``points`` at which a stretch must end
 
     Notes
     -----
     Time and memory grow with n log b, where b <= 256 is the number of moves of the longest stretch.
     """
     ends = np.cumsum(count)
-    blocks = [np.unique(np.append(np.arange(e - n, e - 1, BLOCK), e - 1))
-              for n, e in zip(count.tolist(), ends.tolist(), strict=True)]
+    here = np.searchsorted(kept, np.append(0, ends))
+    blocks = [np.unique(np.concatenate([np.arange(e - n, e - 1, BLOCK), kept[a:b], [e - 1]]))
+              for n, e, a, b in zip(count.tolist(), ends.tolist(), here[:-1].tolist(), here[1:].tolist(), strict=True)]
     at = np.concatenate([b[:-1] for b in blocks])
     stop = np.concatenate([b[1:] for b in blocks])
     may = np.repeat(round_, [len(b) - 1 for b in blocks])

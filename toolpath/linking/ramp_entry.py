@@ -18,6 +18,7 @@ from toolpath.stock.stock_map import SKIN
 RAMP_SHARE = 0.9  # of the steepest ramp allowed
 EASE_SHARE = 0.98  # of that ramp, for one move that catches up
 ROUNDING = 1.1e-4  # mm: on a move of a few um the rounding of Z in the program alone would be too steep
+LEANING = 0.5  # of the steepest ramp: a pass that leans more is gone down steeper than that where it goes down itself
 MIN_RUN = 0.25  # radii, there and back on an open line: least length of a ramp
 MAX_LEGS = 400
 
@@ -42,13 +43,13 @@ def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: floa
     half of the ramp is dug into by all the height lost since the tool was there before. So no more than a skin is lost
     between, and no more than the level or rising way works off: back and forth that is half of it.
     """
-    slope, skin = care * math.tan(angle) * RAMP_SHARE, care * SKIN * tool.diameter
+    slope, skin = steepest_ramp(angle, care), care * SKIN * tool.diameter
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1))])
     total = float(s[-1])
     if total < MIN_RUN * tool.radius * (2.0 if closed else 1.0):
         return None  # back and forth on the spot is drilling
-    lean = _steepest(points if closed else head_of(points, 0.5 * over / slope))
-    digs, rest = lean > 0.5 * slope, slope - min(lean, 0.5 * slope)
+    lean = _steepest(ramped_part(points, closed, over, slope))
+    digs, rest = lean > LEANING * slope, slope - min(lean, LEANING * slope)
     if closed and digs:
         rest = min(slope * _not_down(points, (1.0 / RAMP_SHARE - 1.0) * slope), skin / total)
     if rest <= 0.0:
@@ -78,6 +79,32 @@ def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: floa
         lifts.append(over * (1.0 - (k * leg + along[1:]) / (legs * leg)))
     lifts.append(np.zeros(len(points) - 1))
     return _eased(np.vstack([*ways, points[1:]]), np.concatenate(lifts), most)
+
+
+def steepest_ramp(angle: float, care: float) -> float:
+    """What a ramp goes down at most, mm per mm in plan.
+
+    angle : rad, steepest descent of the tool;  care : share of that angle that is used
+    """
+    return care * math.tan(angle) * RAMP_SHARE
+
+
+def ramped_part(points: F64, closed: bool, over: float, slope: float) -> F64:
+    """The part of a pass that a way down follows, (k, 3) float64, mm, access frame: a closed pass is followed whole.
+
+    points : (n, 3) float64, mm, access frame, the pass;  closed : whether it ends where it begins
+    over   : mm, height of the start of the way above the start of the pass
+    slope  : mm per mm in plan, steepest ramp
+    """
+    return points if closed else head_of(points, 0.5 * over / slope)
+
+
+def digs_down(points: F64, closed: bool, over: float, slope: float) -> bool:
+    """Whether a way down goes down steeper than a ramp where the pass goes down itself.
+
+    points : (n, 3) float64, mm, access frame, the pass;  closed, over, slope : as in ``ramped_part``
+    """
+    return _steepest(ramped_part(points, closed, over, slope)) > LEANING * slope
 
 
 def head_of(points: F64, length: float) -> F64:

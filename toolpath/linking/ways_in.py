@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from toolpath.lines import Line, dense
 from toolpath.linking.lead_arcs import arcs_along
-from toolpath.linking.ramp_entry import RAMP_SHARE, head_of, way_down
+from toolpath.linking.ramp_entry import digs_down, head_of, ramped_part, steepest_ramp, way_down
 from toolpath.linking.rapid_travel import Travel
 from toolpath.scallop_budget import LEAD_SHARE
 from toolpath.stock.cut_history import Depths
@@ -155,7 +155,7 @@ class WaysIn:
         where the tool is not free in air.
         """
         here, start, m = self.go.here(), points[0], self.motions
-        sooner = 2.0 * (z - start[2]) / (math.tan(m.ramp_angle) * RAMP_SHARE * m.feed)
+        sooner = 2.0 * (z - start[2]) / (steepest_ramp(m.ramp_angle, 1.0) * m.feed)
         for q in itertools.chain(self.air_beside(points), self._been_beside(start) if self._shallow(points) else ()):
             way = np.array([here, [*here[:2], z], [*q[:2], z], q])
             way = way[np.r_[True, np.linalg.norm(np.diff(way, axis=0), axis=1) > 1e-9]]
@@ -218,7 +218,11 @@ class WaysIn:
 
     def _shallow(self, points: F64) -> bool:
         """Whether no more than a layer stands over tips (n, 3), mm, skins on the walls beside them included."""
-        return float(self.stock.overlap(points, self.field.tool, LOOK_RIM).max()) <= MAX_OVER * self.motions.step_down
+        return self._stands_over(points) <= MAX_OVER * self.motions.step_down
+
+    def _stands_over(self, points: F64) -> float:
+        """Most stock over tips (n, 3), mm, skins on the walls beside them included."""
+        return float(self.stock.overlap(points, self.field.tool, LOOK_RIM).max())
 
     def _leads_onto(self, q: F64, start: F64) -> bool:
         """Whether the tool can go from a place straight across to a start of a cut as high, (3,) mm."""
@@ -248,11 +252,11 @@ class WaysIn:
             first = int(np.argmin(touched[:-1]))
             points = np.vstack([points[first:-1], points[:first + 1]])
             touched = np.roll(touched[:-1], -first)
-        seen = max(float(self.stock.overlap(points, tool, LOOK_RIM).max()), float(touched[0]))
+        seen = max(self._stands_over(points), float(touched[0]))
         highest = max(float(self.stock.overlap(points[:1], tool, SURE_RIM)[0]),
                       float(self.stock.under_end(points[:1], tool)[0]))
         # where the tool has been before nothing is left that it could take; an open line is gone down along its head
-        slope = math.tan(self.motions.ramp_angle) * RAMP_SHARE
+        slope = steepest_ramp(self.motions.ramp_angle, 1.0)
         head = points if closed else head_of(points, 0.5 * (seen + 0.1) / slope)
         above = max(float(self.depths.above(head).max()), 0.0)
         been = self.depths.near(points[0, :2], BEEN_NEAR * tool.diameter)[:, 2].min(initial=math.inf)
@@ -288,8 +292,18 @@ class WaysIn:
         return None if q is None else np.vstack([q, top])
 
     def _ramp(self, points: F64, closed: bool, over: float) -> F64 | None:
+        """Down a ramp along a pass; None where it is too short, breaks the limit of the engaged angle, or plunges.
+
+        Where it goes down steeper than a ramp, the stock over it must not stand higher than its top: its first way
+        down would take all of that at once.
+        """
         tool = self.field.tool
-        ramp = way_down(points, closed, over, tool, self.motions.ramp_angle, self.found.care(tool, points))
+        care = self.found.care(tool, points)
+        slope = steepest_ramp(self.motions.ramp_angle, care)
+        if digs_down(points, closed, over, slope) and self._stands_over(
+                ramped_part(points, closed, over, slope)) > over:
+            return None
+        ramp = way_down(points, closed, over, tool, self.motions.ramp_angle, care)
         if ramp is None or not within(self.stock, ramp[:len(ramp) - len(points) + 1], tool, self.engaged, self.found):
             return None
         return ramp

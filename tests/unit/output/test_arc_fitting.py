@@ -20,7 +20,7 @@ from tests.arc_plans import HALF, SHAPES, cutting, dense, off, round_clamped, ro
 from tests.golden_file import assert_golden
 from tests.synthetic_plan import BALL, clamped, leaning, step, write_linuxcnc
 from toolpath.linking.lead_arcs import arc_onto
-from toolpath.workingsteps import TrajectoryKind
+from toolpath.workingsteps import Trajectory, TrajectoryKind
 from verify.comparison.program_equivalence import difference
 from verify.comparison.stepnc_agreement import check_agreement
 from verify.gcode.reader import read_program
@@ -155,6 +155,35 @@ def test_a_loose_pass_has_more_room_and_the_one_beside_it_has_not(name):
     assert off(np.vstack([drawn(p) for p in written(loose)])[::3], SHAPES[name]) <= HALF + 0.02 + GRAIN
     assert len(written(loose)) <= len(written(exact))
     assert step.chordal_tolerance == pytest.approx(work.steps[0].chordal_tolerance + HALF + 0.02)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.37])
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_loose_pass_goes_through_the_place_where_its_tool_comes_down_again(name, share):
+    """It passes beside it otherwise, and the tool comes down into the sliver that stays there."""
+    work = cutting(SHAPES[name])
+    ways = work.steps[0].trajectories
+    k = next(k for k, t in enumerate(ways) if t.motion is TrajectoryKind.CUT)
+    path = ways[k].points
+    places = [(1.0 - share) * path[i] + share * path[i + 1] for i in range(1, len(path) - 1, max(len(path) // 7, 1))]
+    above = [Trajectory(TrajectoryKind.APPROACH, np.array([p + [0.0, 0.0, 5.0], p]), 100.0) for p in places]
+
+    def nearest(loose, after, tool=work.steps[0].tool):
+        first = replace(work.steps[0], trajectories=(*ways[:k], replace(ways[k], loose=loose), *ways[k + 1:]))
+        again = replace(work.steps[0], tool=tool, trajectories=tuple(after))
+        pieces_ = written(cut_of(fitted(replace(work, steps=(first, again)), HALF)))
+        assert off(np.vstack([drawn(p) for p in pieces_])[::3], path) <= HALF + loose + GRAIN
+        ends = np.vstack([p[[0, -1]] if not isinstance(p, GridArc) else [p.start, p.end] for p in pieces_]) * GRID
+        drawn_ = np.vstack([drawn(p) for p in pieces_] + [ends])
+        return max(np.linalg.norm(drawn_ - p, axis=1).min() for p in places)
+
+    assert nearest(0.02, above) <= GRID
+    if name in ("ring", "helix", "sine"):
+        assert nearest(0.02, []) > 20 * GRID
+    aside = [replace(t, points=t.points - [0.0, 0.0, 0.01]) for t in above]  # deeper than the cut: nothing it relies on
+    other = replace(work.steps[0].tool, id="T99")
+    assert nearest(0.02, aside) == pytest.approx(nearest(0.02, []))
+    assert nearest(0.02, above, other) == pytest.approx(nearest(0.02, []))
 
 
 def test_blocks_end_where_many_passes_are_gone_along_at_once():

@@ -78,13 +78,14 @@ def test_an_open_line_in_stock_is_ramped_to_and_fro(length):
     assert (cut[:, 1] == 15).all() and cut[:, 0].min() >= line.points[0, 0] - 1e-9
 
 
-def digging(cut, along):
+def digging(cut, along, top=np.inf):
     """What each steep descent of a polyline takes below all that was walked before, mm, and the way of the other moves.
 
+    top : mm, of the stock before it
     Looked at every 0.05 mm of ``along`` (n,), mm, on which a point of the polyline lies in plan.
     """
     places = np.linspace(along.min(), along.max(), int(np.ptp(along) / 0.05) + 2)
-    lowest, dug, aside = np.full(len(places), np.inf), [], 0.0
+    lowest, dug, aside = np.full(len(places), top), [], 0.0
     for k in range(1, len(cut)):
         low, high = sorted(along[k - 1:k + 1])
         here = np.flatnonzero((places >= low) & (places <= high))
@@ -113,6 +114,20 @@ def test_to_and_fro_along_a_leaning_line_the_way_back_takes_no_more_than_a_skin(
     dug, aside = digging(cut, cut[:, 0])
     assert dug.max(initial=0.0) <= SKIN * ball(4.0).diameter
     assert dug.sum() <= np.tan(RAMP) * aside  # and the ways between work it off
+
+
+def test_a_leaning_line_is_not_begun_at_an_earlier_cut_beside_it_with_stock_over_the_rest_of_it():
+    """Its first way down goes steeper than a ramp: with a level line the same is a ramp into the stock."""
+    link = linker(top=3.9, step_down=0.6)
+    before = np.array([[12.0, 15.0, 2.9], [14.0, 15.0, 2.9]])
+    link.stock.cut(before, link.field.tool)
+    link.depths.cut(before)
+    leaning = Line(np.array([[14.0, 15.0, 3.1], [17.0, 15.0, 3.0]]), False)
+    cut = link.ways.ramped(leaning.points, False)[1]
+    dug, _ = digging(cut, cut[:, 0], 3.9)
+    assert dug.max(initial=0.0) <= SKIN * ball(4.0).diameter
+    level = link.ways.ramped(straight(14.0, 17.0, 15.0, 3.1).points, False)[1]
+    assert level[0, 2] == pytest.approx(3.2)  # a tenth above
 
 
 @pytest.mark.parametrize("down", [0.5, 0.8])
