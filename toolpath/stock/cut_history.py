@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
+from toolpath.kernels.walked import chain_all, fresh_moves, note, repeated_moves
 from toolpath.lines import Line, dense, pieces_where, place_keys
 from zones.lattice import Lattice
 
@@ -19,8 +19,6 @@ WRITTEN = 1.0 / PER_MM  # mm, resolution of programs: places that round alike ar
 OVERLAP = 3  # known moves of a line repeated on each side, fewer than the proof counts as a stretch cut twice
 ON = 2.0 * WRITTEN  # mm off a move that still count as on it
 CELL = 10.0 * WRITTEN  # mm, cells in which equal places are searched
-CELL_BITS = 2**21 - 1
-CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 
 class Depths:
@@ -129,7 +127,7 @@ class Walked:
     """
 
     def __init__(self) -> None:
-        self._moves: dict[int, list[tuple[F64, F64]]] = {}
+        self._count, self._notes = 0, _Notes.of(0)
         self.ways: list[F64] = []  # in their original form
 
     def add(self, points: F64) -> None:
@@ -138,23 +136,19 @@ class Walked:
         points : (n, 3) float64, mm, access frame
         """
         self.ways.append(points)
-        keys = _cells(points).tolist()
-        for a, b, p, q in zip(keys[:-1], keys[1:], points[:-1], points[1:], strict=True):
-            self._moves.setdefault(a, []).append((p, q))
-            self._moves.setdefault(b, []).append((q, p))
+        count = self._count + 2 * (len(points) - 1)
+        if count > len(self._notes.after):
+            self._notes = self._notes.grown(self._count, 2 * count)
+        note(self._count, 0, len(points) - 1, np.ascontiguousarray(points), CELL, *self._notes)
+        self._count = count
 
     def fresh(self, line: Line) -> NDArray[np.bool_]:
         """Whether moves of a line were not cut whole before, (n - 1,) bool.
 
         A move is known where it is part of an earlier move and shares an end with it.
         """
-        points, moves = line.points, self._moves
-        out = np.ones(len(points) - 1, np.bool_)
-        near = _cells(points[:, None, :] + ON * CORNERS).tolist()
-        known = [[key for key in dict.fromkeys(keys) if key in moves] for keys in near]
-        for k in range(len(out)):
-            p, q = points[k], points[k + 1]
-            out[k] = not (known[k] and self._along(p, q, known[k]) or known[k + 1] and self._along(q, p, known[k + 1]))
+        out = np.ones(len(line.points) - 1, np.bool_)
+        fresh_moves(np.ascontiguousarray(line.points), ON, CELL, *self._notes, out)
         return out
 
     @staticmethod
@@ -162,37 +156,44 @@ class Walked:
         """Whether moves of a line repeat earlier moves of the same line, (n - 1,) bool, as turns of a spiral at a
         border do."""
         out = np.zeros(len(line.points) - 1, np.bool_)
-        if len(cKDTree(line.points).query_pairs(ON)) <= 1:  # a ring comes back to its beginning
-            return out
-        so_far = Walked()
-        for k in range(len(out)):
-            move = line.points[k:k + 2]
-            out[k] = not so_far.fresh(Line(move, False))[0]
-            so_far.add(move)
+        repeated_moves(np.ascontiguousarray(line.points), ON, CELL, *_Notes.of(2 * len(out)), out)
         return out
-
-    def _along(self, start: F64, end: F64, near: Sequence[int]) -> bool:
-        """Whether an earlier move from ``start``, in one of the cells ``near`` it, passes over ``end``."""
-        for p, q in (move for key in near for move in self._moves[key]):
-            if float((p - start) @ (p - start)) >= ON * ON:
-                continue
-            way, there = q - start, end - start
-            size = float(way @ way)
-            share = float(there @ way) / size if size > 0.0 else 0.0
-            off = there - share * way
-            if 0.0 <= share * size <= size + ON * size**0.5 and float(off @ off) < ON * ON:
-                return True
-        return False
 
     def copied(self) -> Walked:
         """A copy with a history of its own."""
         out = Walked()
-        out._moves, out.ways = {key: list(ends) for key, ends in self._moves.items()}, list(self.ways)
+        out._count, out._notes, out.ways = self._count, self._notes.grown(self._count, 0), list(self.ways)
         return out
 
     def become(self, other: Walked) -> None:
         """Takes over the history of a copy."""
-        self._moves, self.ways = other._moves, other.ways
+        self._count, self._notes, self.ways = other._count, other._notes, other.ways
+
+
+class _Notes(NamedTuple):
+    """Moves by the cells of their ends, as ``toolpath.kernels.walked`` reads them.
+
+    ends : (m, 6) float64, mm;  after : (m,) int64;  cells : (s, 2) int64
+    """
+
+    ends: F64
+    after: NDArray[np.int64]
+    cells: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, room: int) -> _Notes:
+        """Room for so many notes; no more than half of the table is ever used."""
+        return cls(np.empty((room, 6)), np.empty(room, np.int64),
+                   np.full((2 ** max(2 * room, 2).bit_length(), 2), -1, np.int64))
+
+    def grown(self, count: int, room: int) -> _Notes:
+        """A copy of ``count`` notes with room for ``room``, or as much as here where that is more."""
+        if room <= len(self.after):
+            return _Notes(*(a.copy() for a in self))
+        out = _Notes.of(room)
+        out.ends[:count] = self.ends[:count]
+        chain_all(count, CELL, *out)
+        return out
 
 
 def still_to_walk(line: Line, fresh: NDArray[np.bool_]) -> list[Line]:
@@ -215,9 +216,3 @@ def still_to_walk(line: Line, fresh: NDArray[np.bool_]) -> list[Line]:
 def _written(points: F64) -> list[bytes]:
     """A key for each of points (n, 3), mm, the same for points that round alike in a program."""
     return [row.tobytes() for row in np.rint(points * PER_MM).astype(np.int64)]
-
-
-def _cells(points: F64) -> NDArray[np.int64]:
-    """A number (...) for the cell of each of points (..., 3), mm; cells ``2**21`` apart share one."""
-    cells = np.floor(points / CELL).astype(np.int64) & CELL_BITS
-    return np.asarray(cells[..., 0] << 42 | cells[..., 1] << 21 | cells[..., 2])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +14,7 @@ from toolpath.lines import Line, true_runs
 from toolpath.planning import zone_finishing
 from toolpath.planning.zone_finishing import Finish
 from toolpath.planning.zone_layout import Strategy
-from toolpath.stock.cut_history import OVERLAP, Depths, Walked, still_to_walk
+from toolpath.stock.cut_history import ON, OVERLAP, Depths, Walked, still_to_walk
 from toolpath.stock.residual_map import ResidualMap
 from toolpath.workingsteps import CutDirection, TrajectoryKind
 from verify.checks.repeated_passes import WINDOW
@@ -169,6 +170,37 @@ def test_turns_of_a_line_that_fall_on_one_another_are_found():
     assert known.fresh(Line(nearly + [0.0, 0.0, 1e-3], False)).all()
     spiral = turns * (1.0 + 0.01 * np.arange(81)[:, None])
     assert not Walked.again(Line(spiral, False)).any()
+
+
+def passed_over(p, q, moves):
+    """Whether one of moves (m, 2, 3) that ends at p passes over q: all of them looked at."""
+    for a, b in (ends for move in moves for ends in (move, move[::-1])):
+        way, size = b - p, float(np.linalg.norm(b - p))
+        along = float((q - p) @ way) / size if size > 0.0 else 0.0
+        off = np.linalg.norm(q - p - along * way / max(size, 1e-300))
+        if np.linalg.norm(a - p) < ON and 0.0 <= along <= size + ON and off < ON:
+            return True
+    return False
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_known_moves_are_those_that_a_look_at_all_moves_finds(seed):
+    """Places on a coarse and on a fine grid, some a little off, so that moves meet, overlap and cross cells."""
+    rng = np.random.default_rng(seed)
+    step = (5.0, 0.1, 1e-3, 3e-4)[seed % 4]
+    points = rng.integers(-3, 4, (60, 3)) * [step, step, 0.0] + rng.uniform(-6e-5, 6e-5, (60, 3)) * (seed > 3)
+    known, moves = Walked(), []
+    for _ in range(12):
+        way = points[rng.integers(0, 60, rng.integers(2, 20))]
+        known.add(way)
+        moves += list(np.stack([way[:-1], way[1:]], axis=1))
+        asked = points[rng.integers(0, 60, 12)]
+        here = known.copied() if seed % 2 else known
+        assert here.fresh(Line(asked, False)).tolist() == [
+            not (passed_over(p, q, moves) or passed_over(q, p, moves)) for p, q in itertools.pairwise(asked)]
+    own = list(np.stack([points[:-1], points[1:]], axis=1))
+    again = [passed_over(*m, own[:k]) or passed_over(*m[::-1], own[:k]) for k, m in enumerate(own)]
+    assert Walked.again(Line(points, False)).tolist() == again and (step < 5.0 or seed > 3 or any(again))
 
 
 @pytest.mark.parametrize("known", range(1, 20))
