@@ -6,14 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.hand_parts import box_mesh
+from tests.machined_cases import mill, path
 from tests.pocket_case import SETUP, TOOL, block, scored, text
+from toolpath.linking.ramp_entry import way_down
 from verify.kernels.stock import PLUNGE
 from verify.material import stock_pass
 from verify.material.material import stock_spacing, unseen_cores
 from verify.material.stock_field import run_field, stock_field
 from verify.material.stock_lines import blank, run_stock
 from verify.material.stock_pass import Ways, descents, hollow_ends, parts
-from verify.model import NcProgram, ScoredSamples
+from verify.model import NcProgram, ProofSetup, ScoredSamples
 from verify.moves import Moves
 from verify.prove import prove
 
@@ -286,3 +289,18 @@ def test_lines_stand_in_every_core():
     assert stock_spacing(SETUP, moves, [TOOL]) > 0.14
     assert unseen_cores([TOOL], thin, 0.14, True) == [] and unseen_cores([TOOL], SETUP, 0.3, False) == []
     assert unseen_cores([TOOL], thin, 0.3, True) == unseen_cores([TOOL], thin, 0.14, False) == [TOOL]
+
+
+@pytest.mark.parametrize("lean", [0.03, 0.05, 0.2])
+@pytest.mark.parametrize("length", [0.65, 1.0])
+def test_a_way_down_along_a_leaning_pass_is_no_plunge(lean, length):
+    """It begins higher than any stock over the pass. Its first ways back leave the stock, and work off less."""
+    tool, top = mill(0.6, 0.3, 1.8), 0.2 + 0.5 * lean * length
+    setup = ProofSetup(stock_kind="box", stock_box=np.array([[-2.0, -2.0, -1.0], [length + 2.0, 2.0, top]]))
+    run = np.linspace(0.0, length, 4)
+    line = np.column_stack([run, np.zeros(4), -lean * run])
+    for pass_ in (line, line[::-1].copy()):
+        way = way_down(pass_, False, top - line[:, 2].min(), tool, setup.ramp_angle, 1.0)
+        stock = blank(box_mesh([-2.0, -2.0, -1.0], [length + 2.0, 2.0, -0.9]), 0.02, setup)
+        events = run_stock(stock, path(way), [tool], setup).events
+        assert not (events[:, 1] == PLUNGE).any(), (lean, length, events[events[:, 1] == PLUNGE, 2].max(initial=0.0))

@@ -19,6 +19,7 @@ RAMP_SHARE = 0.9  # of the steepest ramp allowed
 EASE_SHARE = 0.98  # of that ramp, for one move that catches up
 ROUNDING = 1.1e-4  # mm: on a move of a few um the rounding of Z in the program alone would be too steep
 LEANING = 0.5  # of the steepest ramp: a pass that leans more is gone down steeper than that where it goes down itself
+IN_CUT = 0.5  # of the way that works off what such a way down digs
 MIN_RUN = 0.25  # radii, there and back on an open line: least length of a ramp
 MAX_LEGS = 400
 
@@ -40,8 +41,11 @@ def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: floa
     Notes
     -----
     Where the pass itself goes up or down, the ramp has less to descend by. Going downhill, a pass inclined by more than
-    half of the ramp is dug into by all the height lost since the tool was there before. So no more than a skin is lost
-    between, and no more than the level or rising way works off: back and forth that is half of it.
+    half of the ramp is dug into by all the height lost since the tool was there before. So what is lost between, D, is
+    no more than the level or rising way works off: back and forth that is half of the way. Only way in the cut works
+    anything off, and the first ways leave the stock for a part of theirs, so ``IN_CUT`` of it counts. Over a pass with
+    the lean l the way in the cut grows by D / l each time. With a ramp t, what is dug and not worked off adds up to
+    D l / 2 t until it is long enough, so D is no more than a skin over 1 + l / 2 t.
     """
     slope, skin = steepest_ramp(angle, care), care * SKIN * tool.diameter
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1))])
@@ -49,9 +53,12 @@ def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: floa
     if total < MIN_RUN * tool.radius * (2.0 if closed else 1.0):
         return None  # back and forth on the spot is drilling
     lean = _steepest(ramped_part(points, closed, over, slope))
-    digs, rest = lean > LEANING * slope, slope - min(lean, LEANING * slope)
-    if closed and digs:
-        rest = min(slope * _not_down(points, (1.0 / RAMP_SHARE - 1.0) * slope), skin / total)
+    digs, rest = lean > LEANING * slope, slope - lean
+    leg = min(total, max(0.5 * over / slope, 1e-9), skin / slope if digs else math.inf)
+    if digs:
+        level = _not_down(points, (1.0 / RAMP_SHARE - 1.0) * slope) if closed else 0.5
+        lost = skin / (1.0 + 0.5 * lean / math.tan(angle))
+        rest = min(IN_CUT * slope * level, lost / (total if closed else 2.0 * leg))
     if rest <= 0.0:
         return None
     need, most = over / rest, math.tan(angle) * EASE_SHARE - (0.0 if digs else lean)
@@ -66,7 +73,6 @@ def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: floa
         path = _eased(down[0], lift, most)
         last = int(np.searchsorted(down[1], need + total - 1e-9))
         return np.ascontiguousarray(path[: last + 1])
-    leg = min(total, max(0.5 * over / slope, 1e-9), skin / slope if digs else math.inf)
     legs = max(2, 2 * math.ceil(need / (2.0 * leg)))
     if legs > MAX_LEGS:
         return None
@@ -76,7 +82,7 @@ def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: floa
     for k in range(legs):
         xy, along = (head, hs) if k % 2 == 0 else (head[::-1], leg - hs[::-1])
         ways.append(xy[1:])
-        lifts.append(over * (1.0 - (k * leg + along[1:]) / (legs * leg)))
+        lifts.append(over * (1.0 - (k + along[1:] / leg) / legs))
     lifts.append(np.zeros(len(points) - 1))
     return _eased(np.vstack([*ways, points[1:]]), np.concatenate(lifts), most)
 

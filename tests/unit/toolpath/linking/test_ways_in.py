@@ -11,6 +11,7 @@ from tests.linked_plate import TOP, linker, loop, motions, steepest_cut, straigh
 from toolpath.counterexamples import CARE, Counterexamples
 from toolpath.lines import Line
 from toolpath.linking.linker import Linker
+from toolpath.linking.ramp_entry import IN_CUT
 from toolpath.linking.rapid_travel import Motions
 from toolpath.stock.cut_history import Depths
 from toolpath.stock.stock_map import SKIN, StockMap
@@ -113,7 +114,7 @@ def test_to_and_fro_along_a_leaning_line_the_way_back_takes_no_more_than_a_skin(
     assert (cut[-2:] == line.points).all() and cut[0, 2] >= TOP
     dug, aside = digging(cut, cut[:, 0])
     assert dug.max(initial=0.0) <= SKIN * ball(4.0).diameter
-    assert dug.sum() <= np.tan(RAMP) * aside  # and the ways between work it off
+    assert dug.sum() <= IN_CUT * np.tan(RAMP) * aside  # and the ways between work it off, half of them in air
 
 
 def test_a_leaning_line_is_not_begun_at_an_earlier_cut_beside_it_with_stock_over_the_rest_of_it():
@@ -145,7 +146,7 @@ def test_a_loop_that_leans_is_ramped_a_skin_a_turn_and_no_more_than_it_works_off
     turns = (turn - turn[0]) / (2.0 * np.pi)
     lost = np.nanmax(cut[:, 2] - np.interp(turns + 1.0, turns, cut[:, 2], right=np.nan))
     assert 0.0 < lost <= SKIN * ball(4.0).diameter + 1e-9
-    assert lost <= np.tan(RAMP) * (1.0 - down) * 2.0 * np.pi * radius
+    assert lost <= IN_CUT * np.tan(RAMP) * (1.0 - down) * 2.0 * np.pi * radius
 
 
 @pytest.mark.parametrize("radius", [1.0, 4.0, 9.0])
