@@ -15,11 +15,6 @@ from geometry.surfaces.nurbs import NurbsSurface
 
 # Starts to every span of knots and order. With fewer starts the nearest one may lie in another valley.
 STARTS = 3
-ROUNDS = 50
-# Largest step as a share of the domain. A step that gains nothing is cut to a quarter, at most this often.
-REACH, CUTS = 0.25, 12
-# A step shorter than this share of the domain ends the search. The error of the distance is then of its square.
-ENOUGH = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,33 +66,7 @@ def foot_points(surface: NurbsSurface, points: ArrayLike, start: ArrayLike | Non
 
 
 def _search(surface: NurbsSurface, points: F64, start: F64) -> FootPoints:
-    low, high = surface.domain
-    uv = start.copy()
-    foot = surface.points(uv)
-    left = np.einsum("pi,pi->p", foot - points, foot - points)
-    rows = np.arange(len(points))
-    for _ in range(ROUNDS):
-        step = _newton(surface, points[rows], uv[rows])
-        step /= np.maximum(np.abs(step / (REACH * (high - low))).max(axis=1, keepdims=True), 1.0)
-        far = (np.abs(step) > ENOUGH * (high - low)).any(axis=1)
-        rows, step = rows[far], step[far]
-        gained = np.zeros(len(rows), bool)
-        for _ in range(CUTS):
-            todo = np.flatnonzero(~gained)
-            if not len(todo):
-                break
-            trial = np.clip(uv[rows[todo]] + step[todo], low, high)
-            at = surface.points(trial)
-            gap = np.einsum("pi,pi->p", at - points[rows[todo]], at - points[rows[todo]])
-            better = gap < left[rows[todo]]
-            gained[todo[better]] = True
-            done = rows[todo[better]]
-            uv[done], foot[done], left[done] = trial[better], at[better], gap[better]
-            step[todo[~better]] *= 0.25
-        rows = rows[gained]
-        if not len(rows):
-            break
-    return FootPoints(uv, foot, np.sqrt(left))
+    return FootPoints(*surface.feet(points, start))
 
 
 def _starts(surface: NurbsSurface, points: F64) -> F64:
@@ -112,33 +81,3 @@ def _starts(surface: NurbsSurface, points: F64) -> F64:
     regular = np.isfinite(surface.normals(uv)[:, 0])
     uv = uv[regular] if regular.any() else uv
     return uv[cKDTree(surface.points(uv)).query(points)[1]] if len(points) else np.zeros((0, 2))
-
-
-def _newton(surface: NurbsSurface, points: F64, uv: F64) -> F64:
-    """Steps of Newton's method, or of Gauss-Newton where Newton's does not descend; no step crosses a border."""
-    d = surface.derivatives(uv)
-    off = d.point - points
-    slope = np.stack([(off * d.u).sum(axis=1), (off * d.v).sum(axis=1)], axis=1)
-    low, high = surface.domain
-    held = ((uv <= low) & (slope > 0.0)) | ((uv >= high) & (slope < 0.0))
-    slope[held] = 0.0
-    metric = np.empty((len(uv), 2, 2))
-    metric[:, 0, 0], metric[:, 1, 1] = (d.u * d.u).sum(axis=1), (d.v * d.v).sum(axis=1)
-    metric[:, 0, 1] = metric[:, 1, 0] = (d.u * d.v).sum(axis=1)
-    bend = np.empty_like(metric)
-    bend[:, 0, 0], bend[:, 1, 1] = (off * d.uu).sum(axis=1), (off * d.vv).sum(axis=1)
-    bend[:, 0, 1] = bend[:, 1, 0] = (off * d.uv).sum(axis=1)
-    hessian = metric + bend
-    good = (np.linalg.det(hessian) > 1e-3 * np.linalg.det(metric)) & (hessian[:, 0, 0] > 0.0)
-    hessian = np.where(good[:, None, None], hessian, metric)
-    hessian[:, [0, 1], [0, 1]] *= 1.0 + 1e-12
-    hessian[:, [0, 1], [0, 1]] += 1e-300
-    # a coordinate fixed at a border leaves the system of equations
-    free = (~held).astype(np.float64)
-    hessian *= free[:, :, None] * free[:, None, :]
-    hessian[:, [0, 1], [0, 1]] += held
-    with np.errstate(invalid="ignore", divide="ignore"):
-        det = np.linalg.det(hessian)
-        step = -np.stack([hessian[:, 1, 1] * slope[:, 0] - hessian[:, 0, 1] * slope[:, 1],
-                          hessian[:, 0, 0] * slope[:, 1] - hessian[:, 1, 0] * slope[:, 0]], axis=1) / det[:, None]
-    return np.where(np.isfinite(step), step, 0.0)

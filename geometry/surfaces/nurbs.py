@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from geometry.array_checks import finite_points
 from geometry.errors import GeometryError
+from geometry.kernels.feet import search_feet
 from geometry.kernels.nurbs import heights_along, surface_values
 from geometry.mesh import F64, I32, TriangleMesh
 
@@ -189,6 +190,22 @@ class NurbsSurface:
                       self.side, low - room, high + room, np.ascontiguousarray(points, np.float64),
                       np.ascontiguousarray(start, np.float64), uv, height)
         return height, uv
+
+    def feet(self, points: F64, start: F64) -> tuple[F64, F64, F64]:
+        """Nearest points within the domain, each in the valley of its start, by Newton's method [Piegl1997].
+
+        points : (p, 3) float64, mm, frame of the control points
+        start  : (p, 2) float64, dimensionless, parameters inside the domain
+
+        Returns the parameters (p, 2), dimensionless, the points (p, 3), mm, and their distances (p,), mm, all float64.
+        ``geometry.surfaces.foot_points`` finds starts.
+        """
+        low, high = self.domain
+        nets, knots_u, knots_v, orders = zip(*(self._nets[way] for way in _WAYS), strict=True)
+        uv, foot, left = np.array(start, np.float64), np.empty((len(points), 3)), np.empty(len(points))
+        search_feet(tuple(np.ascontiguousarray(net) for net in nets), knots_u, knots_v, np.array(orders, np.int64), low,
+                    high, np.ascontiguousarray(points, np.float64), uv, foot, left)
+        return uv, foot, np.sqrt(left)
 
     def curvature(self, uv: ArrayLike) -> F64:
         """Principal curvatures [DoCarmo1976]; errors are those of ``points``.
