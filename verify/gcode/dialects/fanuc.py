@@ -382,9 +382,13 @@ def _uncommented(raw: str) -> str:
 
 
 def _may_run(text: str) -> bool:
-    """Whether a text behind a ; may be a block: plain language and text without a number are comments."""
-    words = "".join(text.upper().split())
-    return bool(words) and ("#" in words or "[" in words or "".join(a + b for a, b in _WORD.findall(words)) == words)
+    """Whether a text behind a ; may be a block, or one of several: plain language and text without a number are
+    comments."""
+    for part in text.upper().split(";"):
+        words = _DELETED.sub(lambda m: m[1] or "", "".join(part.split())).replace(",", "").replace("GOTO", "N")
+        if words and ("#" in words or "[" in words or "".join(a + b for a, b in _WORD.findall(words)) == words):
+            return True
+    return False
 
 
 def codes_move(codes: Sequence[float]) -> bool:
