@@ -16,7 +16,10 @@ from verify.program.arc_chords import CHORD
 from verify.progress import Report, silent
 from verify.stepnc.part21 import is_exchange_file
 
-_END = re.compile(r"M0*(?:2|30)(?![0-9.])|^\s*%\s*$", re.IGNORECASE)
+_STOPS = r"M0*(?:2|30)(?![0-9.])|^\s*%\s*$"
+_ENDS = {"siemens": rf"{_STOPS}|(?<![A-Z_0-9$\"])(?:M17|RET|GOTOS)(?![A-Z_0-9=(])",
+         "heidenhain": rf"{_STOPS}|END PGM.*"}
+_M99 = rf"{_STOPS}|M99(?![0-9.])"  # of the other controls
 MAX_ENDS = 8  # ends within one text that are read through
 BLEND = 0.001  # mm, deviation that G64 may allow; the error bound includes it
 BLEND_SHARE = 0.1  # of the gouge tolerance: allowed instead where that is more
@@ -63,13 +66,14 @@ def read_on(nc: NcProgram, read: Program, reading: Callable[[NcProgram], Program
     Returns None where no lines follow an end, or where they cannot be read so.
     """
     whole, lines = read, cleaned(nc.text).split("\n")
+    ends = re.compile(_ENDS.get(nc.dialect, _M99), re.IGNORECASE)
     for _ in range(MAX_ENDS):
         if not whole.cut_off:
             break
-        end = _END.search(lines[whole.cut_off - 1])
+        end = ends.search(lines[whole.cut_off - 1])
         if end is None:
             return None
-        lines[whole.cut_off - 1] = _END.sub("", lines[whole.cut_off - 1])
+        lines[whole.cut_off - 1] = ends.sub("", lines[whole.cut_off - 1])
         last = next(k for k in range(len(lines), 0, -1) if lines[k - 1].strip() not in ("", "%"))
         for text in (lines, [*lines[:last], end[0]]):  # the last lines may have an end of their own, or none
             try:

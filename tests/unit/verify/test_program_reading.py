@@ -42,6 +42,29 @@ def test_a_program_is_read_on_through_a_percent_sign_in_its_middle(dialect, end)
     assert whole.end[-1, 0] == 9.0 and (whole.end[:len(read)] == read.end).all()
 
 
+@pytest.mark.parametrize(("dialect", "end"), [
+    ("linuxcnc", "M99"), ("fanuc", "M99"), ("haas", "N8 M5 M99"), ("siemens", "RET"), ("siemens", "N8 M17"),
+    ("siemens", "GOTOS")])
+def test_a_program_is_read_on_through_a_return_of_a_subprogram(dialect, end):
+    head = HEAD.replace("G94 G54 G61", "G54 G94") if dialect != "siemens" else (
+        "G71 G90 G17 G94 G54\nT=\"T1\" M6\nS900 M3\nD1\nG0 X0 Y0 Z5\nG1 Z1 F100\n")
+    nc = NcProgram("p", f"{head}X1.\n{end}\nX5.\nX9.\nM30\n", dialect=dialect)
+    read = read_one(nc, (TOOL,))
+    assert read.cut_off == 8 and read.end[-1, 0] == 1.0
+    whole = read_on(nc, read, lambda program: read_one(program, (TOOL,)))
+    assert whole.end[-1, 0] == 9.0 and (whole.end[:len(read)] == read.end).all()
+
+
+def test_a_program_of_heidenhain_is_read_on_through_an_end_in_its_middle():
+    text = ("BEGIN PGM X MM\nTOOL CALL 1 Z S900\nL X+0 Y+0 R0 FMAX M3\nL Z+5 FMAX\nL Z+1 F100\nEND PGM X MM\n"
+            "L X+9\nL Z+5 M30\nEND PGM X MM\n")
+    nc = NcProgram("p", text, dialect="heidenhain")
+    read = read_one(nc, (TOOL,))
+    assert read.cut_off == 6
+    whole = read_on(nc, read, lambda program: read_one(program, (TOOL,)))
+    assert len(whole) == len(read) + 2 and whole.end[-2, 0] == 9.0
+
+
 def test_another_program_of_the_file_is_told_and_not_read_on():
     read, whole = both("X5.\nM30\nO2000\nG0 X9.\nM30\n%\n", "fanuc")
     assert read.cut_off == 0 and whole is None
