@@ -112,5 +112,5 @@ class HaasReader(FanucReader):
     def _after(self, codes: list[float], values: Mapping[str, str]) -> list[str]:
         if 28 not in codes or 43 in codes:
             return []
-        self.dropped = "G28"
+        self.drops = "G28"  # behind this line: the way to the place on the way home has the length
         return ["G49"]

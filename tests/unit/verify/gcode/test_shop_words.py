@@ -206,7 +206,8 @@ def test_a_place_of_the_machine_needs_no_g0_on_these_controls():
     ("fanuc", "G91 G28 Z0.\nG90\n", False), ("fanuc", "G28 G91 Z0.\nG90\n", False), ("fanuc", "G53 G0 Z0.\n", False),
     ("fanuc", "G91 G30 Z0.\nG90\n", False), ("fanuc", "G91 G28 Z0.\nG90\nG28 X0.\n", False),
     ("fanuc", "G0 Z50.\nG91 G28 X0. Y0.\nG90\n", True), ("fanuc", "G0 Z50.\nG53 G0 X0. Y0.\n", True),
-    ("haas", "G91 G28 Z0.\nG90\n", False), ("haas", "G53 G0 Z0.\n", True)])
+    ("haas", "G91 G28 Z0.\nG90\n", False), ("haas", "G53 G0 Z0.\n", True), ("fanuc", "G90 G28 Z50.\n", False),
+    ("haas", "G90 G28 Z50.\n", False)])
 def test_a_way_home_in_z_drops_the_length_until_g43_with_h(dialect, way, kept):
     """Operator's manuals: Fanuc 0i-MB 14.1.2 (G28, G30 and G53 in the axis of the length), Haas (G28)."""
     body = "G1 X1. F100.\n" + way
