@@ -189,7 +189,7 @@ class _Notes(NamedTuple):
     def grown(self, count: int, room: int) -> _Notes:
         """A copy of ``count`` notes with room for ``room``, or as much as here where that is more."""
         if room <= len(self.after):
-            return _Notes(*(a.copy() for a in self))
+            return _Notes(self.ends.copy(), self.after.copy(), self.cells.copy())
         out = _Notes.of(room)
         out.ends[:count] = self.ends[:count]
         chain_all(count, CELL, *out)
