@@ -293,14 +293,20 @@ def test_lines_stand_in_every_core():
 
 @pytest.mark.parametrize("lean", [0.03, 0.05, 0.2])
 @pytest.mark.parametrize("length", [0.65, 1.0])
-def test_a_way_down_along_a_leaning_pass_is_no_plunge(lean, length):
-    """It begins higher than any stock over the pass. Its first ways back leave the stock, and work off less."""
+@pytest.mark.parametrize("stands", [1.0, 0.5, 0.2])
+def test_a_way_down_along_a_leaning_pass_is_no_plunge(lean, length, stands):
+    """It begins higher than any stock over the pass, which may stand over its lower end only.
+
+    The first ways back leave the stock and work off less, and all of them do where stock stands over a short end.
+    """
     tool, top = mill(0.6, 0.3, 1.8), 0.2 + 0.5 * lean * length
-    setup = ProofSetup(stock_kind="box", stock_box=np.array([[-2.0, -2.0, -1.0], [length + 2.0, 2.0, top]]))
+    first = -2.0 if stands == 1.0 else (1.0 - stands) * length
+    box = np.array([[first, -2.0, -1.0], [length + 2.0, 2.0, top]])
+    setup = ProofSetup(stock_kind="box", stock_box=box)
     run = np.linspace(0.0, length, 4)
     line = np.column_stack([run, np.zeros(4), -lean * run])
     for pass_ in (line, line[::-1].copy()):
-        way = way_down(pass_, False, top - line[:, 2].min(), tool, setup.ramp_angle, 1.0)
-        stock = blank(box_mesh([-2.0, -2.0, -1.0], [length + 2.0, 2.0, -0.9]), 0.02, setup)
+        way = way_down(pass_, False, top - line[:, 2].min(), tool, setup.ramp_angle, 1.0, stands)
+        stock = blank(box_mesh(box[0], [*box[1, :2], -0.9]), 0.02, setup)
         events = run_stock(stock, path(way), [tool], setup).events
-        assert not (events[:, 1] == PLUNGE).any(), (lean, length, events[events[:, 1] == PLUNGE, 2].max(initial=0.0))
+        assert not (events[:, 1] == PLUNGE).any(), events[events[:, 1] == PLUNGE, 2].max(initial=0.0)

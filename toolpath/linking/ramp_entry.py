@@ -19,12 +19,13 @@ RAMP_SHARE = 0.9  # of the steepest ramp allowed
 EASE_SHARE = 0.98  # of that ramp, for one move that catches up
 ROUNDING = 1.1e-4  # mm: on a move of a few um the rounding of Z in the program alone would be too steep
 LEANING = 0.5  # of the steepest ramp: a pass that leans more is gone down steeper than that where it goes down itself
-IN_CUT = 0.5  # of the way that works off what such a way down digs
+IN_CUT, LEAST_IN_CUT = 0.5, 0.25  # of the way that works off what such a way down digs
 MIN_RUN = 0.25  # radii, there and back on an open line: least length of a ramp
 MAX_LEGS = 400
 
 
-def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: float, care: float) -> F64 | None:
+def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: float, care: float,
+             stands: float = 1.0) -> F64 | None:
     """A pass with a way down from ``over`` above it: round the loop, or back and forth along its beginning.
 
     points : (n, 3) float64, mm, access frame, the pass
@@ -32,6 +33,7 @@ def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: floa
     over   : mm, height of the start of the way above the start of the pass
     angle  : rad, steepest descent of the tool
     care   : share of that angle and of a skin that is used
+    stands : share of the pass under stock, of the part that the way follows
 
     Returns
     -------
@@ -43,9 +45,9 @@ def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: floa
     Where the pass itself goes up or down, the ramp has less to descend by. Going downhill, a pass inclined by more than
     half of the ramp is dug into by all the height lost since the tool was there before. So what is lost between, D, is
     no more than the level or rising way works off: back and forth that is half of the way. Only way in the cut works
-    anything off, and the first ways leave the stock for a part of theirs, so ``IN_CUT`` of it counts. Over a pass with
-    the lean l the way in the cut grows by D / l each time. With a ramp t, what is dug and not worked off adds up to
-    D l / 2 t until it is long enough, so D is no more than a skin over 1 + l / 2 t.
+    anything off, and the first ways leave the stock for a part of theirs, so ``IN_CUT`` of what lies under stock
+    counts. Over a pass with the lean l the way in the cut grows by D / l each time. With a ramp t, what is dug and not
+    worked off adds up to D l / 2 t until it is long enough, so D is no more than a skin over 1 + l / 2 t.
     """
     slope, skin = steepest_ramp(angle, care), care * SKIN * tool.diameter
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1))])
@@ -58,7 +60,7 @@ def way_down(points: F64, closed: bool, over: float, tool: ToolBody, angle: floa
     if digs:
         level = _not_down(points, (1.0 / RAMP_SHARE - 1.0) * slope) if closed else 0.5
         lost = skin / (1.0 + 0.5 * lean / math.tan(angle))
-        rest = min(IN_CUT * slope * level, lost / (total if closed else 2.0 * leg))
+        rest = min(IN_CUT * max(stands, LEAST_IN_CUT) * slope * level, lost / (total if closed else 2.0 * leg))
     if rest <= 0.0:
         return None
     need, most = over / rest, math.tan(angle) * EASE_SHARE - (0.0 if digs else lean)

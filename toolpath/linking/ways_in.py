@@ -224,6 +224,13 @@ class WaysIn:
         """Most stock over tips (n, 3), mm, skins on the walls beside them included."""
         return float(self.stock.overlap(points, self.field.tool, LOOK_RIM).max())
 
+    def _under_stock(self, points: F64) -> float:
+        """Share of a polyline of tips (n, 3), mm, in plan, that has stock right over the tip."""
+        along = dense(points, LOOK_EVERY * self.field.tool.radius)
+        over = self.stock.overlap(along, self.field.tool, 1.0 - self.field.tool.radius / self.stock.lattice.step) > 0.0
+        length = np.hypot(*np.diff(along[:, :2], axis=0).T)
+        return float(length[over[:-1] | over[1:]].sum() / max(float(length.sum()), 1e-12))
+
     def _leads_onto(self, q: F64, start: F64) -> bool:
         """Whether the tool can go from a place straight across to a start of a cut as high, (3,) mm."""
         if not self.go.free_move(q[:2], start[:2], start[2]) or self.go.limit(q) > q[2] + LEVEL_TOLERANCE:
@@ -299,11 +306,13 @@ class WaysIn:
         """
         tool = self.field.tool
         care = self.found.care(tool, points)
-        slope = steepest_ramp(self.motions.ramp_angle, care)
-        if digs_down(points, closed, over, slope) and self._stands_over(
-                ramped_part(points, closed, over, slope)) > over:
-            return None
-        ramp = way_down(points, closed, over, tool, self.motions.ramp_angle, care)
+        slope, stands = steepest_ramp(self.motions.ramp_angle, care), 1.0
+        if digs_down(points, closed, over, slope):
+            part = ramped_part(points, closed, over, slope)
+            if self._stands_over(part) > over:
+                return None
+            stands = self._under_stock(part)
+        ramp = way_down(points, closed, over, tool, self.motions.ramp_angle, care, stands)
         if ramp is None or not within(self.stock, ramp[:len(ramp) - len(points) + 1], tool, self.engaged, self.found):
             return None
         return ramp

@@ -127,6 +127,8 @@ def test_a_leaning_line_is_not_begun_at_an_earlier_cut_beside_it_with_stock_over
     cut = link.ways.ramped(leaning.points, False)[1]
     dug, _ = digging(cut, cut[:, 0], 3.9)
     assert dug.max(initial=0.0) <= SKIN * ball(4.0).diameter
+    bare = np.sqrt(4.0 - 1.8**2)  # the hollow of the cut before is as wide as that at 3.1
+    assert link.ways._under_stock(leaning.points) == pytest.approx(1.0 - bare / 3.0, abs=0.2)
     level = link.ways.ramped(straight(14.0, 17.0, 15.0, 3.1).points, False)[1]
     assert level[0, 2] == pytest.approx(3.2)  # a tenth above
 
