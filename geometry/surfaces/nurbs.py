@@ -19,8 +19,7 @@ from numpy.typing import ArrayLike
 
 from geometry.array_checks import finite_points
 from geometry.errors import GeometryError
-from geometry.kernels.feet import search_feet
-from geometry.kernels.nurbs import heights_along, surface_values
+from geometry.kernels.nurbs import heights_along, search_feet, surface_values
 from geometry.mesh import F64, I32, TriangleMesh
 
 # Parameters may lie outside the knots by this share of their range, because of rounding.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from toolpath.kernels.skins import near
+from toolpath.kernels.leaning import near
 from toolpath.stock.residual_map import ResidualMap
 from zones.reach.assembly import Clearances, Disc
 

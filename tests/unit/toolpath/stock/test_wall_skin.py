@@ -10,7 +10,7 @@ from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, low_walls, plan_part
 from toolpath.five_axis.oriented_motion import LOADED, Surroundings, free_parts, in_turn
 from toolpath.five_axis.oriented_piece import Piece
-from toolpath.kernels.skins import near
+from toolpath.kernels.leaning import near
 from toolpath.passes.pass_family import FinishTarget
 from toolpath.plan_settings import CutData, PlanSettings, RotaryAxes
 from toolpath.planning.zone_finishing import Finish
