@@ -121,7 +121,7 @@ WITHOUT_INFLUENCE = {
         "MILLING_TOOL_DIMENSION.edge_radius": "of a ball; it is half the diameter",
         "PLANE_CL_STRATEGY.stepover": "for information beside an explicit path",
         "UV_STRATEGY.stepover": "for information beside an explicit path",
-        "SETUP.its_origin": "where the setup stands on the machine; paths are in the setup frame",
+        "SETUP.its_origin": "where the setup stands on the machine; paths are in the frame of the first setup",
         "SETUP_INSTRUCTION.description": "for people",
         "WORKPIECE.its_bounding_geometry": "the blank is that of the setup",
         "WORKPIECE.its_material": "for people",

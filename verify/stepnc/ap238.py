@@ -17,7 +17,7 @@ from geometry.errors import ProgramError
 from geometry.mesh import F64
 from verify.program.program import Remark
 from verify.program.turn_subdivision import TURN
-from verify.stepnc.ap238_attributes import EXECUTABLES, RECORDS, REPRESENTATIONS, SHAPES, TABLE, UNITS
+from verify.stepnc.ap238_attributes import EXECUTABLES, METHODS, RECORDS, REPRESENTATIONS, SHAPES, TABLE, UNITS
 from verify.stepnc.attribute_checks import FARTHEST, Checked, shown
 from verify.stepnc.curves import curve_points
 from verify.stepnc.iso14649 import sane_rates, shape_of, tool_number
@@ -86,6 +86,7 @@ class Ap238Reader:
         self.data = Checked(file, TABLE, RECORDS)
         self.properties = self._properties("ACTION_PROPERTY", "definition")
         self._check_properties()
+        self._check_relationships()
         self.units: dict[int, tuple[dict[str, float], float]] = {}
         self.scales: dict[int, float] = {}
         self.secure = self._security_plane()
@@ -156,6 +157,17 @@ class Ap238Reader:
                                                 f"{', '.join(_NAMES.get(entity, ())) or 'none'}")
                 if name in _SYMBOLS:
                     self._symbol(representation, _SYMBOLS[name])
+
+    def _check_relationships(self) -> None:
+        """Refuse what relates methods in a way that is not read: branches, and what is done at the same time."""
+        for entity, numbers in sorted(self.file.entities().items()):
+            if entity in TABLE or entity in RECORDS or not entity.endswith(("_RELATIONSHIP", "_METHOD")):
+                continue
+            for n in numbers:
+                for value in (v for _, values in self.file.records(n) for v in values):
+                    if isinstance(value, Ref) and self.file.has(value) and set(self.file.names(value)) & set(METHODS):
+                        raise self.file.error(n, f"is {entity}, which is not read; a control may do more than the "
+                                                 "sequence says", int(value))
 
     def _items(self, representation: int) -> list[int]:
         entity = self.data.get(representation, *REPRESENTATIONS, *SHAPES)[0]

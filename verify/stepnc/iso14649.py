@@ -152,6 +152,7 @@ TABLE: Table = {
     "B_SPLINE_SURFACE_WITH_KNOTS": attributes(**_NET, **_KNOTS),
     **CURVE_TABLE,
 }
+UPRIGHT = 1.0 - 1e-9  # cosine of the tilt of a setup
 RECORDS: Table = {
     "B_SPLINE_SURFACE": attributes(**{k: v for k, v in _NET.items() if k != "name"}),
     "B_SPLINE_SURFACE_WITH_KNOTS": attributes(**_KNOTS),
@@ -179,6 +180,7 @@ class Iso14649Reader:
         self.file, self.recorder = file, recorder
         self.data = Checked(file, TABLE, RECORDS)
         self.place = np.eye(4)
+        self.origin: tuple[bool, F64] | None = None
         self.elements: list[tuple[int, F64]] = []
         self.seen: set[int] = set()
 
@@ -200,6 +202,20 @@ class Iso14649Reader:
             self.place = place
             self._execute(k, number)
 
+    def _standing(self, setup: int) -> F64:
+        """(4, 4): transformation from a setup to the first one of the file, whose origin is program zero.
+
+        The part stays where it is clamped, so a setup whose origin is another place of the machine shifts the paths.
+        """
+        target = self.data.maybe(setup, "SETUP", "its_origin")
+        own = target is not None, np.eye(4) if target is None else self.data.placement(target)
+        if self.origin is None:
+            self.origin = own
+        if own[0] != self.origin[0]:
+            raise self.file.error(setup, ", its_origin: every setup of a file states its origin, or none does")
+        same = np.array_equal(self.origin[1], own[1])
+        return np.eye(4) if same else np.asarray(np.linalg.solve(self.origin[1], own[1]))
+
     def _flatten(self, number: int, place: F64) -> None:
         """List the elements of a workplan and of the workplans in it, with the frame of their workpiece."""
         if number in self.seen:
@@ -211,10 +227,12 @@ class Iso14649Reader:
         setup = self.data.maybe(number, "WORKPLAN", "its_setup")
         if setup is not None:
             plane = self.data.ref(setup, "SETUP", "its_secplane")
-            there = self.data.placement(self.data.ref(plane, "PLANE", "position"))
+            standing = self._standing(setup)
+            there = standing @ self.data.placement(self.data.ref(plane, "PLANE", "position"))
+            place = standing @ self._setup(setup)
             self.recorder.plane("security plane", there[:3, 3], there[:3, 2], self.file.line(setup))
         for element in self.data.refs(number, "WORKPLAN", "its_elements"):
-            self._flatten(element, place if setup is None else self._setup(setup))
+            self._flatten(element, place)
 
     def _setup(self, number: int) -> F64:
         """(4, 4): transformation from the workpiece to the setup frame."""
@@ -314,6 +332,9 @@ class Iso14649Reader:
             return None
         kind = self.data.get(target, *_AXES)[0]
         if kind == "THREE_AXES":
+            if self.origin is not None and self.origin[1][2, 2] < UPRIGHT:
+                raise self.file.error(number, ", its_tool_direction: THREE_AXES is Z of the machine, and its_origin of "
+                                              "the setup is tilted: the tool would lean")
             return np.array([0.0, 0.0, 1.0])
         if kind == "THREE_AXES_TILTED_TOOL":
             return self.data.vector(self.data.ref(target, kind, "its_tool_direction"))

@@ -296,6 +296,52 @@ def test_where_workpiece_and_feature_stand_is_heeded():
     assert np.allclose(b.end[keep], np.column_stack([-a.end[keep, 1], a.end[keep, 0], a.end[keep, 2]]) + [1, 2, 3])
 
 
+def _second_setup(text_: str, height: float, workpiece: float = 0.0) -> str:
+    """A file whose last workingstep has a setup of its own, its origin and its workpiece at heights, mm."""
+    steps, rest = re.findall(r"(?m)^#\d+=WORKPLAN\('setup[^']*',\(([^)]*)\),(#\d+,#\d+,\$)\);", text_)[0]
+    channel, setup = rest.split(",")[:2]
+    secplane = re.findall(rf"(?m)^{setup}=SETUP\('[^']*',#\d+,(#\d+),", text_)[0]
+    piece = re.findall(r"=WORKPIECE_SETUP\((#\d+),", text_)[0]
+    first, last = steps.rsplit(",", 1)
+    own = (f"#9001=CARTESIAN_POINT('',(0.,0.,{height:.4f}));\n#9002=AXIS2_PLACEMENT_3D('',#9001,$,$);\n"
+           f"#9003=CARTESIAN_POINT('',(0.,0.,{workpiece:.4f}));\n#9004=AXIS2_PLACEMENT_3D('',#9003,$,$);\n"
+           f"#9005=WORKPIECE_SETUP({piece},#9004,$,$,());\n#9006=SETUP('second',#9002,{secplane},(#9005));\n"
+           f"#9007=WORKPLAN('second',({last}),{channel},#9006,$);\nENDSEC;\nEND-")
+    return text_.replace(f"({steps})", f"({first},#9007)").replace(
+        "ENDSEC;\nEND-", own)
+
+
+def test_a_second_setup_shifts_paths_by_where_it_stands():
+    """Positions of a workpiece in two setups are those of the machine: setup by setup, workpiece in its setup."""
+    text_ = write_stepnc_arm(plan())
+    a, lower, same = (read_moves(t) for t in (text_, _second_setup(text_, -0.05), _second_setup(text_, -0.05, 0.05)))
+    assert np.allclose(lower.end[:20], a.end[:20])
+    assert np.allclose(lower.end[-5:-1], a.end[-5:-1] + [0.0, 0.0, -0.05])
+    assert np.allclose(same.end, a.end)
+
+
+def test_a_setup_that_stands_nowhere_or_tilted_is_refused():
+    text_ = _second_setup(write_stepnc_arm(plan()), 0.0)
+    with pytest.raises(ProgramError, match="every setup of a file states its origin"):
+        read_moves(text_.replace("#9006=SETUP('second',#9002,", "#9006=SETUP('second',$,"))
+    whole = write_stepnc_arm(tiny())
+    tilted = re.sub(r"(?m)^(#\d+=SETUP\('[^']*',)#\d+", r"\g<1>#9002", whole).replace(
+        "ENDSEC;\nEND-", "#9001=DIRECTION('',(0.,0.1,0.995));\n#9003=CARTESIAN_POINT('',(0.,0.,0.));\n"
+                         "#9002=AXIS2_PLACEMENT_3D('',#9003,#9001,$);\nENDSEC;\nEND-")
+    with pytest.raises(ProgramError, match="its_origin of the setup is tilted"):
+        read_moves(tilted)
+
+
+@pytest.mark.parametrize("entity", ["CONCURRENT", "BRANCH"])
+def test_workingsteps_beside_the_sequence_are_refused(entity):
+    """A control would run them too, or instead."""
+    text_ = write_stepnc_aim(tiny())
+    beside = re.sub(r"=MACHINING_PROCESS_SEQUENCE_RELATIONSHIP\(", f"=MACHINING_PROCESS_{entity}_RELATIONSHIP(", text_,
+                    count=1)
+    with pytest.raises(ProgramError, match=f"is MACHINING_PROCESS_{entity}_RELATIONSHIP, which is not read"):
+        read_moves(beside)
+
+
 def test_a_tool_is_known_by_its_number_or_its_size():
     text_ = write_stepnc_arm(tiny())
     nameless = text_.replace("MILLING_CUTTING_TOOL('T1: ball", "MILLING_CUTTING_TOOL('BALL_3MM: ball")
