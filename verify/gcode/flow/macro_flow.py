@@ -276,19 +276,27 @@ class MacroFlow:
 
     def _assignment(self, reading: ExpressionReader) -> Callable[[], int]:
         """Assignments to the end of the line; run, they give 0."""
-        parts: list[tuple[Value, Value]] = []
+        parts: list[tuple[Value, Value, str]] = []
         while reading.rest:
             target = reading.target()
             if target.number is None:
                 raise BlockError(f"#<{target.name}>: macros have numbered variables only")
             reading.take("=")
-            parts.append((target.number, reading.whole()))
+            start = reading.at
+            alone = ExpressionReader(reading.text, MACRO_GRAMMAR)
+            alone.at = start
+            alone.value()
+            value, copied = reading.whole(), reading.text[start] == "#" and alone.at == reading.at
+            parts.append((target.number, value, "" if copied else reading.text[start:reading.at].upper()))
             if reading.rest.startswith(","):
                 reading.take(",")
 
         def run() -> int:
-            for number, value in parts:
-                self.scope.put(self.scope.known(number(self.scope), "#"), value(self.scope))
+            for number, value, formula in parts:
+                found = value(self.scope)
+                if formula or not self.scope.emptied():  # controls count a vacant variable as 0 in a formula
+                    self.scope.known(found, formula or "an assignment")
+                self.scope.put(self.scope.known(number(self.scope), "#"), found)
             return 0
         return run
 

@@ -3,7 +3,7 @@
 #1 to #33 belong to one level of G65; #100 to #199 and #500 to #999 to the control. #0 and a local variable without a
 value are vacant, which EQ and NE tell from 0. A common variable keeps its value from the program before, so one that
 the program has not set is unknown, and reading it is an error that names it. A word whose variable is vacant is
-ignored; one that may be vacant, or an expression of it in a word, is an error too.
+ignored. One that may be vacant is an error too, and so is a formula of a vacant one, which controls count as 0.
 """
 
 from __future__ import annotations

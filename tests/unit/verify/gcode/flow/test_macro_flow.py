@@ -44,6 +44,7 @@ def test_local_calls_of_haas():
     ("G65 P20 I1. I2. I3.\nM30\nO20\nG1 X#4 Y#7 F100.\nX#10\nM99\n", [(1, 2), (3, 2)]),
     ("#1=7\nG65 P20 L2\nG1 X#1 F100.\nM30\nO20\n#1=2\nM99\n", [(7, 0)]),
     ("#1=#0\nG1 X5. Y#1 F100.\n#500=#0\nX6. Y#500\nM30\n", [(5, 0), (6, 0)]),
+    ("#1=#0\n#2=#1\n#3=#2\nG1 X5. Y#3 F100.\nM30\n", [(5, 0)]),
     ("G65 P20 X5.\nM30\nO20\nG1 X#24 Y#25 F100.\nX#0 Y2.\nM99\n", [(5, 0), (5, 2)]),
     ("DPRNT[X#5041[43]]\n#3006=1 (CHECK)\nG1 X1. F100.\nM30\n", [(1, 0)])])
 def test_macros_compute_and_branch(body, expected):
@@ -59,6 +60,10 @@ def test_macros_compute_and_branch(body, expected):
     ("M98\nM30\n", 8, "M98 without P"), ("M98 P20\nM30\nO20\nG1 X1. F100.\n", 11, "O20 ends without M99"),
     ("M98 P20\nM30\nO20\nM98 P20\nM99\n", 11, "more than 10 nested calls"),
     ("G1 X#100 F100.\nM30\n", 8, "#100 has no value"), ("G1 X#7 F100.\nM30\n", 8, "X#7 uses #7, which has no value"),
+    ("#1=#1-0.5\nG1 Z#1 F100.\nM30\n", 8, "#1-0.5 uses #1, which has no value"),
+    ("#1=#0\n#2=-#1\nM30\n", 9, "-#1 uses #1, which has no value"),
+    ("#2=#1\nG1 Z#2 F100.\nM30\n", 8, "an assignment uses #1, which has no value"),
+    ("G65 P20 X1.\nM30\nO20\n#26=#26*2.\nM99\n", 11, "#26*2. uses #26, which has no value"),
     ("#1=#5221\nM30\n", 8, "#5221 is a variable of the control"), ("#5221=3.\nM30\n", 8, "#5221 is a variable"),
     ("#3000=1 (NO TOOL)\nM30\n", 8, "stops here with an alarm"), ("GOTO 77\nM30\n", 8, "N77 is not in the program"),
     ("/GOTO 5\nN5 M30\n", 8, "a / before a statement"), ("/M98 P20\nM30\nO20\nM99\n", 8, "a / before M98"),
