@@ -310,3 +310,12 @@ def test_a_way_down_along_a_leaning_pass_is_no_plunge(lean, length, stands):
         stock = blank(box_mesh(box[0], [*box[1, :2], -0.9]), 0.02, setup)
         events = run_stock(stock, path(way), [tool], setup).events
         assert not (events[:, 1] == PLUNGE).any(), events[events[:, 1] == PLUNGE, 2].max(initial=0.0)
+
+
+def test_lines_stand_under_every_tool_that_only_goes_at_rapid():
+    """Its width and its clearance count: a thin probe without clearance could pass between lines at rapid."""
+    feed = np.array([True, False])
+    moves = Moves(np.zeros((2, 3)), np.ones((2, 3)), feed, np.array([0, 1], np.int32))
+    probe = replace(TOOL, diameter=0.1, number=2)
+    close = [stock_spacing(replace(SETUP, clearance_rapid=room), moves, [TOOL, probe]) for room in (0.0, 0.05, 1.0)]
+    assert close == pytest.approx([0.035, 0.07, SETUP.line_spacing])

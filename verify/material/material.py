@@ -119,15 +119,18 @@ def stock_spacing(setup: ProofSetup, moves: Moves, tools: Sequence[ToolBody]) ->
 
     A square lattice has a line in every circle of radius 1 / sqrt 2 of its spacing. Lines are twice as close, and nodes
     closer still, since an end may come down on rest material that is narrower than itself. An end with a narrow tip
-    counts as half its radius. A line stands in every core that does not cut.
+    counts as half its radius. A line stands in every core that does not cut. A tool that only goes at rapid counts with
+    its clearance.
     """
-    used = [tools[k] for k in np.unique(moves.tool[moves.feed])]
+    fed = np.unique(moves.tool[moves.feed])
+    carried = min((tools[k].radius + setup.clearance_rapid for k in np.setdiff1d(moves.tool, fed)), default=np.inf)
+    used = [tools[k] for k in fed]
     wide = np.maximum(end_radii(used, setup.tap_holes),
                       [0.5 * t.radius if t.cone_height > 0.0 else 0.0 for t in used])
     if moves.axes is not None:
-        return min(setup.line_spacing, NODES_APART * float(wide.min(initial=np.inf)))
+        return min(setup.line_spacing, NODES_APART * float(wide.min(initial=carried)))
     core = np.array([setup.cores[t.number] for t in used if setup.cores.get(t.number, 0.0) > 0.0])
-    return min(setup.line_spacing, LINES_APART * float(wide.min(initial=np.inf)),
+    return min(setup.line_spacing, LINES_APART * float(wide.min(initial=carried)),
                LINES_APART * float(core.min(initial=np.inf)))
 
 
