@@ -166,8 +166,8 @@ class Ap238Reader:
             for n in numbers:
                 for value in (v for _, values in self.file.records(n) for v in values):
                     if isinstance(value, Ref) and self.file.has(value) and set(self.file.names(value)) & set(METHODS):
-                        raise self.file.error(n, f"is {entity}, which is not read; a control may do more than the "
-                                                 "sequence says", int(value))
+                        raise self.file.error(n, "is not read; a control may do more than the sequence says",
+                                              int(value))
 
     def _items(self, representation: int) -> list[int]:
         entity = self.data.get(representation, *REPRESENTATIONS, *SHAPES)[0]
