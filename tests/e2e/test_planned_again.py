@@ -38,8 +38,9 @@ def steep(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Ways down are too steep where the plan takes no care."""
     right = ways_in.way_down
 
-    def way_down(points: Any, closed: bool, over: float, tool: Any, angle: float, care: float) -> Any:
-        return right(points, closed, over, tool, angle if care < 1.0 else TOO_STEEP * angle, care)
+    def way_down(points: Any, closed: bool, over: float, tool: Any, angle: float, care: float,
+                 stands: float) -> Any:
+        return right(points, closed, over, tool, angle if care < 1.0 else TOO_STEEP * angle, care, stands)
 
     monkeypatch.setattr(ways_in, "way_down", way_down)
     yield
