@@ -22,7 +22,7 @@ ROUNDS = 50
 REACH, CUTS = 0.25, 12
 # A step shorter than this share of the domain ends the search. The error of the distance is then of its square.
 ENOUGH = 1e-10
-ROUND = 1e-3  # of the determinant of the metric: a Hessian with less does not descend surely
+LEAST_DETERMINANT = 1e-3  # of the determinant of the metric: a Hessian with less does not descend surely
 
 
 @njit(**KERNEL)
@@ -164,7 +164,7 @@ def _step(d, x, y, z, at, low, high, out):
     huu = e + o0 * d[3, 0] + o1 * d[3, 1] + o2 * d[3, 2]
     huv = f + o0 * d[4, 0] + o1 * d[4, 1] + o2 * d[4, 2]
     hvv = g + o0 * d[5, 0] + o1 * d[5, 1] + o2 * d[5, 2]
-    if not (huu * hvv - huv * huv > ROUND * (e * g - f * f) and huu > 0.0):
+    if not (huu * hvv - huv * huv > LEAST_DETERMINANT * (e * g - f * f) and huu > 0.0):
         huu, huv, hvv = e, f, g
     huu, hvv = huu * (1.0 + 1e-12) + 1e-300, hvv * (1.0 + 1e-12) + 1e-300
     if held_u or held_v:  # a coordinate fixed at a border leaves the system of equations
