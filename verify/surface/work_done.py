@@ -301,7 +301,8 @@ def _sides(measured: Measured, few: SurfaceSamples, tried: INT, height: F64, row
 def _ways(few: SurfaceSamples, rows: INT, axes: F64, lift: float, cutting: Cutting) -> WaysOut:
     """Shortest ways out of the stock on some samples, (r,) index; axes : (k, 3) float64, unit; lift : mm.
 
-    Of more than ``MAX_WAYS`` samples an even share is followed; each other one gets the way of the nearest of its face.
+    Of more than ``MAX_WAYS`` samples an even share is followed; each other one gets the way of the nearest of its face, to
+    the same top: the plane square to that way at its end.
     """
     chosen = thinned(rows, MAX_WAYS)
     ways = ways_out(few.points[chosen], few.normals[chosen], axes, lift, MAX_WAY, cutting)
@@ -309,6 +310,7 @@ def _ways(few: SurfaceSamples, rows: INT, axes: F64, lift: float, cutting: Cutti
         return ways
     near = KeyedPoints(few.face[chosen].astype(np.int64), few.points[chosen])
     of = near.nearest(few.face[rows].astype(np.int64), few.points[rows])[:, 0]
-    none = of < 0
-    return WaysOut(np.where(none, np.inf, ways.length[of]), ways.direction[of],
+    none, direction = of < 0, ways.direction[of]
+    nearer = np.einsum("ij,ij->i", direction, few.points[rows] - few.points[chosen][of])
+    return WaysOut(np.where(none, np.inf, np.maximum(ways.length[of] - nearer, 0.0)), direction,
                    np.where(none, -1, ways.mover[of]).astype(np.int32))

@@ -12,6 +12,7 @@ from verify.model import Asked, FindingKind, NcProgram, ScoredSamples
 from verify.moves import Moves
 from verify.program_reading import read_one
 from verify.prove import prove
+from verify.surface import work_done
 from verify.surface.asked_faces import Cutting, thinned
 from verify.surface.ways_out import ways_out
 from verify.surface.work_done import cutting_axes
@@ -71,6 +72,13 @@ def test_an_offset_upwards_is_as_high_as_it_is_on_the_floor(by):
     assert all(f.depth <= by + 1e-6 for f in found), "the foot of a wall is as high as the floor"
     if by > 0.3:
         assert all(f.depth > 0.97 * by for f in found), "not only somewhat up it"
+
+
+def test_samples_whose_way_is_not_followed_count_up_to_the_top_of_their_neighbour(monkeypatch):
+    monkeypatch.setattr(work_done, "MAX_WAYS", 40)
+    found = of(run(raised(program(), 2.0)))
+    assert {f.face for f in found} == {f"F{n}" for n in (*WALLS, FLOOR)}
+    assert all(0.97 * 2.0 < f.depth <= 2.0 + 1e-6 for f in found)
 
 
 def test_an_offset_aside_is_as_high_as_it_is_on_the_wall_that_it_leaves():
