@@ -196,11 +196,15 @@ class SiemensReader(SiemensCalls):
         if text.startswith("MCALL"):
             line.modal, reader.at = True, len("MCALL")
             self.cycle = None
+        others = ""  # what is not the setting of a variable
         while True:
             reader.skip()
             if reader.at >= len(text):
                 break
+            begin, sets = reader.at, len(line.set_here)
             self._word(reader, line)
+            others += " " if len(line.set_here) > sets else text[begin:reader.at]
+        _check_order(line, others)
         if line.change:  # T and D may stand behind M6
             stated = [w for w in line.out if w.startswith(("G43 H", "G49"))]
             line.out = [w for w in line.out if w not in stated]
@@ -249,7 +253,11 @@ class SiemensReader(SiemensCalls):
         reader.at = behind
         index = reader.index()
         reader.need("=")
-        return self.variables.put(name, index, reader.value())
+        return self._set(name, index, reader, line)
+
+    def _set(self, name: str, index: tuple[int, ...], reader: ValueReader, line: Line) -> None:
+        self.variables.put(name, index, reader.value())
+        line.set_here.append(name)
 
     def _system(self, name: str, reader: ValueReader, at: int) -> None:
         if not _HARMLESS.match(name):
@@ -347,7 +355,7 @@ class SiemensReader(SiemensCalls):
         if name.startswith("$"):
             return self._system(name, reader, reader.at)
         if re.fullmatch(r"R[0-9]+", name) or self.variables.known(name):
-            return self.variables.put(name, (), reader.value())
+            return self._set(name, (), reader, line)
         if name in REFUSED:
             raise BlockError(f"{name}= ({REFUSED[name]}) is not followed")
         if name == "OVR":
@@ -547,6 +555,17 @@ class SiemensReader(SiemensCalls):
         if self.cycle is not None and self.moved and "G53" not in line.out:
             blocks += self._cycle_there(line)
         return blocks
+
+
+def _check_order(line: Line, others: str) -> None:
+    """Refuse a block that sets a variable and reads it in a word of another kind, such as X=R1.
+
+    Whether the word takes the old value or the new one is not stated; SINUMERIK 802D asks for blocks of their own.
+    """
+    for name in line.set_here:
+        if re.search(rf"(?<![A-Z_0-9$]){re.escape(name)}(?![A-Z_0-9])", others):
+            raise BlockError(f"{name} is set and read in one block: the move may take the old or the new value",
+                             f"set {name} in a block of its own before")
 
 
 __all__ = ["ZEROS", "SiemensReader", "is_siemens"]

@@ -25,6 +25,7 @@ class Line:
     out, before, after : words of the block, blocks before it and after it
     places : X, Y, Z, A, B, C as written, with their kind ('', AC, IC, ...); centre : I, J, K in the same way
     values : other names with a number; codes : G words
+    set_here : names of variables that the block sets
     """
 
     out: list[str] = field(default_factory=list)
@@ -35,6 +36,7 @@ class Line:
     values: dict[str, float] = field(default_factory=dict)
     kinds: dict[str, str] = field(default_factory=dict)
     codes: list[int] = field(default_factory=list)
+    set_here: list[str] = field(default_factory=list)
     frame: str = ""
     modal: bool = False
     change: bool = False

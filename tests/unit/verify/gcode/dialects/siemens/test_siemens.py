@@ -114,6 +114,18 @@ def test_a_loop_without_end_is_bounded(monkeypatch):
     assert refused.value.code == "program_too_long" and refused.value.limit == 1000
 
 
+@pytest.mark.parametrize("block", ["R1=5 G1 Z=R1", "G1 Z=-R1 R1=5", "R1=5 G1 X=AC(R1*2)", "R[1]=5 G1 X=R[1]",
+                                   "DEPTH=5 G1 Z=DEPTH", "R1=5 F=R1 X1"])
+def test_a_variable_is_not_set_and_read_in_one_block(block):
+    with pytest.raises(ProgramError, match="is set and read in one block"):
+        read(f"DEF REAL DEPTH\nR1=1 R11=2\n{block}", "siemens")
+
+
+def test_a_block_that_sets_a_variable_may_read_others_and_set_more():
+    p = read("R1=2 R11=3\nR1=5 R2=R1+1 G1 X=R11 F100\nG1 X=R1 Y=R2", "siemens")
+    assert p.end[-2:, 0].tolist() == [3.0, 5.0] and p.end[-1, 1] == 6.0
+
+
 @pytest.mark.parametrize("loop", ["AA: R1=1\nGOTOB AA", "AA: G1 X10 F100\nG1 X0\nGOTOB AA",
                                   "R1=1\nGOTOS\nIF R1==2 GOTOS"])
 def test_a_jump_back_that_finds_all_as_it_was_has_no_end(loop):
