@@ -301,8 +301,8 @@ def _sides(measured: Measured, few: SurfaceSamples, tried: INT, height: F64, row
 def _ways(few: SurfaceSamples, rows: INT, axes: F64, lift: float, cutting: Cutting) -> WaysOut:
     """Shortest ways out of the stock on some samples, (r,) index; axes : (k, 3) float64, unit; lift : mm.
 
-    Of more than ``MAX_WAYS`` samples an even share is followed; each other one gets the way of the nearest of its face, to
-    the same top: the plane square to that way at its end.
+    Of more than ``MAX_WAYS`` samples an even share is followed; each other one gets the way of the nearest of its face,
+    to the same top: the plane square to that way at its end.
     """
     chosen = thinned(rows, MAX_WAYS)
     ways = ways_out(few.points[chosen], few.normals[chosen], axes, lift, MAX_WAY, cutting)

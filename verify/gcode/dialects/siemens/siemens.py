@@ -20,8 +20,9 @@ from verify.gcode.dialects.orientation import needed
 from verify.gcode.dialects.siemens.siemens_calls import SiemensCalls
 from verify.gcode.dialects.siemens.siemens_cycles import DrillingCall
 from verify.gcode.dialects.siemens.siemens_expressions import MAX_ELEMENTS, Value, ValueReader, Variables, arguments
-from verify.gcode.dialects.siemens.siemens_flow import LABEL, NUMBERED, PLAIN, SiemensFlow, statement
+from verify.gcode.dialects.siemens.siemens_flow import SiemensFlow
 from verify.gcode.dialects.siemens.siemens_moves import CURVES, Line
+from verify.gcode.dialects.siemens.siemens_sections import LABEL, NUMBERED, PLAIN, statement
 from verify.gcode.dialects.siemens.siemens_words import (
     COMPRESSORS,
     ENVELOPES,

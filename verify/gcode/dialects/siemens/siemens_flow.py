@@ -1,7 +1,6 @@
 """The order in which the lines of a Siemens program run: subprograms, repeats, jumps, conditions and loops.
 
-A file holds one program, or several: each begins with ``%_N_NAME_MPF``, ``%_N_NAME_SPF`` or ``PROC NAME``. A call is
-followed into a program of the same file. Loops and jumps are bounded by ``MAX_JUMPS``.
+A call is followed into a program of the same file (``siemens_sections``). Loops and jumps are bounded by ``MAX_JUMPS``.
 """
 
 from __future__ import annotations
@@ -13,19 +12,18 @@ from dataclasses import dataclass, field
 from verify.gcode.block_words import BlockError
 from verify.gcode.dialects.base import Jumps, Machine
 from verify.gcode.dialects.siemens.siemens_expressions import Value, ValueReader, Variables, same
+from verify.gcode.dialects.siemens.siemens_sections import (
+    PLAIN,
+    Section,
+    body_of,
+    find_sections,
+    label_lines,
+    statement,
+)
 
 MAX_JUMPS = 200_000
 MAX_CALLS = 16
 """Nested calls that the control runs."""
-NUM = r"[+-]?(?:[0-9]{1,8}(?:\.[0-9]*)?|\.[0-9]+)"
-PLAIN = re.compile(rf"(?:N[0-9]+ ?)?(?:G[01] ?)?(?:[XYZABC]{NUM} ?)*(?:F{NUM} ?)?\r?")
-"""A straight move without anything else."""
-NUMBERED = re.compile(r"(?:N|:)[0-9]+\s*")
-_NUMBERED_LINE = re.compile(r"\s*N([0-9]{1,9})(?![0-9])", re.IGNORECASE)
-LABEL = re.compile(r"(?:(?:N|:)[0-9]+\s*)?([A-Z_]{2}[A-Z_0-9]*):(?!=)\s*")
-_SECTION = re.compile(r"%_N_([A-Z_0-9]+?)(?:_(?:MPF|SPF|CYC))?\s*(?:;.*)?", re.IGNORECASE)
-_PROC = re.compile(r"PROC\s+([A-Z_][A-Z_0-9]*)\s*(?:\((.*?)\))?\s*([A-Z ]*)")
-_PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL|CHAR|STRING\s*\[\s*[0-9]+\s*\])\s+([A-Z_][A-Z_0-9]*)\s*(?:=\s*(.+))?")
 _KEYWORD = re.compile(r"(IF|ELSE|ENDIF|WHILE|ENDWHILE|FOR|ENDFOR|LOOP|ENDLOOP|REPEATB|REPEAT|UNTIL|CASE|GOTOF|GOTOB"
                       r"|GOTOC|GOTOS|GOTO|RET|M17|EXTCALL|PCALL|ISOCALL|CALLPATH|CALL|PROC|ENDPROC|EXTERN|MCALL)(?![A-Z_0-9=(])|"
                       r"(IF|WHILE|UNTIL|CASE|EXTCALL|PCALL|RET|CALLPATH)(?=\()")
@@ -35,36 +33,6 @@ _DECIDES = re.compile(r"(?<![A-Z_0-9$])(IF|CASE|WHILE|UNTIL|GOTO[FBC]?)(?![A-Z_0
 Steps = Generator[tuple[int, str], None, int]
 """Lines to run, and the line that follows them."""
 _OPENS = {"WHILE": "ENDWHILE", "FOR": "ENDFOR", "LOOP": "ENDLOOP", "REPEAT": "UNTIL", "IF": "ENDIF"}
-
-
-def statement(raw: str) -> str:
-    """A line without its comment, upper case outside of quotes, blanks stripped."""
-    if ";" not in raw and '"' not in raw:
-        return raw.upper().strip()
-    out, quoted = [], False
-    for part in re.split(r'(")', raw):
-        if part == '"':
-            quoted = not quoted
-            out.append(part)
-            continue
-        before, comment, _ = (part, "", "") if quoted else part.partition(";")
-        out.append(before if quoted else before.upper())
-        if comment:
-            break
-    return "".join(out).strip()
-
-
-@dataclass(frozen=True)
-class Section:
-    """One program of the file: lines ``first`` to ``end`` (not included), its parameters and attributes.
-
-    parameters : type, name, default and whether the caller's variable changes too
-    """
-
-    first: int
-    end: int
-    parameters: tuple[tuple[str, str, str, bool], ...] = ()
-    saves: bool = False
 
 
 @dataclass
@@ -135,7 +103,7 @@ class SiemensFlow:
                 continue
             text = statement(raw)
             self.machine.log.pass_line(at + 1)
-            head, body = _body(text)
+            head, body = body_of(text)
             if body and (m := _KEYWORD.match(body)):
                 word = m[1] or m[2]
                 if head.startswith("/"):
@@ -229,7 +197,7 @@ class SiemensFlow:
     def _find(self, name: str, ranges: Sequence[range]) -> int | None:
         """The line of a label or block number that comes first in one of the ranges."""
         if self._labels is None:
-            self._labels = _label_lines(self.lines)
+            self._labels = label_lines(self.lines)
         places = self._labels.get(f"N{int(name[1:])}" if name[0] == "N" and name[1:].isdigit() else name, [])
         for lines in ranges:
             found = [k for k in places if k in lines]
@@ -276,7 +244,7 @@ class SiemensFlow:
             self.variables.put(name, index, reader.number())
             return at + 1 if self._counts(reader, name, index) else pair["end"] + 1
         if word == "ENDFOR":
-            _, body = _body(statement(self.lines[pair["start"]]))
+            _, body = body_of(statement(self.lines[pair["start"]]))
             begun = ValueReader(body, self.variables, len("FOR"))
             name, index = self._counter(begun)
             begun.need("=")
@@ -366,13 +334,13 @@ class SiemensFlow:
             self._paired.add(section.first)
             self._match(section)
         if at not in self.pairs:
-            raise BlockError(f"'{_body(statement(self.lines[at]))[1][:30]}' has no counterpart in this program")
+            raise BlockError(f"'{body_of(statement(self.lines[at]))[1][:30]}' has no counterpart in this program")
         return self.pairs[at]
 
     def _match(self, section: Section) -> None:
         open_: list[tuple[str, dict[str, int], int]] = []
         for k in range(section.first, section.end):
-            m = _KEYWORD.match(body) if (body := _body(statement(self.lines[k]))[1]) else None
+            m = _KEYWORD.match(body) if (body := body_of(statement(self.lines[k]))[1]) else None
             word = (m[1] or m[2]) if m else ""
             if word in _OPENS and not (word == "IF" and "GOTO" in body) and not (word == "REPEAT" and body != word):
                 open_.append((word, {"start": k}, k))
@@ -465,83 +433,4 @@ class SiemensFlow:
         return frame.back
 
 
-@dataclass
-class _Head:
-    """The head of a program: its line, its names, and what its PROC says."""
-
-    first: int
-    names: list[str]
-    proc: bool = False
-    parameters: tuple[tuple[str, str, str, bool], ...] = ()
-    saves: bool = False
-
-
-def _label_lines(lines: Sequence[str]) -> dict[str, list[int]]:
-    """Lines by their label, and by their block number without leading zeros (N10)."""
-    out: dict[str, list[int]] = {}
-    for k, raw in enumerate(lines):
-        if m := _NUMBERED_LINE.match(raw):
-            out.setdefault(f"N{int(m[1])}", []).append(k)
-        if ":" in raw and (m := LABEL.match(statement(raw))):
-            out.setdefault(m[1], []).append(k)
-    return out
-
-
-def _body(text: str) -> tuple[str, str]:
-    """A statement without its skip sign, block number and label: (the sign, the rest)."""
-    head = ""
-    if text.startswith("/"):
-        m = re.match(r"/[0-9]?\s*", text)
-        head = m[0] if m else ""
-    rest = text[len(head):]
-    if m := LABEL.match(rest):
-        return head, rest[m.end():]
-    m = NUMBERED.match(rest)
-    return head, rest[m.end():] if m else rest
-
-
-def find_sections(lines: Sequence[str]) -> dict[str, Section]:
-    """Programs of a file by name; '' is the first, which runs.
-
-    Raises
-    ------
-    BlockError
-        Two programs have one name, or the head of one cannot be read.
-    """
-    heads: list[_Head] = []
-    for k, raw in enumerate(lines):
-        m = _SECTION.fullmatch(raw.strip()) if raw[:1] == "%" else None
-        if m:
-            heads.append(_Head(k, [m[1].upper()]))
-        elif "PROC" in raw.upper() and (p := _PROC.match(_body(statement(raw))[1])):
-            if not heads or heads[-1].proc or any(statement(x) for x in lines[heads[-1].first + 1:k]):
-                heads.append(_Head(k, []))
-            heads[-1].names.append(p[1])
-            heads[-1].proc, heads[-1].parameters = True, _parameters(p[2] or "")
-            heads[-1].saves = "SAVE" in (p[3] or "").split()
-    if not heads or any(statement(x) for x in lines[:heads[0].first]):
-        heads.insert(0, _Head(0, []))
-    out: dict[str, Section] = {}
-    for n, head in enumerate(heads):
-        end = heads[n + 1].first if n + 1 < len(heads) else len(lines)
-        section = Section(head.first + (n > 0 or bool(head.names)), end, head.parameters, head.saves)
-        if n == 0:
-            out[""] = section
-        for name in set(head.names):
-            if name in out:
-                raise BlockError(f"two programs of the file have the name {name}")
-            out[name] = section
-    return out
-
-
-def _parameters(text: str) -> tuple[tuple[str, str, str, bool], ...]:
-    out = []
-    for part in filter(None, (p.strip() for p in text.split(","))):
-        m = _PARAMETER.fullmatch(part)
-        if m is None:
-            raise BlockError(f"cannot read the parameter '{part[:40]}' of PROC")
-        out.append((m[2].split("[")[0].strip(), m[3], m[4] or "", bool(m[1])))
-    return tuple(out)
-
-
-__all__ = ["LABEL", "NUMBERED", "PLAIN", "SiemensFlow", "find_sections", "statement"]
+__all__ = ["SiemensFlow"]
