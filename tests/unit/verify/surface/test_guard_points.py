@@ -24,6 +24,7 @@ from verify.surface.guard_points import (
 )
 
 RADIUS = 15.0
+QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _on_sphere(off: float):
@@ -32,6 +33,10 @@ def _on_sphere(off: float):
     x, y = (a.ravel() for a in np.meshgrid(g, g))
     n = np.column_stack([x, y, np.sqrt(RADIUS**2 - x**2 - y**2)]) / RADIUS
     return n * (RADIUS + off) - [0.0, 0.0, RADIUS], n
+
+
+def about_z(angle):
+    return np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
 
 
 @pytest.mark.parametrize("off", [0.0, -0.0006])
@@ -52,6 +57,20 @@ def test_a_ray_from_rim_to_rim_over_a_hollow_is_out_of_the_part(side):
     assert gouge_depths(tree, points, normals, np.full(500, 20.0)).max() < 1e-3
     depth = gouge_depths(tree, points - [0.0, 0.0, 4.0], normals, np.full(500, 0.5))
     np.testing.assert_allclose(depth, 0.5, atol=5e-3)
+
+
+def test_a_gouge_along_the_bisector_of_an_edge_is_as_deep_as_under_both_faces():
+    """Both faces are as near all the way: rounding decided where their chords cross, at times beyond the cut."""
+    box, rng = box_mesh([-10, -10, 0], [10, 10, 6]), np.random.default_rng(5)
+    for angle in rng.uniform(0.0, 6.3, 100):
+        turn = about_z(angle)
+        tree = TriangleTree(TriangleMesh(box.vertices @ turn.T, box.faces))
+        for side in (np.linalg.matrix_power(QUARTER, k) for k in range(4)):
+            places = np.column_stack([np.full(100, 10.0), rng.uniform(-9.0, 9.0, 100), np.full(100, 6.0)])
+            normals = np.tile(np.array([1.0, 0.0, 1.0]) / np.sqrt(2.0) @ side.T @ turn.T, (100, 1))
+            along = rng.uniform(0.01, 1.0, 100)
+            np.testing.assert_allclose(gouge_depths(tree, places @ side.T @ turn.T, normals, along),
+                                       along / np.sqrt(2.0), rtol=5e-3, atol=1e-4)
 
 
 @pytest.mark.parametrize("lost", ["a facet of the top", "the top", "nothing"])
