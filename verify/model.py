@@ -196,6 +196,15 @@ class Touch(Protocol):
         """
         ...
 
+    def edges(self, samples: SurfaceSamples, tools: Sequence[ToolBody], axes: F64, lift: float) -> NDArray[np.bool_]:
+        """Samples that the sharp edge of a flat end touches along some axis: it finishes them in steps alone.
+
+        samples, axes, lift : as for ``reaches``
+
+        Returns (n,) bool.
+        """
+        ...
+
     def reasons(self, samples: SurfaceSamples, tools: Sequence[ToolBody], axes: F64) -> NDArray[np.object_]:
         """Why no tool touches samples: words of the remainder.
 

@@ -77,6 +77,21 @@ class ToolTouch:
             out[rows] = one.reached(samples.subset(rows), axes).any(axis=1)
         return out
 
+    def edges(self, samples: SurfaceSamples, tools: Sequence[ToolBody], axes: F64, lift: float) -> BOOL:
+        """Samples that the sharp edge of a flat end touches along some axis: it finishes them in steps alone.
+
+        samples, axes, lift : as for ``reaches``
+
+        Returns (n,) bool.
+        """
+        out = np.zeros(len(samples), np.bool_)
+        for tool in (t for t in tools if t.corner_radius <= 0.0 and not t.named):
+            rows = np.flatnonzero(~out)
+            out[rows] = approach(self.obstacles, tool, self.inputs.clearances, samples.points[rows],
+                                 samples.normals[rows], axes, lift,
+                                 self.inputs.quality.stock_allowance_mm).any(axis=1)
+        return out
+
     def reasons(self, samples: SurfaceSamples, tools: Sequence[ToolBody], axes: F64) -> NDArray[np.object_]:
         """Why no tool touches samples: 'undercut', 'fixture', 'holder', 'shank', 'sharp corner' or 'corner'.
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from geometry.mesh import F64, I32
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
@@ -45,6 +46,8 @@ MAX_WAY = 12.0  # mm, longest such way
 LIFT_SHARE = 0.1  # of h: distance at which a tool on an open face touches a sample
 CORNER_SHARE = 0.5  # of h: the same in a corner
 UPRIGHT = float(np.sin(np.radians(3.0)))  # share of the axis in the normal up to which a face counts as a wall
+STEPS_WITHIN = 0.5  # mm: stock is even to the scallop height within this where steps are fine
+LEAST_NEAR = 4  # samples that must lie there
 MAX_AXES = 24
 SAME_AXIS = float(np.radians(0.01))
 NOT_IN_PROGRAM, LEFT = "not_in_program", "pass"  # words of the remainder
@@ -96,6 +99,8 @@ def work_done(asked: Asked, measured: Measured, cutting: Cutting, cut: BOOL, sou
        from stock that other faces may keep.
     2. A tool without such room comes within h / 2 of it, and more than 1.5 h + e stands on it, along the normal and
        along the shortest way out. Of stock that a drill or tap left, the depth that it must still go counts instead.
+       The sharp edge of a flat end comes near a slope in this sense where the stock there is even to h, as the fine
+       steps leave it that finish a slope.
 
     Beside a place of the same face that is cut, stock of which a way out is h + e or shorter is none.
     """
@@ -198,6 +203,9 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     tight = high[~left[high]]
     touched = tight[reached(tight, limits.near, 0.0)]
     beyond = np.setdiff1d(tight, touched)
+    stepped = beyond[_in_fine_steps(few, height, beyond, limits)]
+    touched = np.union1d(touched, stepped[asked.touch.edges(few.subset(stepped), tools, axes, limits.near)])
+    beyond = np.setdiff1d(beyond, touched)
     why[beyond] = asked.touch.reasons(few.subset(beyond), tools, axes)
     deep = _missing_depths(few, touched, mover, axes, limits.lift, cutting)
     corner = np.zeros(len(tried), np.bool_)
@@ -216,6 +224,23 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     height[rows], mover[rows], direction[rows] = (a[deep.found] for a in (deep.length, deep.mover, deep.direction))
     direction -= np.einsum("ij,ij->i", direction, few.normals)[:, None] * few.normals
     return StandingStock(np.where(np.isfinite(height), height, MAX_WAY), mover, direction), left, why
+
+
+def _in_fine_steps(few: SurfaceSamples, height: F64, rows: INT, limits: _Limits) -> BOOL:
+    """Whether the stock round some samples, (r,) index, is even to the scallop height, as fine steps leave it.
+
+    height : (n,) float64, mm over the allowance, at all samples
+    """
+    out = np.zeros(len(rows), np.bool_)
+    for face in np.unique(few.face[rows]).tolist():
+        known = np.flatnonzero((few.face == face) & np.isfinite(height))
+        mine = np.flatnonzero(few.face[rows] == face)
+        if not len(known):
+            continue
+        around = cKDTree(few.points[known]).query_ball_point(few.points[rows[mine]], STEPS_WITHIN)
+        out[mine] = [len(near) >= LEAST_NEAR and bool(np.ptp(height[known[near]]) <= limits.h + 2.0 * limits.error)
+                     for near in around]
+    return out
 
 
 @dataclass(frozen=True, eq=False)

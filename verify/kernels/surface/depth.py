@@ -31,7 +31,7 @@ def _bound(corners, p, n, a, b):
     """What the distance to the mesh cannot exceed between two places (t, distance, triangle), and t where it may be."""
     if a[2] == b[2]:
         return max(a[1], b[1]), b[0]
-    # the chord of a's triangle rises over the other by this at b, that of b's over a's at a; rounding may say less than 0
+    # the chord of a's triangle rises over the other by this at b, that of b's over a's at a; rounding may make it < 0
     at_a = max(_gap(corners, b[2], p, n, a[0]) - a[1], 0.0)
     beyond = max(_gap(corners, a[2], p, n, b[0]), b[1])
     at_b = beyond - b[1]

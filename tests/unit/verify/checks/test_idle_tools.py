@@ -23,6 +23,9 @@ class Nothing:
     def reaches(self, samples, tools, axes, lift, room):
         return np.zeros(len(samples), np.bool_)
 
+    def edges(self, samples, tools, axes, lift):
+        return np.zeros(len(samples), dtype=bool)
+
     def reasons(self, samples, tools, axes):
         return np.full(len(samples), "corner", dtype=object)
 

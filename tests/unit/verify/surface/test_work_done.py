@@ -32,6 +32,9 @@ class Everything:
         corner = (np.abs(samples.points[:, 0]) > 8) & (np.abs(samples.points[:, 1]) > 4) & (samples.face > TOP)
         return ~np.isin(samples.face, self.without) & ~corner
 
+    def edges(self, samples, tools, axes, lift):
+        return np.zeros(len(samples), dtype=bool)
+
     def reasons(self, samples, tools, axes):
         return np.full(len(samples), "corner", dtype=object)
 
