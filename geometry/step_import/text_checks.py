@@ -50,6 +50,7 @@ class StepText:
     uncertainty : length uncertainty in units of the file, None when the file names none
     has_unit    : the text declares a length unit
     products    : names of products
+    encoding    : of its text: 'utf-8', or 'cp1252' where it is none; some systems write no escapes
     product_count : statements that define a product
     """
 
@@ -59,6 +60,7 @@ class StepText:
     has_unit: bool
     products: tuple[str, ...]
     product_count: int
+    encoding: str
 
 
 def check_text(path: str | Path, *, max_bytes: int = MAX_BYTES) -> StepText:
@@ -78,8 +80,9 @@ def check_text(path: str | Path, *, max_bytes: int = MAX_BYTES) -> StepText:
     if len(data) <= REFERENCE_CHECK_BYTES:
         _check_references(bare)
     uncertainty = [float(x) for x in _UNCERTAINTY.findall(bare) if _is_positive(x)]
+    encoding = _encoding(data)
     products = tuple(dict.fromkeys(
-        name.decode("latin-1") for pair in _PRODUCT.findall(data) for name in pair if name.strip()))
+        name.decode(encoding, "replace") for pair in _PRODUCT.findall(data) for name in pair if name.strip()))
     return StepText(
         sha256=hashlib.sha256(data).hexdigest(),
         faces=len(_FACE.findall(bare)),
@@ -87,7 +90,16 @@ def check_text(path: str | Path, *, max_bytes: int = MAX_BYTES) -> StepText:
         has_unit=b"LENGTH_UNIT" in bare,
         products=products,
         product_count=len(_PRODUCT_START.findall(bare)),
+        encoding=encoding,
     )
+
+
+def _encoding(data: bytes) -> str:
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8"
 
 
 def _read(path: Path, max_bytes: int) -> bytes:

@@ -21,6 +21,7 @@ UNITS = {
     "micrometre": ("um", 1e-3), "inch": ("inch", 25.4), "foot": ("foot", 304.8), "mil": ("mil", 0.0254),
     "mile": ("mile", 1609344.0), "microinch": ("microinch", 2.54e-5),
 }
+CODEPAGES = {"utf-8": "UTF8", "cp1252": "CP1252"}  # names the kernel gives to encodings
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,7 @@ def read_shape(path: str | Path) -> StepShape:
     placing = assembly_reader() if text.product_count > 1 else None
     reader = placing.ChangeReader() if placing else STEPControl_Reader()
     Interface_Static.SetCVal_s("xstep.cascade.unit", "MM")
+    Interface_Static.SetCVal_s("read.step.codepage", CODEPAGES[text.encoding])
     if (placing or reader).ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
         raise StepError("the CAD kernel cannot parse the STEP file", code="unreadable_step",
                         remedy="export the part again, as AP214 or AP242")

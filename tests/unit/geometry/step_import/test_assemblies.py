@@ -55,6 +55,13 @@ def test_products_of_an_assembly_are_separate_and_named(tmp_path):
     assert "part.solid: N" in found.remedy and "part.fuse: true" in found.remedy
 
 
+@pytest.mark.parametrize("written", ["Pl\u00e4tte".encode(), b"Pl\xe4tte", b"Pl\\X2\\00E4\\X0\\tte"])
+def test_names_are_read_as_they_were_written(tmp_path, written):
+    path = plate_and_bolt(tmp_path / "asm.step")
+    path.write_bytes(path.read_bytes().replace(b"'plate'", b"'" + written + b"'"))
+    assert "solid 1 (Pl\u00e4tte" in refused(path).message
+
+
 @pytest.mark.skipif(not CASE.is_file(), reason="the collection of cases (../shared/cases) is not here")
 def test_the_bolt_in_a_plate_of_the_cases_is_refused_chosen_and_fused():
     found = refused(CASE)
