@@ -199,7 +199,9 @@ class Touch(Protocol):
     def edges(self, samples: SurfaceSamples, tools: Sequence[ToolBody], axes: F64, lift: float) -> NDArray[np.bool_]:
         """Samples that the sharp edge of a flat end touches along some axis: it finishes them in steps alone.
 
-        samples, axes, lift : as for ``reaches``
+        samples : SurfaceSamples, frame of the proof
+        axes    : (k, 3) float64, unit, tip to spindle, frame of the proof
+        lift    : mm, distance from the sample along its normal within which a touch counts, over the allowance
 
         Returns (n,) bool.
         """
