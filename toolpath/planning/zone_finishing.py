@@ -303,8 +303,9 @@ class Finish:
         return self.settings.found.aims(self.zone.id, aim, len(self.checks.points))
 
     def _groups(self, k: int, failing: NDArray[np.int64]) -> list[list[Line]]:
-        if k > REFINEMENTS:
-            return [touch_points.touches(self.field, self.checks.tips[failing], self.checks.normals[failing])]
+        if k > REFINEMENTS:  # where stock is in the way of neck, shank or holder, passes come once it is gone
+            free = failing[~self.stock.meets_bodies(self.checks.tips[failing], self.field.discs)]
+            return [touch_points.touches(self.field, self.checks.tips[free], self.checks.normals[free])]
         every = np.arange(len(self.checks.points))
         # a band has levels of its own, which go no deeper than it does
         whole = (k == 0 and not self.strategy.ordered and not self.settings.planes

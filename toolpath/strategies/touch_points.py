@@ -17,13 +17,14 @@ from scipy.spatial import cKDTree
 from geometry.mesh import F64
 from toolpath.lines import Line
 from toolpath.passes.contours import moves_free
+from toolpath.strategies.zigzag import STEEP
 from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 MAX_PLACES = 400  # a zone with more is not just missing a few spots
 APART = 0.1  # mm, places nearer than this are one
 SHORT = 0.02  # mm, length of a touch
 BESIDE = 0.5  # mm, places farther apart are not joined
-GRADE = 0.1  # height over length of a move: places that ask for more are not joined
+GRADE = 0.9 * STEEP  # height over length of a move: a steeper one would need raised copies of the pass
 ALIKE = 0.5  # cosine between normals: places with less are on two walls
 
 

@@ -24,6 +24,7 @@ from zones.reach.tip_field import TipField
 
 MIN_STEP = 0.02  # mm between passes of a round
 WORTH_A_SPIRAL = 8  # least straight passes at which a spiral is tried
+STEEP = 0.05  # mm per mm in plan, 3 degrees: a pass that goes down steeper may need raised copies of itself
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +200,7 @@ def _steep_stock(points: F64, stock: StockMap, tool: ToolBody, wall: bool) -> F6
     """
     move = np.diff(points, axis=0)
     rise = -move[:, 2] if wall else np.abs(move[:, 2])
-    steep = rise > 0.05 * np.hypot(move[:, 0], move[:, 1])  # 3 degrees
+    steep = rise > STEEP * np.hypot(move[:, 0], move[:, 1])
     steep = np.concatenate([steep, [False]]) | np.concatenate([[False], steep])
     over = stock.under_end(points, tool) if wall else stock.overlap(points, tool, -0.3)
     if tool.corner_radius == 0.0:  # the edge of a flat cuts going down, and a short move takes no more than a rim

@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import SURFACES, ball, field_of, terraces, tool
 from tests.plan_checks import dense
 from tests.unit.toolpath.strategies.touched_places import reached
+from toolpath.stock.stock_map import StockMap
 from toolpath.strategies import touch_points
+from toolpath.strategies.zigzag import skimmed
 from zones.reach.tip_field import LEVEL_TOLERANCE
 
 
@@ -40,6 +43,17 @@ def test_every_place_is_on_a_line_or_has_a_touch_of_its_own(name):
         way = np.diff(line.points, axis=0)
         assert (np.abs(way[:, 2]) <= touch_points.GRADE * np.hypot(way[:, 0], way[:, 1]) + 1e-12).all()
         assert (np.linalg.norm(way, axis=1) <= touch_points.BESIDE).all()
+
+
+def test_no_pass_through_places_needs_layers_above_it():
+    """Places of a wall lie at any height: passes that followed them down 4 degrees were cut in 30 raised copies."""
+    mesh, body = terraces([0, 4, 11.5, 16], [0, 20], [[8, 2, 8]]), tool(6.0, 0.0)
+    field, rng = field_of(mesh, body), np.random.default_rng(6)
+    tips = np.column_stack([np.full(400, 7.0), rng.uniform(3.0, 17.0, 400), rng.uniform(4.0, 4.6, 400)])
+    got = touch_points.touches(field, tips, np.tile([1.0, 0.0, 0.0], (400, 1)))
+    assert max(np.ptp(line.points[:, 2]) for line in got) > 0.02
+    stock = StockMap.box(TriangleTree(mesh), np.array([0.0, 0.0, 0.0]), np.array([16.0, 20.0, 8.0]), 0.15)
+    assert all(skimmed(line, stock, body, 0.6, 0.047, True) == [line] for line in got)
 
 
 def test_touches_are_few_and_leave_out_what_has_no_free_direction():
