@@ -46,6 +46,7 @@ from verify.surface.sample_scores import RAY_ERROR
 
 MIN_REACH = 1.0
 RAY_BATCH = 400_000  # rays at a time from places under paths
+OWN_LOOKS = 500  # places of a face at most that are asked whether their tool alone cuts them
 SEED_BATCH = 4000  # places that are looked at more closely at a time
 
 
@@ -170,6 +171,7 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
     parts = [_deepened(parts, even, tree, shot, lambda f: tell(0.85 + 0.15 * f))]
     table = _at_ends(parts, tree, shot)
     gouged = np.flatnonzero((table.residual < -setup.gouge_tolerance - RAY_ERROR) & (table.mover >= 0))
+    by = _by_own_tool(table, gouged, tree, shot)
     tips = tip_gouges(part.mesh, moves, tools, source, setup.gouge_tolerance + RAY_ERROR)
     watch = np.arange(len(s), first)
     sunk = np.clip(table.residual[watch], -setup.gouge_tolerance, 0.0)
@@ -178,12 +180,12 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
     return SurfaceCuts(
         table.residual[:len(s)], table.mover[:len(s)],
         [*tips, *gouge_findings(table.points[gouged], table.face[gouged], -table.residual[gouged], table.area[gouged],
-                                table.mover[gouged], source, setup.gouge_tolerance)],
+                                by, source, setup.gouge_tolerance)],
         _in_allowance(table, (row < on_edge) | ((row >= first) & (row < even)), setup, source),
         _excluded(table, slice(len(s), on_edge), part.mesh, shot, source),
         max([float(-table.residual.min(initial=0.0)), 0.0, *(f.depth for f in tips)]), left[:guarded],
         left[guarded:], close, table.residual[first:even], shot.reach, [*wide_samples(part.mesh), *wide],
-        _thread_notes(np.unique(moves.tool[table.mover[gouged]]).tolist(), tools))
+        _thread_notes(np.unique(moves.tool[by]).tolist(), tools))
 
 
 def _watching(mesh: TriangleMesh, tell: Report) -> tuple[tuple[F64, F64, I32, F64], int]:
@@ -300,6 +302,32 @@ def _at_ends(taken: list[_Table], tree: TriangleTree, shot: _Shooting) -> _Table
                            np.zeros(len(new)), -depth[new], rows[new].astype(np.int32))]
     del table
     return _joined(parts)
+
+
+def _by_own_tool(table: _Table, rows: NDArray[np.int64], tree: TriangleTree, shot: _Shooting) -> I32:
+    """The moves that are told of gouges, (r,) int32, index; rows : (r,) int64, index, of the gouges.
+
+    At the edge of a hole a drill may take a place along its ray, as facets stand into the hole, while another tool cuts
+    the hole too wide. So on faces that several tools gouge, a move whose tool alone leaves something of the part as
+    near as the tolerance is not told, but the move of another tool.
+    """
+    moves, tolerance = shot.moves, shot.setup.gouge_tolerance + RAY_ERROR
+    by = table.mover[rows].copy()
+    tool = moves.tool[by]
+    pairs, of = np.unique(np.column_stack([table.face[rows], tool]), axis=0, return_inverse=True)
+    mixed = np.isin(pairs[:, 0], pairs[:, 0][np.r_[False, pairs[1:, 0] == pairs[:-1, 0]]])
+    for pair in np.flatnonzero(mixed).tolist():
+        mine, k = np.flatnonzero(of.reshape(-1) == pair), int(pairs[pair, 1])
+        if len(mine) > OWN_LOOKS:
+            continue
+        alone = Remains(tree, moves.only(moves.tool == k), shot.tools, shot.threads)
+        other = mine[~alone.gone(table.points[rows[mine]], tolerance)]
+        rest = np.flatnonzero(moves.tool != k)
+        left, move = residual_on_normals(table.points[rows[other]], table.normals[rows[other]], np.zeros(len(other)),
+                                         moves.only(rest), shot.tools, threads=shot.threads)
+        found = (move >= 0) & (left < -tolerance)
+        by[other[found]] = rest[move[found]]
+    return by
 
 
 def _gouged(table: _Table, shot: _Shooting) -> _Table:
