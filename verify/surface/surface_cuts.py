@@ -315,7 +315,8 @@ def _by_own_tool(table: _Table, rows: NDArray[np.int64], tree: TriangleTree, sho
     by = table.mover[rows].copy()
     tool = moves.tool[by]
     pairs, of = np.unique(np.column_stack([table.face[rows], tool]), axis=0, return_inverse=True)
-    mixed = np.isin(pairs[:, 0], pairs[:, 0][np.r_[False, pairs[1:, 0] == pairs[:-1, 0]]])
+    face, count = np.unique(pairs[:, 0], return_counts=True)
+    mixed = np.isin(pairs[:, 0], face[count > 1])
     for pair in np.flatnonzero(mixed).tolist():
         mine, k = np.flatnonzero(of.reshape(-1) == pair), int(pairs[pair, 1])
         if len(mine) > OWN_LOOKS:

@@ -99,8 +99,8 @@ def work_done(asked: Asked, measured: Measured, cutting: Cutting, cut: BOOL, sou
        from stock that other faces may keep.
     2. A tool without such room comes within h / 2 of it, and more than 1.5 h + e stands on it, along the normal and
        along the shortest way out. Of stock that a drill or tap left, the depth that it must still go counts instead.
-       The sharp edge of a flat end comes near a slope in this sense where the stock there is even to h, as the fine
-       steps leave it that finish a slope.
+       The sharp edge of a flat end comes near a slope in this sense where moves have left stock that is even to h, as
+       the fine steps do that finish a slope.
 
     Beside a place of the same face that is cut, stock of which a way out is h + e or shorter is none.
     """
@@ -203,7 +203,7 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     tight = high[~left[high]]
     touched = tight[reached(tight, limits.near, 0.0)]
     beyond = np.setdiff1d(tight, touched)
-    stepped = beyond[_in_fine_steps(few, height, beyond, limits)]
+    stepped = beyond[(mover[beyond] >= 0) & _in_fine_steps(few, height, beyond, limits)]
     touched = np.union1d(touched, stepped[asked.touch.edges(few.subset(stepped), tools, axes, limits.near)])
     beyond = np.setdiff1d(beyond, touched)
     why[beyond] = asked.touch.reasons(few.subset(beyond), tools, axes)
