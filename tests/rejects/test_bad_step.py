@@ -13,6 +13,7 @@ from geometry.errors import PartError, ResourceError, SetupError, StepError
 from geometry.step_import.occ.loading import load_part
 from geometry.step_import.reader import read_part
 from geometry.step_import.text_checks import check_text
+from tests.child_processes import running, started_since
 from tests.step_files import real_part, write_step
 from tests.time_limits import in_time
 
@@ -21,8 +22,9 @@ cq = pytest.importorskip("cadquery")
 
 @pytest.fixture(autouse=True)
 def nothing_left_running():
+    before = running()
     yield
-    assert psutil.Process().children(recursive=True) == []
+    assert started_since(before) == []
 
 
 @pytest.fixture(scope="module")

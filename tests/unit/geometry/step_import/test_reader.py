@@ -4,7 +4,6 @@ import re
 from collections import Counter
 
 import numpy as np
-import psutil
 import pytest
 import trimesh
 
@@ -17,6 +16,7 @@ from geometry.step_import.occ.holes import fill_slivers
 from geometry.step_import.occ.loading import load_part, load_solid
 from geometry.step_import.occ.meshing import count_open_edges
 from geometry.step_import.reader import read_part
+from tests.child_processes import running, started_since
 from tests.step_files import real_part, write_step
 
 cq = pytest.importorskip("cadquery")
@@ -31,7 +31,7 @@ def bracket():
 
 
 def test_box_through_the_child(tmp_path):
-    path = write_step(cq.Workplane().box(10, 20, 30), tmp_path / "box.step")
+    path, before = write_step(cq.Workplane().box(10, 20, 30), tmp_path / "box.step"), running()
     part = read_part(path)
     assert part.volume == pytest.approx(6000.0, rel=1e-12)
     assert part.mesh.volume == pytest.approx(6000.0, rel=1e-12)
@@ -40,7 +40,7 @@ def test_box_through_the_child(tmp_path):
     assert (part.unit, part.warnings, part.deviation) == ("mm", (), pytest.approx(0.0, abs=1e-12))
     assert kinds(part) == {"convex": 12}
     assert all(e.angle == pytest.approx(np.pi / 2) for e in part.edges)
-    assert psutil.Process().children(recursive=True) == []
+    assert started_since(before) == []
 
 
 def test_child_and_own_process_agree(tmp_path):
@@ -254,9 +254,10 @@ def test_faces_that_nearly_meet_are_told(tmp_path):
 
 @pytest.mark.slow
 def test_compressor_wheel_is_fused_and_its_stray_dropped():
+    before = running()
     part = read_part(real_part("imp_kj66_compressor_wheel.step"), chord=0.05,
                      placement=SetupFrame(z_axis=(0, 1, 0), x_axis=(1, 0, 0)))
     assert part.deviation <= 0.075 and count_open_edges(part.mesh) == 0
     assert any("stray" in w for w in part.warnings) and any("fused into 1" in w for w in part.warnings)
     assert 65_534 < part.volume < 78_553
-    assert psutil.Process().children(recursive=True) == []
+    assert started_since(before) == []
