@@ -563,8 +563,9 @@ def _check_order(line: Line, others: str) -> None:
 
     Whether the word takes the old value or the new one is not stated; SINUMERIK 802D asks for blocks of their own.
     """
+    bare = re.sub(r'"[^"]*"', "", others)  # texts, as of MSG, read nothing
     for name in line.set_here:
-        if re.search(rf"(?<![A-Z_0-9$]){re.escape(name)}(?![A-Z_0-9])", others):
+        if re.search(rf"(?<![A-Z_0-9$]){re.escape(name)}(?![A-Z_0-9])", bare):
             raise BlockError(f"{name} is set and read in one block: the move may take the old or the new value",
                              f"set {name} in a block of its own before")
 

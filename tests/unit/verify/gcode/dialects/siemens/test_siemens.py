@@ -124,6 +124,7 @@ def test_a_variable_is_not_set_and_read_in_one_block(block):
 def test_a_block_that_sets_a_variable_may_read_others_and_set_more():
     p = read("R1=2 R11=3\nR1=5 R2=R1+1 G1 X=R11 F100\nG1 X=R1 Y=R2", "siemens")
     assert p.end[-2:, 0].tolist() == [3.0, 5.0] and p.end[-1, 1] == 6.0
+    assert len(read('R1=2 MSG("R1 is 2")\nG1 X=R1 F100', "siemens"))
 
 
 @pytest.mark.parametrize("loop", ["AA: R1=1\nGOTOB AA", "AA: G1 X10 F100\nG1 X0\nGOTOB AA",
