@@ -34,6 +34,8 @@ class Settings(BaseSettings):
         1, _cores() // 2)
     child_threads: Annotated[int, Field(ge=0, le=1024, description="Kernel threads of one job; 0: "
                                                                    "cores / workers.")] = 0
+    preload: Annotated[bool, Field(
+        description="Whether a process with the planner loaded stays ready, from which jobs start at once.")] = True
     job_time_limit_s: Annotated[float, Field(gt=0, description="Wall time of one attempt, s.")] = 1800.0
     job_memory_limit_mb: Annotated[int, Field(ge=64, description="Largest resident memory of a job, MB.")] = 8000
     max_attempts: Annotated[int, Field(

@@ -20,6 +20,8 @@ __all__ = ["pytest_collection_modifyitems", "pytest_itemcollected", "pytest_make
            "pytest_runtest_makereport", "pytest_runtest_setup", "pytest_terminal_summary"]  # hooks
 
 HERE = Path(__file__).resolve()
+# The planner takes seconds to load, in each of hundreds of services. Tests that want it preloaded say so.
+os.environ.setdefault("ZONEMILL_PRELOAD", "0")
 WRITTEN_PARTS = os.environ.get("ZONEMILL_PARTS")  # set where the environment has no cadquery (make test-runtime)
 DRAWS = 'importorskip("cadquery")'
 SHARED_PARTS = Path(__file__).resolve().parents[2] / "shared" / "parts"

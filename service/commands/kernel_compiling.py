@@ -128,16 +128,24 @@ def kernel_of(listed: Listed) -> tuple[Any, tuple[Any, ...]]:
     return kernel, tuple(type_of(t) for t in listed.arguments)
 
 
+def is_stored(kernel: Any, arguments: tuple[Any, ...]) -> bool:
+    """Whether the cache has a kernel for these types of arguments.
+
+    Raises
+    ------
+    AttributeError, TypeError, ValueError, KeyError
+        They do not fit the sources.
+    """
+    kernel.targetctx.refresh()
+    return kernel._cache._index_key(arguments, kernel.targetctx.codegen()) in kernel._cache._cache_file._load_index()
+
+
 def to_compile(kernels: Sequence[Listed]) -> list[int]:
     """Places of those that fit the sources and are not in the cache."""
     found = []
     for place, listed in enumerate(kernels):
         try:
-            kernel, arguments = kernel_of(listed)
-            cache = kernel._cache
-            kernel.targetctx.refresh()
-            key = cache._index_key(arguments, kernel.targetctx.codegen())
-            if key not in cache._cache_file._load_index():
+            if not is_stored(*kernel_of(listed)):
                 found.append(place)
         except STALE:
             continue

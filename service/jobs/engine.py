@@ -25,6 +25,7 @@ from service.jobs.artifacts import Artifacts
 from service.jobs.attempt import WorkConfig, run_job
 from service.jobs.database import AWAY, connect, migrate
 from service.jobs.disk_space import check_free, check_writable
+from service.jobs.job_child import close_servers, preload
 from service.jobs.job_store import JobStore, NewJob, Room
 from service.jobs.library import LibraryStore
 from service.jobs.retention import RetentionSweeper
@@ -55,7 +56,7 @@ class Engine:
         self.work = WorkConfig(
             settings.url, str(settings.data_dir.resolve()),
             ProcessLimits(settings.job_time_limit_s, settings.job_memory_limit_mb * 1_000_000, settings.threads,
-                   settings.poll_s),
+                          settings.poll_s, settings.preload),
             settings.lease_s, chain, settings.max_attempts, settings.log_level, settings.log_format)
         self.room = Room(settings.max_queued, settings.max_queued_each)
         self._wake, self._stop = threading.Event(), threading.Event()
@@ -98,6 +99,8 @@ class Engine:
                 log.info("jobs of an earlier run continue", jobs=left)
         if embedded:
             self._look()
+            if self.settings.preload:
+                preload(self.settings.threads)
         self._thread = threading.Thread(target=self._dispatch, name="dispatcher", daemon=True)
         self._thread.start()
         if self.settings.webhooks_on:
@@ -132,6 +135,7 @@ class Engine:
                 part.close(timeout=10)
         if self._loop is not None:
             self._loop.stop(timeout=5)
+        close_servers()
         if self._lock is not None:
             self._lock.close()
         log.info("engine closed")

@@ -1,5 +1,7 @@
 # The process in which one job is computed. It imports nothing at the top, so that it starts quickly.
-"""``python -m service.jobs.job_process REQUEST.json FD``: run one job, send progress lines to the pipe FD.
+"""``python -m service.jobs.job_process REQUEST.json FD PARENT``: run one job, send progress lines to the pipe FD.
+
+PARENT is the number of the process that starts it, with which it ends.
 
 The request is {"kind", "part", "setup", "program", "stock", "spindle_tool", "out", "kept", "chain", "address_bytes"}.
 Lines on the pipe are JSON: {"stage", "progress"} while it runs, {"resumed"} when it uses a checkpoint of an earlier
@@ -101,7 +103,7 @@ def main(argv):
     with open(argv[1], encoding="utf-8") as handle:
         request = json.load(handle)
     pipe = int(argv[2])
-    guard(request["parent"], request["address_bytes"])
+    guard(int(argv[3]), request["address_bytes"])
     from geometry.errors import CamError, InternalError, ResourceError
     from service.jobs.disk_space import is_full, storage_full
 

@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import selectors
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -24,14 +22,10 @@ import psutil  # type: ignore[import-untyped]
 
 from geometry.child_process import Family
 from geometry.errors import CancelledError, ResourceError, error_from_dict
+from service.jobs.job_child import JobChild, start_child
 
-ROOT = Path(__file__).resolve().parents[2]
-JOB_MODULE = "service.jobs.job_process"
 # Address space includes mapped but unused memory (libraries, thread arenas), so its limit is larger.
 ADDRESS_ROOM = 8_000_000_000
-_SECRET = re.compile("^ZONEMILL_|PASSW|SECRET|TOKEN|CREDENTIAL|PRIVATE|_KEY$|_URL$", re.IGNORECASE)
-THREAD_VARIABLES = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS")
-ONE_THREAD = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # matrices of three columns win nothing by more
 
 
 @dataclass(frozen=True)
@@ -42,12 +36,14 @@ class ProcessLimits:
     memory_bytes : resident memory of the child and its descendants together
     threads      : kernel threads
     poll_s       : interval between checks of the limits and of ``keep``, s
+    preload      : whether the child may be forked from a process that has the planner loaded
     """
 
     time_s: float
     memory_bytes: int
     threads: int = 1
     poll_s: float = 0.2
+    preload: bool = False
 
 
 def supervise(request: dict[str, Any], limits: ProcessLimits, scratch: Path, *,
@@ -55,7 +51,7 @@ def supervise(request: dict[str, Any], limits: ProcessLimits, scratch: Path, *,
               keep: Callable[[], bool]) -> str:
     """Run a job in a child process.
 
-    request     : see ``service.jobs.job_process``; 'parent' and 'address_bytes' are filled in here
+    request     : see ``service.jobs.job_process``; 'address_bytes' is filled in here
     scratch     : folder for temporary files of the child
     on_progress : called with stage and fraction, at most once per check
     on_resumed  : called with the number of checkpoints used, by kind
@@ -75,21 +71,18 @@ def supervise(request: dict[str, Any], limits: ProcessLimits, scratch: Path, *,
     """
     with tempfile.TemporaryDirectory(prefix="job-", dir=scratch) as folder:
         path, log = Path(folder, "request.json"), Path(folder, "log")
-        path.write_text(json.dumps({**request, "parent": os.getpid(),
-                                    "address_bytes": limits.memory_bytes + ADDRESS_ROOM}))
+        path.write_text(json.dumps({**request, "address_bytes": limits.memory_bytes + ADDRESS_ROOM}))
         reading, writing = os.pipe()
         try:
             with log.open("wb") as out, closing_fd(writing):
-                child = subprocess.Popen([sys.executable, "-m", JOB_MODULE, str(path), str(writing)],
-                                         pass_fds=(writing,), stdin=subprocess.DEVNULL, stdout=out, stderr=out,
-                                         start_new_session=True, cwd=ROOT, env=_environment(limits.threads))
+                child = start_child(path, writing, out, limits.threads, limits.preload)
             try:
                 final = _watch(child, _Lines(reading, on_progress, on_resumed), limits, keep)
             finally:
                 kill_tree(child)
         finally:
             os.close(reading)
-        return _outcome(child.returncode, final, log)
+        return _outcome(child.wait(), final, log)
 
 
 @contextmanager
@@ -101,7 +94,7 @@ def closing_fd(handle: int) -> Iterator[None]:
         os.close(handle)
 
 
-def kill_tree(child: subprocess.Popen[bytes]) -> None:
+def kill_tree(child: JobChild) -> None:
     """Kill a child with all its descendants, also those in sessions of their own, and wait for it."""
     try:
         family = psutil.Process(child.pid).children(recursive=True) if child.returncode is None else []
@@ -119,15 +112,7 @@ def kill_tree(child: subprocess.Popen[bytes]) -> None:
     child.wait()
 
 
-def _environment(threads: int) -> dict[str, str]:
-    """Environment of a child, without settings and secrets of the service, since the child reads untrusted files."""
-    kept = {k: v for k, v in os.environ.items() if not _SECRET.search(k)}
-    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
-    return {**kept, "PYTHONPATH": path, **dict.fromkeys(THREAD_VARIABLES, str(threads)),
-            **dict.fromkeys(ONE_THREAD, "1")}
-
-
-def _watch(child: subprocess.Popen[bytes], lines: _Lines, limits: ProcessLimits,
+def _watch(child: JobChild, lines: _Lines, limits: ProcessLimits,
            keep: Callable[[], bool]) -> dict[str, Any]:
     """Monitor the child until it ends; returns its last message, {} when there was none."""
     deadline = time.monotonic() + limits.time_s
@@ -192,7 +177,7 @@ def _check(family: Family, limits: ProcessLimits, deadline: float, keep: Callabl
                             remedy="simplify the part or raise ZONEMILL_JOB_MEMORY_LIMIT_MB")
 
 
-def _await_exit(child: subprocess.Popen[bytes]) -> None:
+def _await_exit(child: JobChild) -> None:
     """Wait a moment for the interpreter to end, after it has closed the pipe."""
     try:
         child.wait(timeout=5.0)

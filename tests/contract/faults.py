@@ -26,7 +26,7 @@ from typing import Any
 import httpx
 import psutil
 
-from service.jobs.supervisor import JOB_MODULE
+from service.jobs.job_child import JOB_MODULE
 from tests.contract.servers import Postgres, free_port, until_open
 
 ROOT = Path(__file__).resolve().parents[2]

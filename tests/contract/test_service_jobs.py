@@ -12,7 +12,7 @@ import pytest
 
 from schemas.setup import content_hash
 from service.from_wire import parse_setup
-from service.jobs.supervisor import JOB_MODULE
+from service.jobs.job_child import JOB_MODULE
 from tests.time_limits import in_time
 
 STEP = runpy.run_path(str(Path(__file__).parent / "fakes" / "step_text.py"))["STEP"]
@@ -253,7 +253,7 @@ def test_a_child_that_cannot_be_started_for_want_of_handles_is_waited_for(client
             raise OSError(left.pop(), "none left")
         return popen(*args, **kwargs)
 
-    monkeypatch.setattr("service.jobs.supervisor.subprocess.Popen", starts)
+    monkeypatch.setattr("service.jobs.job_child.subprocess.Popen", starts)
     monkeypatch.setattr("service.jobs.attempt.RETRY_S", 0.1)
     job = finish(client, post(client, "few handles").json())
     assert (job["state"], job["attempt"]) == ("proved", 1) and not left
@@ -263,7 +263,7 @@ def test_a_worker_that_can_start_no_child_at_all_says_so(client, post, finish, m
     def never(*_args, **_kwargs):
         raise OSError(errno.EMFILE, "Too many open files")
 
-    monkeypatch.setattr("service.jobs.supervisor.subprocess.Popen", never)
+    monkeypatch.setattr("service.jobs.job_child.subprocess.Popen", never)
     monkeypatch.setattr("service.jobs.attempt.RETRY_S", 0.05)
     monkeypatch.setattr("service.jobs.attempt.PATIENCE_S", 0.3)
     job = finish(client, post(client, "no handles").json())

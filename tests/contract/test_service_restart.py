@@ -13,7 +13,7 @@ import httpx
 import psutil
 import pytest
 
-from service.jobs.supervisor import JOB_MODULE
+from service.jobs.job_child import JOB_MODULE
 from tests.contract.servers import free_port
 from tests.time_limits import in_time
 

@@ -21,7 +21,7 @@ from fastapi.testclient import TestClient
 from geometry.step_import.occ.loading import load_part
 from geometry.step_import.reader import READER_MODULE
 from service.api.app import create_app
-from service.jobs.supervisor import JOB_MODULE
+from service.jobs.job_child import JOB_MODULE
 from service.logs import configure
 from service.settings import Settings
 from tests.step_files import write_step
