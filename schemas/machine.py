@@ -101,9 +101,10 @@ class Machine(WireModel):
                     "Other controls are taken to go above everything.")] = None
     nose_diameter_mm: Annotated[Number | None, Field(
         ge=1, le=1000, description="Diameter of the spindle nose, mm. The nose is then a body 200 mm high that begins "
-                                   "gauge_length_mm over the tip of each tool, and at the program's Z where the "
-                                   "spindle is empty. null: nothing is checked above a holder, and the nose of an "
-                                   "empty spindle is taken to be 69.832 mm wide (taper 30 of DIN 2079).")] = None
+                                   "gauge_length_mm over the tip of each tool, if a holder or that length is given, "
+                                   "and at the program's Z where the spindle is empty. null: nothing is checked "
+                                   "above a holder, and the nose of an empty spindle is taken to be 69.832 mm wide "
+                                   "(taper 30 of DIN 2079).")] = None
     orientations: Annotated[Literal["find", "given"], Field(
         description="find: a 5-axis machine also uses other tool axes for areas that the accesses of the setup do not "
                     "reach. given: it uses those accesses only. No effect on a 3-axis machine.")] = "find"

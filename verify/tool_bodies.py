@@ -78,6 +78,11 @@ class Bodies:
         return float(max(cutters[:, 0].max(initial=0.0), self.rows[:, 2:4].max(initial=0.0)))
 
 
+def nose_placed(tool: ToolBody, setup: ProofSetup) -> bool:
+    """Whether holder or gauge length say how high over the tip the spindle nose is."""
+    return bool(tool.holder) or tool.number in setup.gauge_given
+
+
 def _frusta(tool: ToolBody, setup: ProofSetup) -> list[tuple[float, float, float, float, float, int]]:
     neck, shank = 0.5 * tool.neck_diameter, 0.5 * tool.shank_diameter
     top = max(tool.neck_length, tool.flute_length)
@@ -87,7 +92,7 @@ def _frusta(tool: ToolBody, setup: ProofSetup) -> list[tuple[float, float, float
     for part in tool.holder:
         out.append((z, z + part.length, 0.5 * part.diameter, 0.5 * part.diameter_top, setup.clearance_holder, HOLDER))
         z += part.length
-    if tool.holder and setup.nose_diameter is not None:
+    if setup.nose_diameter is not None and nose_placed(tool, setup):
         face, nose = max(z, setup.gauge_length.get(tool.number, z)), 0.5 * setup.nose_diameter
         out.append((face, face + NOSE_LENGTH, nose, nose, setup.clearance_holder, HOLDER))
     if not tool.holder:

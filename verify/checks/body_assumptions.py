@@ -17,6 +17,7 @@ from verify.findings import Source
 from verify.material.free_width import LARGEST, free_holder_width
 from verify.model import ProofSetup
 from verify.moves import Moves
+from verify.tool_bodies import nose_placed
 
 BELOW = 0.01  # mm: tips less far below the part are not named
 NOSE_FIELD = "state machine.nose_diameter_mm"
@@ -70,6 +71,11 @@ def _holders(part: Part, moves: Moves, source: Source, tools: Sequence[ToolBody]
 
 def _above_holders(part: Part, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup) -> Iterator[Assumed]:
     if setup.nose_diameter is not None:
+        for k in np.unique(moves.tool).tolist():
+            if tools[k].number != EMPTY and not nose_placed(tools[k], setup):
+                yield Assumed(AssumedKind.ABOVE_HOLDER, f"T{tools[k].number} the nose is nowhere: neither a holder nor "
+                              "a gauge length says how high it stands", "the spindle may enter part, stock or fixtures",
+                              f"state gauge_length_mm of {tools[k].id}")
         return
     used = [k for k in np.unique(moves.tool).tolist() if tools[k].holder]
     if used:

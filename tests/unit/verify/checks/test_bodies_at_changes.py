@@ -119,6 +119,24 @@ def test_a_stated_nose_stands_above_the_holder():
     assert (z0, z1) == (80.0, 80.0 + NOSE_LENGTH) and r0 - clearance == r1 - clearance == SMALLEST_NOSE / 2
 
 
+def test_a_stated_nose_stands_above_a_tool_without_a_holder_where_its_gauge_length_is_given():
+    bare = ToolBody("T1", 1, 6.0, 0.0, 20.0, 6.0, 20.0, 6.0, 25.0)
+    setup = ProofSetup(nose_diameter=120.0, gauge_length={1: 30.0}, gauge_given=frozenset({1}))
+    nose = [(z0, z1, r0 - c) for z0, z1, r0, _, c, _ in Bodies.of([bare], setup).rows if r0 - c > 10.0]
+    assert nose == [(30.0, 30.0 + NOSE_LENGTH, 60.0)]
+    unplaced = ProofSetup(nose_diameter=120.0, gauge_length={1: 30.0})
+    assert not [r for r in Bodies.of([bare], unplaced).rows if r[2] > 10.0]
+
+
+@pytest.mark.parametrize(("given", "told"), [(frozenset(), True), (frozenset({1}), False)])
+def test_a_nose_that_nothing_places_is_told(given, told):
+    bare = replace(SHORT_TOOL, holder=())
+    setup = ProofSetup(**{**SETUP.__dict__, "nose_diameter": 120.0, "gauge_length": {1: 80.0}, "gauge_given": given})
+    taken = [a for a in proved("G0 X60", "G0 Z15", tools=[bare], setup=setup).assumed
+             if a.what == AssumedKind.ABOVE_HOLDER]
+    assert [a.remedy for a in taken] == (["state gauge_length_mm of " + bare.id] if told else [])
+
+
 def test_what_stands_above_a_holder_and_under_the_part_is_told():
     taken = {a.what: str(a.value) for a in proved("G0 X60", "G0 Z-12.5", "G0 Z15").assumed}
     assert "ends 62.5 mm above the top" in taken[AssumedKind.ABOVE_HOLDER]
