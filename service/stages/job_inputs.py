@@ -179,10 +179,10 @@ class JobInputs:
     def cores(self) -> dict[int, float]:
         """Mm by T number: diameter at the end within which a tool does not cut, of tools that do not cut to the centre.
 
-        Drills, taps and thread mills are left out.
+        Taps are left out: what stands before them is judged by the hole that they need.
         """
         return {body.number: t.core_mm for t, body in zip(self.tools, self.bodies, strict=True)
-                if not t.center_cutting and not body.named}
+                if not t.center_cutting and t.kind != "tap"}
 
     @property
     def tap_holes(self) -> dict[int, float]:

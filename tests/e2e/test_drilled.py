@@ -44,7 +44,7 @@ def program(*, deep=-5.0 - POINT, through=-9.2, chamfer=-1.6, tapped=True, tappe
 
 @pytest.fixture(scope="module")
 def verify(tmp_path_factory):
-    """Verify a text against the plate -> the report. The plate is read once."""
+    """Verify a text, and the first tool with other fields, against the plate -> the report. The plate is read once."""
     import cadquery as cq
 
     plate = cq.Workplane("XY").box(16, 12, 8, centered=(True, True, False)).translate((0, 0, -8))
@@ -56,20 +56,33 @@ def verify(tmp_path_factory):
     job = read_job_part(path, parse_setup(json.dumps(SETUP)), lambda _stage, _share: None)
 
     @lru_cache
-    def report(text):
-        mine = replace(job, inputs=JobInputs.of(parse_setup(json.dumps(SETUP))))
-        made = proved_program(mine, read_first(mine_setup(), text, ending=".ngc"), lambda _share: None).report
+    def report(text, **first):
+        setup = parse_setup(json.dumps({**SETUP, "tools": [{**SETUP["tools"][0], **first}, *SETUP["tools"][1:]]}))
+        mine = replace(job, inputs=JobInputs.of(setup))
+        made = proved_program(mine, read_first(setup, text, ending=".ngc"), lambda _share: None).report
         Verification.model_validate(made)
         return made
-
-    def mine_setup():
-        return parse_setup(json.dumps(SETUP))
 
     return report
 
 
 def kinds(report):
     return report["finding_counts"]
+
+
+@pytest.mark.parametrize("core", [2.5, None])
+def test_a_drill_that_does_not_cut_to_its_centre_goes_into_no_solid(verify, core):
+    """Its core is pressed as deep as the hole is, whatever is bored out beside it."""
+    (told,) = [f for f in verify(program(), center_cutting=False, core_diameter_mm=core)["findings"]
+               if f["kind"] == "plunge"]
+    assert "lines 8 to 9" in told["message"] and told["depth"] == pytest.approx(8.0, abs=0.1)
+
+
+def test_such_a_drill_opens_a_hole_that_stands(verify):
+    lines = ["%", "G21 G90 G17 G94 G40 G49 G54 G64 P0.001", "T4 M6", "S3000 M3", "G0 X4 Y0", "G43 H4 Z20",
+             "G81 X4 Y0 Z-9.5 R2 F150", "G80", "G0 Z20", "T1 M6", "S3000 M3", "G0 X4 Y0", "G43 H1 Z20",
+             "G81 X4 Y0 Z-9.2 R2 F150", "G80", "G0 Z20", "M5", "M30", "%"]
+    assert "plunge" not in kinds(verify("\n".join(lines) + "\n", center_cutting=False, core_diameter_mm=2.5))
 
 
 def test_a_right_program_is_proved(verify):
