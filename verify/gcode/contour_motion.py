@@ -360,10 +360,13 @@ class ContourMotion(Origins):
             self.log.stops.append(StopPoint(self.log.line, UNPLACED, s.tool, (x, y, z), room=True))
         s.parked &= math.isnan(target[0]) or math.isnan(target[1])
         if known:
+            s.lost = False
             if not self.log.moved:
                 self._assume()
             axes = sum(1 << k for k, p in enumerate(was) if math.isnan(p))
             self._write(start, target, kind, feed, axes, turn, minutes)
+        elif s.lost and (turn is not None and turn != s.turn or any(not math.isnan(v) for v in target)):
+            self._no_tips()
         elif turn is not None:
             self._stand(turn)
 

@@ -73,6 +73,7 @@ class Rotary:
         """Linear axes went to a fixed place of the machine; with the part or tool turned, X, Y and Z are unknown."""
         s = self.s
         s.sent |= named[2]
+        s.lost &= not named[2]
         every = s.tcp and s.tilted and any(named)
         s.position = [NAN if n or every else p for n, p in zip(named, s.position, strict=True)]
 
@@ -86,6 +87,8 @@ class Rotary:
         gauge = self._gauge()
         known = self.machine is not None and gauge is not None and not any(map(math.isnan, tip))
         if s.tcp or not known:
+            s.lost |= not (s.tcp or any(map(math.isnan, tip)))
+            s.sent &= not s.lost
             s.position = tip if s.tcp else [NAN] * 3
         elif self.machine is not None and gauge is not None:
             s.position = self.machine.joints(np.array([tip]), np.radians([s.turn]), gauge)[0].tolist()

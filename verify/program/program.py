@@ -232,6 +232,8 @@ class State:
     along_tool : whether the next way home in Z goes along the tool (M140 MB MAX)
     sent      : whether Z was ever sent to a fixed place of the machine
     parked    : whether X or Y stand at a fixed place of the machine (G53, G28, G30)
+    lost      : whether the tool stands where it stood while its coordinates are unknown, for tool centre point control
+                went off with turned axes and the setup has no pivots
     cycle     : words of the drilling cycle in force, and the height where its series began
     table     : mm, shift of the work offset by G10
     shift     : mm, shift of program zero by G92, and by G52 where both share one register
@@ -262,6 +264,7 @@ class State:
     retract_to_r: bool = False
     cycle: dict[str, float] = field(default_factory=dict)
     parked: bool = False
+    lost: bool = False
     sent: bool = False
     along_tool: bool = False
     turn: list[float] = field(default_factory=lambda: [0.0, 0.0])

@@ -121,6 +121,20 @@ def test_joints_go_where_the_controller_was_seen():
     np.testing.assert_allclose(at[13], at[11] + 2 * p.poses.end_axis[-1], atol=1e-9)
 
 
+@pytest.mark.parametrize("off", ["G49", "G43 H1", "M428\nG49\nM429"])
+@pytest.mark.parametrize("body", ["G0 A0\n", "G1 C5 F500\n", "G0 A45\n", "G0 X50\n", "G91 G28 C0\n"])
+def test_without_pivots_nothing_moves_from_where_tip_control_went_off(off, body):
+    """The part turns under a tool that stands beside it, and nothing says where the joints are."""
+    with pytest.raises(ProgramError, match="pivots"):
+        read(f"G43.4 H1\nG1 A30 C90 F900\nX10 Z5\n{off}\n{body}", pivots=False)
+
+
+@pytest.mark.parametrize("body", ["G53 G0 Z0\nG0 A0 C0\n", "G91 G28 Z0\nG90\nG0 A0 C0\n", "G43.4 H1\nG0 X0 Y0 Z90\n",
+                                  "G0 A30\n", "M5\n"])
+def test_home_or_tip_control_puts_an_end_to_that(body):
+    read(f"G43.4 H1\nG1 A30 C90 F900\nX10 Z5\nG49\n{body}", pivots=False)
+
+
 def test_a_table_stands_still_while_the_linear_axes_drill():
     p = read("G0 A90 C0\nG0 Y-60 Z20\nG81 X0 Z10 R15 F80\nG80\n")
     holes = np.flatnonzero(p.kind == FEED)
