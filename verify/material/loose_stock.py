@@ -1,8 +1,9 @@
 """Pieces of stock that the programs cut off from the rest: a slug in a through pocket, a part out of its frame.
 
 The stock that stands after all moves is parted into pieces that hang together. A piece that no fixture touches lies
-loose: the flutes may catch it. Shops hold pieces by tape, vacuum or glue, of which no setup tells, so a loose piece is
-an assumption and no finding.
+loose: the flutes may catch it. Where fixtures touched the blank and touch nothing in the end, every piece does; without
+such fixtures the largest counts as held. Shops hold pieces by tape, vacuum or glue, of which no setup tells, so a loose
+piece is an assumption and no finding.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from scipy import ndimage
 from geometry.mesh import F64, TriangleMesh
 from geometry.tool_body import ToolBody
 from verify.assumptions import Assumed, AssumedKind
+from verify.blank.blank import stock_bounds
 from verify.findings import Source
 from verify.material.stock_field import DistanceField
 from verify.material.stock_lines import StockLines
@@ -42,6 +44,7 @@ class LoosePiece:
     joined : mm, what is thinner may join it to the rest unseen
     border : (n, 2) float64, mm, setup frame, lines at its border; none where tools lean
     foot   : mm, underside of the stock
+    let_go : whether fixtures touched the blank, and now touch no piece
     """
 
     volume: float
@@ -50,6 +53,7 @@ class LoosePiece:
     joined: float
     border: F64
     foot: float
+    let_go: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +108,8 @@ def loose_lines(lines: StockLines, mesh: TriangleMesh, setup: ProofSetup) -> lis
     """
     over = np.maximum(lines.height - lines.bottom, 0.0)
     label, count = ndimage.label(over > SKIN)
-    if count < 2:
+    touched = _touched(mesh, setup)
+    if count < 2 and not touched:
         return []
     volume = np.bincount(label.ravel(), over.ravel(), count + 1).astype(np.float64) * lines.step**2
     stock = _Lattice(label, lines.origin + 0.5 * lines.step, lines.step, volume)
@@ -120,45 +125,60 @@ def loose_lines(lines: StockLines, mesh: TriangleMesh, setup: ProofSetup) -> lis
         stands = box[1, 2] >= lines.bottom - TOUCH and box[0, 2] <= lines.bottom + tall(n, at) + TOUCH
         return bool(stands) and stock.touches(n, at, box[:, :2])
 
-    def piece(n: int, at: Slices) -> LoosePiece:
+    def piece(n: int, at: Slices, let_go: bool) -> LoosePiece:
         here = stock.mask(n, at)
         rim = np.argwhere(here & ~ndimage.binary_erosion(here)) + [s.start for s in at]
         border = stock.first + rim * stock.step
         x, y = 0.5 * (border.min(axis=0) + border.max(axis=0))
         return LoosePiece(float(volume[n]), np.array([x, y, lines.bottom + 0.5 * tall(n, at)]), n == own, SKIN, border,
-                          lines.bottom)
+                          lines.bottom, let_go)
 
-    return [piece(n, at) for n, at in _loose(stock, own, is_thick, is_held, setup)]
+    return [piece(*p) for p in _loose(stock, own, is_thick, is_held, setup, touched)]
 
 
 def loose_nodes(field: DistanceField, mesh: TriangleMesh, setup: ProofSetup) -> list[LoosePiece]:
     """Loose pieces of a stock of distances after all moves, as ``loose_lines``."""
     label, count = ndimage.label(field.values > 0.0)
-    if count < 2:
+    touched = _touched(mesh, setup)
+    if count < 2 and not touched:
         return []
     volume = np.bincount(label.ravel(), minlength=count + 1).astype(np.float64) * field.step**3
     stock = _Lattice(label, field.origin, field.step, volume)
     own = stock.holds_most(mesh.triangles.mean(axis=1))
 
-    def piece(n: int, at: Slices) -> LoosePiece:
+    def piece(n: int, at: Slices, let_go: bool) -> LoosePiece:
         middle = field.origin + 0.5 * field.step * np.array([s.start + s.stop - 1 for s in at])
-        return LoosePiece(float(stock.volume[n]), middle, n == own, field.step, np.zeros((0, 2)), 0.0)
+        return LoosePiece(float(stock.volume[n]), middle, n == own, field.step, np.zeros((0, 2)), 0.0,
+                          let_go)
 
-    return [piece(n, at) for n, at in _loose(stock, own, stock.wide, stock.touches, setup)]
+    return [piece(*p) for p in _loose(stock, own, stock.wide, stock.touches, setup, touched)]
 
 
 def _loose(stock: _Lattice, own: int, is_thick: Callable[[int, Slices], bool],
-           is_held: Callable[[int, Slices, F64], bool], setup: ProofSetup) -> list[tuple[int, Slices]]:
-    """Numbers of the loose pieces with the indices of the boxes round them, the part ``own`` first."""
+           is_held: Callable[[int, Slices, F64], bool], setup: ProofSetup,
+           touched: bool) -> list[tuple[int, Slices, bool]]:
+    """Numbers of the loose pieces with the indices of the boxes round them, the part ``own`` first.
+
+    touched : whether fixtures touched the blank
+
+    Returns with each whether they let go of it and of all others.
+    """
     large = [n for n in np.flatnonzero(stock.volume >= VOLUME).tolist() if n > 0]
-    if len(large) < 2:
+    if len(large) < 2 and not touched:
         return []
     boxes = ndimage.find_objects(stock.label)
     pieces = sorted(((n, boxes[n - 1]) for n in large), key=lambda p: -stock.volume[p[0]])
     held = {n for n, at in pieces if any(is_held(n, at, np.asarray(box)) for box in setup.fixtures)}
     thick = [(n, at) for n, at in pieces if is_thick(n, at)]
-    free = [p for p in thick if p[0] not in held] if held else thick[1:]  # without fixtures the largest is held
-    return sorted(free, key=lambda p: p[0] != own)
+    free = [p for p in thick if p[0] not in held] if held or touched else thick[1:]  # the largest is held
+    return sorted(((n, at, not held and touched) for n, at in free), key=lambda p: p[0] != own)
+
+
+def _touched(mesh: TriangleMesh, setup: ProofSetup) -> bool:
+    """Whether a fixture is beside the box round the blank, or in it."""
+    low, high = stock_bounds(mesh.bounds, setup)
+    return any(bool(((box[0] <= high + TOUCH) & (box[1] >= low - TOUCH)).all()) for box in map(np.asarray,
+                                                                                               setup.fixtures))
 
 
 def loose_assumptions(pieces: Sequence[LoosePiece], moves: Moves, cut: NDArray[np.bool_], source: Source,
@@ -173,8 +193,10 @@ def loose_assumptions(pieces: Sequence[LoosePiece], moves: Moves, cut: NDArray[n
         by = f", cut off by line {source.line[line]} of {source.names[source.program[line]]}" if line >= 0 else ""
         more = f" (and {len(pieces) - LISTED} more)" if k == LISTED - 1 and len(pieces) > LISTED else ""
         what = "the part, in a piece" if p.part else "a piece"
+        why = "no fixture touches any more" if p.let_go else \
+            f"nothing thicker than {p.joined:.2g} mm joins to the rest of the stock{by}"
         yield Assumed(AssumedKind.LOOSE_STOCK, f"held: {what} of {p.volume:.0f} mm³ at X{x:.1f} Y{y:.1f} Z{z:.1f} that "
-                      f"nothing thicker than {p.joined:.2g} mm joins to the rest of the stock{by}{more}",
+                      f"{why}{more}",
                       "it lies loose, and the tool catches it and breaks or throws it",
                       "hold it (fixtures, tape, vacuum), leave tabs, or mill it away")
 

@@ -16,6 +16,7 @@ from verify.moves import Moves
 
 STEP, TOP = 0.25, 6.0
 PART = box_mesh([-7.0, -7.0, 0.0], [7.0, 7.0, TOP])
+BLANK = np.array([[-15.0, -15.0, 0.0], [15.0, 15.0, TOP]])
 JAW = np.array([[-30.0, -5.0, -5.0], [-15.0, 5.0, 3.0]])  # beside the blank from X-15 on
 FLAT = ToolBody("T1", 1, 6.0, 0.0, 14.0, 6.0, 14.0, 6.0, 26.0, ())
 
@@ -41,8 +42,8 @@ def nodes(*rings):
     return DistanceField(np.array([-15.0 + 0.5 * STEP, -15.0 + 0.5 * STEP, 0.0]), STEP, values)
 
 
-def loose(stock, fixtures=()):
-    setup = ProofSetup(fixtures=tuple(fixtures))
+def loose(stock, fixtures=(), **more):
+    setup = ProofSetup(fixtures=tuple(fixtures), **more)
     return (loose_lines if isinstance(stock, StockLines) else loose_nodes)(stock, PART, setup)
 
 
@@ -52,6 +53,15 @@ def test_a_slug_is_loose_and_the_frame_is_not(stock):
         (slug,) = loose(stock((3.0, 9.0, 0.0)), held)
         assert slug.volume == pytest.approx(6.0 * 6.0 * TOP, rel=0.03)
         np.testing.assert_allclose(slug.middle, [0.0, 0.0, 0.5 * TOP], atol=STEP)
+
+
+@pytest.mark.parametrize("stock", [lines, nodes])
+def test_a_part_that_its_jaw_touches_no_more_is_loose(stock):
+    """The jaw touches the blank at X-15; milled away from X-14 on, the part stands before it."""
+    (part,) = loose(stock((13.9, 15.0, 0.0)), [JAW], stock_kind="box", stock_box=BLANK)
+    assert part.part and part.let_go
+    assert not loose(stock((13.9, 15.0, 1.0)), [JAW], stock_kind="box", stock_box=BLANK)  # a floor of 1 mm is left
+    assert not loose(stock((13.9, 15.0, 0.0)), [JAW - [5.0, 0.0, 0.0]], stock_kind="box", stock_box=BLANK)
 
 
 @pytest.mark.parametrize("stock", [lines, nodes])
