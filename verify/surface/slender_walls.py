@@ -163,13 +163,17 @@ def _followed(tree: TriangleTree, points: F64, normals: F64, thickness: F64, rat
 
 def _way(tree: TriangleTree, points: F64, normals: F64, thickness: F64, along: F64, ratio: float,
          skin: float) -> tuple[BOOL, F64]:
-    """Follow sheets one way: whether each has support within ``ratio`` times its mean thickness; that length, mm."""
+    """Follow sheets one way: whether each has support within ``ratio`` times its mean thickness; that length, mm.
+
+    A step is ``STEP`` of the thickness, or of the mean so far where that is more. The thickness of a wedge is k times
+    the way s from its edge and the mean k s / 2, so each step makes the way 1 + ``STEP`` k / 2 times longer.
+    """
     n = len(points)
     held, limit = np.zeros(n, np.bool_), ratio * thickness
     live = np.arange(n)
     middle, square, way = points - 0.5 * thickness[:, None] * normals, normals.copy(), along.copy()
     step = STEP * thickness
-    gone, total, looks = np.zeros(n), thickness.copy(), np.ones(n)
+    gone, total, looks = np.zeros(n), thickness * step, step.copy()  # the thickness over the way, and the way
     while len(live):
         at = middle[live] + step[live, None] * way[live]
         wide, mid, turned, inside = _across(tree, at, square[live], skin)
@@ -179,9 +183,10 @@ def _way(tree: TriangleTree, points: F64, normals: F64, thickness: F64, along: F
         on = inside & ~thick
         rows = live[on]
         gone[rows] += step[rows]
-        total[rows] += wide[on]
-        looks[rows] += 1.0
+        total[rows] += wide[on] * step[rows]
+        looks[rows] += step[rows]
         limit[rows] = ratio * total[rows] / looks[rows]
+        step[rows] = STEP * np.maximum(thickness[rows], total[rows] / looks[rows])
         middle[rows], square[rows] = mid[on], turned[on]
         along_now = way[rows] - (way[rows] * square[rows]).sum(axis=1)[:, None] * square[rows]
         way[rows] = along_now / np.maximum(np.linalg.norm(along_now, axis=1), 1e-9)[:, None]
