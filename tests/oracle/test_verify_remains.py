@@ -230,4 +230,4 @@ def test_a_ray_that_a_shallow_cut_drives_out_of_a_thin_edge_ends_in_nothing_that
     up = up[np.argmin(np.abs(up[:, 0]))] if len(up) else np.array([-math.sin(half), 0.0, math.cos(half)])
     points = np.array([[0.0, 1.0, 0.0], [0.1, 1.0, 0.1 * math.tan(half) * math.copysign(1.0, up[2])]])
     rays = Rays(points, np.array([[-1.0, 0.0, 0.0], up]), np.array([-short, -0.8 * tolerance]))
-    assert agrees(depths_both_ways(left, rays, np.array([0]), 2, tolerance)[0], short)
+    assert agrees(depths_both_ways(left, rays, np.array([0]), np.zeros(1, np.bool_), 2, tolerance)[0], short)

@@ -43,6 +43,28 @@ def test_a_rib(thick, tolerance):
     assert top.any() and not proof.proved[top].any()
 
 
+@pytest.mark.parametrize("left, right, height", [
+    (0.26, 0.26, 3.0), (0.29, 0.22, 3.0), (0.25, 0.2501, 3.0),  # neither is deeper than the tolerance
+    (0.36, 0.2, 3.0), (0.45, 0.06, 3.0),  # one is
+    (0.2, 0.2, 0.0), (0.29, 0.15, 0.0)])  # a rib of 0.1 and 0.06 mm stays
+def test_a_rib_cut_from_both_sides(left, right, height):
+    part = as_part(terraces([0, 10, 10.5, 20.5], [0, 8], [[0.0, 3.0, 0.0]], -4.0))
+    sides = [line for x in (6.0 + left, 14.5 - right) for line in (f"G0 X{x:.4f} Y-6", "G1 Z0 F300", "Y14", "G0 Z20")]
+    depth, proof, samples = deepest(part, 0.3, *sides)
+    assert near(depth, height)
+    top = samples.points[:, 2] > 2.9
+    assert top.any() and (not proof.proved[top].any() or not height)
+
+
+@pytest.mark.parametrize("thick, tolerance", [(0.05, 0.03), (0.15, 0.1), (0.004, 0.005)])
+def test_a_thin_rib_cut_from_both_sides_by_half(thick, tolerance):
+    part = as_part(terraces([0, 10, 10 + thick, 20 + thick], [0, 8], [[0.0, 3.0, 0.0]], -4.0))
+    cut = 0.5 * thick + 0.001
+    sides = [line for x in (6.0 + cut, 14.0 + thick - cut)
+             for line in (f"G0 X{x:.4f} Y-6", "G1 Z0 F300", "Y14", "G0 Z20")]
+    assert near(deepest(part, tolerance, *sides)[0], 3.0)
+
+
 @pytest.mark.parametrize("thick, tolerance", GRID)
 def test_a_floor(thick, tolerance):
     part = as_part(terraces([0, 20], [0, 20], [[thick]], 0.0))

@@ -18,13 +18,14 @@ from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.rays import first_hits
 from geometry.tool_body import ToolBody
 from verify.kernels.surface.remains import CLOSE, SHARE, distances_left
 from verify.material.point_tree import curve_keys
 from verify.material.tiles import run_tiles
 from verify.moves import BOW, Moves, Progress, cutter_table
 from verify.progress import Report, silent
-from verify.surface.guard_points import gouge_depths, inside_part
+from verify.surface.guard_points import FACETS_OFF, gouge_depths, inside_part
 from verify.tool_axes import ToolAxes
 
 WHOLE = 0.99  # of the way along a ray: a gouge that deep is measured by its ray
@@ -33,6 +34,10 @@ SHARES = 8  # calls a thread at least, where there are as many places: places di
 CELL = 5.0  # mm: of the places in such a cell only those are measured that may be the farthest
 APART = 0.05  # mm
 MANY_RAYS = 250_000  # whose ends are computed at a time
+SHALLOW = 0.25  # of the tolerance, that the deeper of two cuts takes at least where they make something vanish
+STARTS = 1e-4  # mm: what is nearer to the start of a ray is where it starts
+LEAST_TURNED = 0.1  # cosine: a cut reaches no farther along a ray than its depth by that of their angle
+BESIDE = 0.5  # mm: rays so near to each other tell of one place
 NEAR, MANY = 2.0, 256  # mm, and of them along the places: what cells of that size do not hold is looked for among all
 
 
@@ -136,6 +141,49 @@ class Rays(NamedTuple):
     residual: F64
 
 
+def vanished(left: Remains, rays: Rays, deep: NDArray[np.int64], even: int, tolerance: float) -> NDArray[np.int64]:
+    """Rays where no cut is deeper than the tolerance and yet nothing is left, for the far side is cut too.
+
+    left      : Remains
+    rays      : Rays
+    deep      : (k,) int64, index, those that are cut deeper than the tolerance
+    even      : count of rays that lie evenly over the part; others are not asked
+    tolerance : mm
+
+    Returns (m,) int64, index, rays with nothing left of the part as near as the tolerance. Of two cuts that make a
+    thickness vanish one takes half of it or more, so the part is t <= 2 a thick under its rays. Cuts of less than
+    ``SHALLOW`` of the tolerance are not asked. Then the rays of the far side are asked.
+    """
+    cut = -rays.residual[:even]
+    rows = np.flatnonzero((cut >= SHALLOW * tolerance) & (cut <= tolerance))
+    rows = rows[np.isfinite(_thickness(left.tree, rays, rows, 2.0 * cut[rows]))]
+    found = rows[left.gone(rays.points[rows], tolerance)]
+    both = np.union1d(deep, found)
+    if not len(both):
+        return both
+    rest = np.setdiff1d(np.arange(even), both)
+    rest = rest[_cut_from_behind(left.tree, rays, rest, both, tolerance)]
+    return np.union1d(found, rest[left.gone(rays.points[rest], tolerance)])
+
+
+def _thickness(tree: TriangleTree, rays: Rays, rows: NDArray[np.int64], within: F64) -> F64:
+    """Thickness of the part under rays (k,), (k,) float64, mm; inf where it is more than ``within``, (k,) mm."""
+    points, normals = rays.points[rows], rays.normals[rows]
+    out, begin, open_ = np.full(len(rows), np.inf), np.zeros(len(rows)), np.arange(len(rows))
+    for _ in range(2):  # a sample of the exact surface may lie above its facet, which is not the far side
+        way = within[open_] - begin[open_] + STARTS
+        most = float(way.max(initial=STARTS))
+        t, hit = first_hits(tree, points[open_] - begin[open_, None] * normals[open_], -way[:, None] * normals[open_],
+                            STARTS / most, 1.0)
+        open_, t, hit = open_[hit >= 0], (t * way)[hit >= 0], hit[hit >= 0]
+        far = np.einsum("ij,ij->i", tree.mesh.normals[hit], normals[open_]) < 0.0
+        out[open_[far]] = begin[open_[far]] + t[far]
+        again = ~far & (t < FACETS_OFF)
+        open_ = open_[again]
+        begin[open_] += t[again]
+    return out
+
+
 class LeftOnRays:
     """Places where rays meet what is left: what ``Remains.depths`` starts from.
 
@@ -192,13 +240,42 @@ class LeftOnRays:
         return np.asarray(cKDTree(ends[kept]).query(points)[0], dtype=np.float64)
 
 
-def depths_both_ways(left: Remains, rays: Rays, deep: NDArray[np.int64], even: int, tolerance: float,
-                     tell: Report = silent) -> F64:
+def _cut_from_behind(tree: TriangleTree, rays: Rays, rows: NDArray[np.int64], deep: NDArray[np.int64],
+                     tolerance: float) -> NDArray[np.bool_]:
+    """Whether the ends of rays may be gone, (k,) bool, because a cut from the far side met theirs.
+
+    rows : (k,) int64, index, the rays
+    deep : (d,) int64, index, those that are cut deeper than the tolerance, or where nothing is left
+
+    It is said of some that stand, too.
+    """
+    out = np.zeros(len(rows), np.bool_)
+    most = max(tolerance, -float(rays.residual[deep].min(initial=0.0)))
+    box = rays.points[deep].min(axis=0) - most - BESIDE, rays.points[deep].max(axis=0) + most + BESIDE
+    near = np.flatnonzero(((rays.points[rows] >= box[0]) & (rays.points[rows] <= box[1])).all(axis=1))
+    own = np.maximum(-rays.residual[rows[near]], 0.0)
+    thick = _thickness(tree, rays, rows[near], own + most)
+    thin = np.isfinite(thick)
+    near, own, thick = near[thin], own[thin], thick[thin]
+    if len(near):
+        behind = rays.points[rows[near]] - thick[:, None] * rays.normals[rows[near]]
+        away, k = cKDTree(rays.points[deep]).query(behind, distance_upper_bound=BESIDE)
+        there = np.full(len(near), tolerance)
+        met = np.flatnonzero(np.isfinite(away))
+        turned = np.abs(np.einsum("ij,ij->i", rays.normals[rows[near[met]]], rays.normals[deep[k[met]]]))
+        there[met] = np.maximum(tolerance, -rays.residual[deep[k[met]]]) / np.maximum(turned, LEAST_TURNED)
+        out[near] = thick <= own + there + STARTS
+    return out
+
+
+def depths_both_ways(left: Remains, rays: Rays, deep: NDArray[np.int64], thin: NDArray[np.bool_], even: int,
+                     tolerance: float, tell: Report = silent) -> F64:
     """Depth of gouges: removed places to the surface, or surface that is gone to what is left [Hausdorff1914].
 
     left      : Remains
     rays      : Rays
     deep      : (k,) int64, index, the rays on which the part is cut, in rising order
+    thin      : (k,) bool, those of them that are ``vanished``
     even      : count of rays that lie evenly over the part. Those after them are close round places that are cut. They
                 are asked for the second way only where none of the others in their cell is gone, one in 0.05 mm
     tolerance : mm; where something is left as near as that, only the first way counts
@@ -208,13 +285,14 @@ def depths_both_ways(left: Remains, rays: Rays, deep: NDArray[np.int64], even: i
     """
     points, along = rays.points[deep], -rays.residual[deep]
     depth = gouge_depths(left.tree, points, rays.normals[deep], along, lambda f: tell(0.3 * f))
-    whole = depth >= WHOLE * along  # what is left begins at the end of the ray
+    whole = (depth >= WHOLE * along) & ~thin  # what is left begins at the end of the ray
     if whole.all():
         return depth
     ends = np.ones(len(rays.points), np.bool_)
     ends[deep[~whole]] = False
     size = float(np.linalg.norm(np.diff(left.tree.mesh.bounds, axis=0)))
-    there = LeftOnRays(left.tree, rays, np.flatnonzero(ends), size)
+    rows = np.flatnonzero(ends)
+    there = LeftOnRays(left.tree, rays, rows[~_cut_from_behind(left.tree, rays, rows, deep, tolerance)], size)
 
     def second(rows: NDArray[np.int64], first: float, last: float) -> NDArray[np.int64]:
         bound = there.bounds(points[rows])

@@ -40,7 +40,7 @@ from verify.surface.guard_points import (
     wide_samples,
     worth_a_look,
 )
-from verify.surface.remains import Rays, Remains, depths_both_ways
+from verify.surface.remains import Rays, Remains, depths_both_ways, vanished
 from verify.surface.removal import residual_on_normals
 from verify.surface.sample_scores import RAY_ERROR
 
@@ -258,10 +258,10 @@ def _deepened(taken: list[_Table], even: int, tree: TriangleTree, shot: _Shootin
     even  : count of rays that lie evenly over the part
     """
     tolerance = shot.setup.gouge_tolerance
-    near = _cut(taken[0], shot)
-    if not len(near):
-        return taken.pop()
-    doubtful, deep = closer_seeds(near.points, near.residual, near.mover, tolerance)
+    near, left = _cut(taken[0], shot), Remains(tree, shot.moves, shot.tools, shot.threads)
+    doubtful = deep = np.zeros((0, 3))
+    if len(near):
+        doubtful, deep = closer_seeds(near.points, near.residual, near.mover, tolerance)
     looks, kept = len(doubtful) + len(deep), [taken.pop()]
     for i in range(0, len(doubtful), SEED_BATCH):
         seeds = doubtful[i:i + SEED_BATCH]
@@ -274,9 +274,13 @@ def _deepened(taken: list[_Table], even: int, tree: TriangleTree, shot: _Shootin
         kept.append(_gouged(_close_rays(tree, shot, *closer_points(tree, seeds)), shot))
         tell(0.25 + 0.25 * (i + len(seeds)) / len(deep))
     table = _joined(kept)
+    rays = Rays(table.points, table.normals, table.residual)
     rows = np.flatnonzero((table.residual < -tolerance) & (table.mover >= 0))
-    rays, left = Rays(table.points, table.normals, table.residual), Remains(tree, shot.moves, shot.tools, shot.threads)
-    table.residual[rows] = -depths_both_ways(left, rays, rows, even, tolerance, lambda f: tell(0.5 + 0.5 * f))
+    thin = vanished(left, rays, rows, even, tolerance)
+    rows = np.union1d(rows, thin)
+    if len(rows):
+        table.residual[rows] = -depths_both_ways(left, rays, rows, np.isin(rows, thin), even, tolerance,
+                                                 lambda f: tell(0.5 + 0.5 * f))
     return table
 
 
