@@ -325,7 +325,7 @@ def left_at_m99(rng: Rng) -> Case:
     s.head = ["%", "O1000", "G21 G17 G90 G94 G40 G49 G80".replace(word, ""), "G54"]
     s.foot = ["M5", "G91 G28 Z0.", "G90", left, "M99", "%"]
     return made("left at M99", part, s, ("program", REFUSED), None, None, {"machine": {"dialects": [dialect]}}, dialect,
-                word="M99", what=left)
+                word="begins again", what=left)
 
 
 def left_in_a_table(rng: Rng) -> Case:
