@@ -123,7 +123,7 @@ PAIRS = {
     "machine place": ("L X+5\nL Z+0 R0 FMAX M91\nL Z-1 F999 M91\nL X+7 Y+7 FMAX\nL Z+9 FMAX",
                       "G1 X5\nG0 G53 Z0\nX7 Y7\nZ9"),
     "feeds of TOOL CALL": ("L X+5 FAUTO\nL X+6 F50\nL X+7 FAUTO", "G1 X5 F200\nX6 F50\nX7 F200"),
-    "idle words": ("M118 X1 Y1\nL X+1 M120 LA5\nM103 F0.5\nM107\nL X+2 M98\nFUNCTION MODE MILL\nFN 14: "
-                   "ERROR=1000\nM6\nM3",
+    "idle words": ("M118 X1 Y1\nL X+1 M120 LA5\nM103 F0.5\nM107\nL X+2 M98\nFUNCTION MODE MILL\nM6\n"
+                   "M3",
                    "G1 X1\nX2"),
 }

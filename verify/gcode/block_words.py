@@ -50,6 +50,7 @@ _PLACES = frozenset("XYZABC")
 _WORD = re.compile(rf"([A-Z@^])({NUMBER})")
 _COMMENT = re.compile(r"\([^()]*\)")
 _SCRIPT = re.compile(r"[;(]\s*PY\s*,", re.IGNORECASE)
+_ABORT = re.compile(r"[;(]\s*ABORT\s*,", re.IGNORECASE)
 _FOREIGN = re.compile(r"[^\t -~]")
 _M_CODES = frozenset({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 60, 61}) | SAVES
 _ROTARY = "ABC"
@@ -153,10 +154,12 @@ def bare(text: str) -> str:
     Raises
     ------
     BlockError
-        An open comment, a comment that LinuxCNC runs as Python, a character outside ASCII.
+        An open comment, one that LinuxCNC runs as Python or that ends the program, a character outside ASCII.
     """
     if _SCRIPT.search(text):
         raise BlockError("LinuxCNC runs this comment as Python ('py,')")
+    if _ABORT.search(text):
+        raise BlockError("the program stops here with an alarm ('abort,'), and what follows is never run")
     text = _COMMENT.sub(" ", text).split(";", 1)[0]
     if "(" in text or ")" in text:
         raise BlockError("a comment is not closed")

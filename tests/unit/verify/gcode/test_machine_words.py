@@ -57,3 +57,25 @@ def test_the_page_lists_every_refused_word():
     for title, words in (("Fanuc", FANUC_M), ("Haas", HAAS_M), ("Siemens", SIEMENS_M), ("Heidenhain", HEIDENHAIN_M)):
         row = re.search(rf"^\| {title} \| (M.*) \|$", page, re.MULTILINE)[1]
         assert {int(m) for m in re.findall(r"M(\d+)", row)} >= set(words), title
+
+
+ALARMS = [
+    ("linuxcnc", "(ABORT, worn)", "o100 if [1 EQ 2]\n(abort, worn)\no100 endif"),
+    ("fanuc", "#3000=1(WORN)", "IF[1 NE 2]GOTO5\n#3000=1(WORN)\nN5"),
+    ("haas", "#3000=1", "IF[1 NE 2]GOTO5\n#3000=1\nN5"),
+    ("siemens", "SETAL(65000)", "IF 1==2\nSETAL(65000)\nENDIF"),
+    ("heidenhain", "FN 14: ERROR=1000", "FN 9: IF +1 EQU +1 GOTO LBL 5\nFN 14: ERROR=1000\nLBL 5"),
+]
+
+
+@pytest.mark.parametrize(("dialect", "alarm", "guarded"), ALARMS)
+def test_an_alarm_of_the_program_ends_it_where_it_is_reached(dialect, alarm, guarded):
+    """What follows is never run; behind a jump that passes it over nothing happens."""
+    with pytest.raises(ProgramError, match="stops here with an alarm"):
+        program(dialect, alarm)
+    program(dialect, guarded)
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas"])
+def test_on_fanuc_and_haas_abort_is_a_comment_like_others(dialect):
+    program(dialect, "(ABORT, WORN)")

@@ -27,7 +27,8 @@ _JUMP = re.compile(rf'FN\s*(9|10|11|12)\s*:\s*IF\s*({VALUE})\s*(EQU|NE|GT|LT)\s*
                    r'("[^"]*"|[0-9]+)')
 _FORMULA = re.compile(r"(Q[LR]?[0-9]+)\s*=\s*(.+)")
 _TOKEN = re.compile(rf"\s*({NUM}|Q[LR]?[0-9]+|[A-Z]+|[-+*/^%()])")
-SILENT = frozenset({14, 15, 16, 19, 20, 29, 37, 38})
+ALARM = 14
+SILENT = frozenset({15, 16, 19, 20, 29, 37, 38})
 """FN functions that stop, print or talk to the machine and move nothing."""
 
 
@@ -86,6 +87,8 @@ class QParameters:
             self.put(m[2], self._function(int(m[1]), m[3].strip()))
             return True
         if m := re.match(r"FN\s*([0-9]+)\s*:", text):
+            if int(m[1]) == ALARM:
+                raise BlockError(f"{text[:40]}: the program stops here with an alarm")
             if int(m[1]) in SILENT:
                 return True
             raise BlockError(f"FN {m[1]} is not followed: FN 0 to FN 13 are")

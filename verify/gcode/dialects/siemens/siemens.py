@@ -488,6 +488,8 @@ class SiemensReader(SiemensCalls):
         elif name == "SETMS" and parts not in ([""], ["1"]):
             raise BlockError(f"SETMS({','.join(parts)[:20]}): another spindle becomes the master, and S and M3 turn "
                              "that one")
+        elif name == "SETAL":
+            raise BlockError(f"SETAL({','.join(parts)[:20]}): the program stops here with an alarm")
         elif name in ("HOLES1", "HOLES2"):
             self._row(name, self._values(name, parts), line)
         elif name == "CYCLE832":

@@ -53,7 +53,7 @@ DEGREE_IS_MM = 57.2957
 """mm, FGREF of a rotary axis at which one degree counts as 1 mm: as delivered."""
 
 IDLE_CALLS = frozenset("""
-    BRISKA CLRINT DELETE DISABLE DRIVEA ENABLE FGREF FGROUP GROUP_ADDEND GROUP_BEGIN GROUP_END MSG NEWCONF SETAL
+    BRISKA CLRINT DELETE DISABLE DRIVEA ENABLE FGREF FGROUP GROUP_ADDEND GROUP_BEGIN GROUP_END MSG NEWCONF
     SETMS SOFTA SPCOF SPCON SPI WAITP WORKPIECE WRITE""".split())
 """Calls without a move: lines on the screen, the blank of the graphics, limits of speed."""
 
