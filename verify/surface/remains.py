@@ -37,7 +37,8 @@ MANY_RAYS = 250_000  # whose ends are computed at a time
 SHALLOW = 0.25  # of the tolerance, that the deeper of two cuts takes at least where they make something vanish
 STARTS = 1e-4  # mm: what is nearer to the start of a ray is where it starts
 LEAST_TURNED = 0.1  # cosine: a cut reaches no farther along a ray than its depth by that of their angle
-BESIDE = 0.5  # mm: rays so near to each other tell of one place
+BESIDE, FEW = 0.5, 8  # mm: rays so near to each other tell of one place; how many of them do
+APART_ASKED = 1.0  # mm: one place in such a cell is asked whether anything is left near it
 NEAR, MANY = 2.0, 256  # mm, and of them along the places: what cells of that size do not hold is looked for among all
 
 
@@ -150,20 +151,57 @@ def vanished(left: Remains, rays: Rays, deep: NDArray[np.int64], even: int, tole
     even      : count of rays that lie evenly over the part; others are not asked
     tolerance : mm
 
-    Returns (m,) int64, index, rays with nothing left of the part as near as the tolerance. Of two cuts that make a
-    thickness vanish one takes half of it or more, so the part is t <= 2 a thick under its rays. Cuts of less than
-    ``SHALLOW`` of the tolerance are not asked. Then the rays of the far side are asked.
+    Returns (m,) int64, index. Of two cuts that make a thickness vanish one takes half of it or more, so the part is
+    t <= 2 a thick under its rays, and rays near their far ends are cut by t - a. Cuts of less than ``SHALLOW`` of the
+    tolerance are not asked. Then the rays of the far side are asked. One ray of each cell of ``APART_ASKED`` mm is
+    asked for all that may be gone there: how deep each is cut is measured later.
     """
     cut = -rays.residual[:even]
     rows = np.flatnonzero((cut >= SHALLOW * tolerance) & (cut <= tolerance))
-    rows = rows[np.isfinite(_thickness(left.tree, rays, rows, 2.0 * cut[rows]))]
-    found = rows[left.gone(rays.points[rows], tolerance)]
+    thick = _thickness(left.tree, rays, rows, 2.0 * cut[rows])
+    rows, thick = rows[np.isfinite(thick)], thick[np.isfinite(thick)]
+    over = cut[rows] + _cut_at(rays, rows, thick, np.flatnonzero(cut > CLOSE)) - thick
+    rows, over = rows[over > -STARTS], over[over > -STARTS]
+    found = rows[_gone_by_cell(left, rays.points[rows], over, tolerance)]
     both = np.union1d(deep, found)
     if not len(both):
         return both
     rest = np.setdiff1d(np.arange(even), both)
-    rest = rest[_cut_from_behind(left.tree, rays, rest, both, tolerance)]
-    return np.union1d(found, rest[left.gone(rays.points[rest], tolerance)])
+    over = _over_from_behind(left.tree, rays, rest, both, tolerance)
+    rest, over = rest[over >= 0.0], over[over >= 0.0]
+    return np.union1d(found, rest[_gone_by_cell(left, rays.points[rest], over, tolerance)])
+
+
+def _gone_by_cell(left: Remains, points: F64, over: F64, tolerance: float) -> NDArray[np.bool_]:
+    """Whether nothing is left near a place of each cell, (n,) bool.
+
+    points : (n, 3) float64, mm, setup frame
+    over   : (n,) float64, mm, the place where it is most is asked
+    """
+    if not len(points):
+        return np.zeros(0, np.bool_)
+    _, cell = np.unique(np.floor(points / APART_ASKED).astype(np.int64), axis=0, return_inverse=True)
+    cell = cell.reshape(-1)
+    order = np.lexsort((np.arange(len(over)), -over, cell))
+    asked = order[np.unique(cell[order], return_index=True)[1]]
+    return np.asarray(left.gone(points[asked], tolerance)[cell])
+
+
+def _cut_at(rays: Rays, rows: NDArray[np.int64], thick: F64, among: NDArray[np.int64]) -> F64:
+    """How deep the part is cut at the far ends of rays, along them, (k,) float64, mm: the most of the rays beside.
+
+    rows, thick : (k,) int64, index, the rays, and (k,) float64, mm, how far off their far ends are
+    among       : (m,) int64, index, the rays that may be there
+    """
+    out = np.zeros(len(rows))
+    if len(rows) and len(among):
+        behind = rays.points[rows] - thick[:, None] * rays.normals[rows]
+        away, k = cKDTree(rays.points[among]).query(behind, FEW, distance_upper_bound=BESIDE)
+        there = among[np.where(np.isfinite(away), k, 0)]
+        turned = np.abs(np.einsum("ij,ikj->ik", rays.normals[rows], rays.normals[there]))
+        cut = np.maximum(-rays.residual[there], 0.0) / np.maximum(turned, LEAST_TURNED)
+        out = np.where(np.isfinite(away), cut, 0.0).max(axis=1)
+    return np.asarray(out)
 
 
 def _thickness(tree: TriangleTree, rays: Rays, rows: NDArray[np.int64], within: F64) -> F64:
@@ -240,16 +278,16 @@ class LeftOnRays:
         return np.asarray(cKDTree(ends[kept]).query(points)[0], dtype=np.float64)
 
 
-def _cut_from_behind(tree: TriangleTree, rays: Rays, rows: NDArray[np.int64], deep: NDArray[np.int64],
-                     tolerance: float) -> NDArray[np.bool_]:
-    """Whether the ends of rays may be gone, (k,) bool, because a cut from the far side met theirs.
+def _over_from_behind(tree: TriangleTree, rays: Rays, rows: NDArray[np.int64], deep: NDArray[np.int64],
+                      tolerance: float) -> F64:
+    """How far a cut from the far side may reach over the ends of rays, (k,) float64, mm; -inf where it does not.
 
     rows : (k,) int64, index, the rays
     deep : (d,) int64, index, those that are cut deeper than the tolerance, or where nothing is left
 
-    It is said of some that stand, too.
+    From 0 on the ends may be gone. It is said of some that stand, too: a cut of the tolerance counts everywhere.
     """
-    out = np.zeros(len(rows), np.bool_)
+    out = np.full(len(rows), -np.inf)
     most = max(tolerance, -float(rays.residual[deep].min(initial=0.0)))
     box = rays.points[deep].min(axis=0) - most - BESIDE, rays.points[deep].max(axis=0) + most + BESIDE
     near = np.flatnonzero(((rays.points[rows] >= box[0]) & (rays.points[rows] <= box[1])).all(axis=1))
@@ -257,14 +295,8 @@ def _cut_from_behind(tree: TriangleTree, rays: Rays, rows: NDArray[np.int64], de
     thick = _thickness(tree, rays, rows[near], own + most)
     thin = np.isfinite(thick)
     near, own, thick = near[thin], own[thin], thick[thin]
-    if len(near):
-        behind = rays.points[rows[near]] - thick[:, None] * rays.normals[rows[near]]
-        away, k = cKDTree(rays.points[deep]).query(behind, distance_upper_bound=BESIDE)
-        there = np.full(len(near), tolerance)
-        met = np.flatnonzero(np.isfinite(away))
-        turned = np.abs(np.einsum("ij,ij->i", rays.normals[rows[near[met]]], rays.normals[deep[k[met]]]))
-        there[met] = np.maximum(tolerance, -rays.residual[deep[k[met]]]) / np.maximum(turned, LEAST_TURNED)
-        out[near] = thick <= own + there + STARTS
+    there = np.maximum(_cut_at(rays, rows[near], thick, deep), tolerance)
+    out[near] = own + there + STARTS - thick
     return out
 
 
@@ -292,12 +324,14 @@ def depths_both_ways(left: Remains, rays: Rays, deep: NDArray[np.int64], thin: N
     ends[deep[~whole]] = False
     size = float(np.linalg.norm(np.diff(left.tree.mesh.bounds, axis=0)))
     rows = np.flatnonzero(ends)
-    there = LeftOnRays(left.tree, rays, rows[~_cut_from_behind(left.tree, rays, rows, deep, tolerance)], size)
+    over = _over_from_behind(left.tree, rays, rows, deep, tolerance)
+    there = LeftOnRays(left.tree, rays, rows[over < 0.0], size)
 
     def second(rows: NDArray[np.int64], first: float, last: float) -> NDArray[np.int64]:
         bound = there.bounds(points[rows])
         rows, bound = rows[bound > tolerance], bound[bound > tolerance]
-        gone = left.gone(points[rows], tolerance, lambda f: tell(first + 0.5 * (last - first) * f))
+        gone = thin[rows]
+        gone[~gone] = left.gone(points[rows[~gone]], tolerance, lambda f: tell(first + 0.5 * (last - first) * f))
         rows, bound = rows[gone], bound[gone]
         away = left.depths(points[rows], bound, lambda f: tell(0.5 * (first + last) + 0.5 * (last - first) * f))
         depth[rows] = np.maximum(depth[rows], away)
