@@ -76,6 +76,11 @@ def test_an_alarm_of_the_program_ends_it_where_it_is_reached(dialect, alarm, gua
     program(dialect, guarded)
 
 
+@pytest.mark.parametrize("comment", ["; abort, worn", "(abort , worn)", "(aborted, worn)"])
+def test_what_linuxcnc_takes_for_a_comment_stops_nothing(comment):
+    program("linuxcnc", comment)
+
+
 @pytest.mark.parametrize("dialect", ["fanuc", "haas"])
 def test_on_fanuc_and_haas_abort_is_a_comment_like_others(dialect):
     program(dialect, "(ABORT, WORN)")

@@ -55,7 +55,7 @@ SMALL = 0.01
 _RESET = re.compile(r"TRANS (MIRROR|ROTATION|SCALE) RESET")
 _DEF = re.compile(rf"TOOL DEF\s+(\"[^\"]*\"|{NUMBER}|QS?[0-9]+)((?:\s+[LR]\s*{VALUE})*)")
 _SIZE = re.compile(rf"([LR])\s*({VALUE})")
-_IDLE = ("BLK FORM", "* -", "*", "FUNCTION PROG PATH", "FUNCTION MODE MILL", "FUNCTION FEED DWELL",
+_IDLE = ("BLK FORM", "* -", "*", "FUNCTION PROG PATH OFF", "FUNCTION MODE MILL", "FUNCTION FEED DWELL",
          "FUNCTION S-PULSE RESET",
          "FUNCTION DWELL", "WMAT", "CYCL DEF 13.", "FUNCTION COUNT", "FUNCTION FILE", "OPEN TABLE",
          "FUNCTION FEED RESET",
@@ -73,6 +73,7 @@ _REFUSED = {
     "FUNCTION POLARKIN": "polar kinematics", "SEL CORR-TABLE": "a correction table",
     "FUNCTION CORRDATA": "a correction table",
     "TRANS DATUM TABLE": "a datum table", "SEL TABLE": "a datum table", "FUNCTION TURNING": "turning",
+    "FUNCTION PROG PATH": "a path along the contour, not of the tool",
     "CALL PGM": "another program", "FUNCTION S-PULSE P-TIME": "a spindle speed that swings",
 }
 """Openings of blocks that move or cut and are not followed, and what they are."""
@@ -219,7 +220,8 @@ class HeidenhainReader(HeidenhainPaths):
         self.lengthen(given.get("DL", 0.0) * self.factor_of_unit)
         if self.longer and self.swung:
             raise BlockError("TOOL CALL with DL in a tilted plane")
-        if given.get("DR2", 0.0):
+        self.rounder = given.get("DR2", 0.0)
+        if self.rounder:
             self.notes.append("TOOL CALL with DR2 changes the compensation in space only; the reader has none")
         return [" ".join([f"T{number} M6", *out]), *([f"G43 H{number}"] if number else [])]
 

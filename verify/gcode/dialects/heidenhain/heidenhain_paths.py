@@ -182,16 +182,20 @@ class HeidenhainPaths(HeidenhainEdges):
         if all(v is None for v in given):
             if key != "LN":
                 return None
-            if self.wider or self.longer:
-                raise BlockError("LN after TOOL CALL with DL or DR (compensation along the normal) is not followed")
+            self._check_deltas()
             if not self.tcp or all(v is None for v in normal):
                 return None
             given = normal  # under M128 the control holds the tool along the normal
         if turns:
             raise BlockError("a tool vector (TX, TY, TZ) and rotary words in one block")
-        if key == "LN" and (self.wider or self.longer):
-            raise BlockError("LN after TOOL CALL with DL or DR (compensation along the normal) is not followed")
+        if key == "LN":
+            self._check_deltas()
         return tuple(v or 0.0 for v in given)
+
+    def _check_deltas(self) -> None:
+        """Refuse LN with deltas of the tool, by which the control shifts it along the normal."""
+        if self.wider or self.longer or self.rounder:
+            raise BlockError("LN after TOOL CALL with DL, DR or DR2 (compensation along the normal) is not followed")
 
     def _arc(self, key: str, w: Words, move: Move) -> Move:
         start, end = move.start, list(move.end)

@@ -108,7 +108,7 @@ class HeidenhainWords(HeidenhainFrames):
 
     held     : the move before a corner, and the corner: kind, size, F word, line
     approach : an APPR whose first contour move is not known yet
-    side     : of radius compensation, 1 left, -1 right, 0 off; wider : mm, DR of TOOL CALL
+    side     : of radius compensation, 1 left, -1 right, 0 off; wider, rounder : DR, mm, and DR2 of TOOL CALL
     wound    : deg by which a rotary word counts less than the axis has turned (M94)
     calls    : whether the latest move calls a cycle at its end, ``end``; modal_call : whether every move does (M89)
     rate     : the F word in force; auto : feed of TOOL CALL
@@ -127,7 +127,7 @@ class HeidenhainWords(HeidenhainFrames):
         self.in_mm = False  # whether F counts in mm where a rotary axis turns (M116)
         self.inch = self.shortest = self.modal_call = self.calls = self.last_rapid = False
         self.tool = self.side = self.number = 0
-        self.wider = 0.0
+        self.wider = self.rounder = 0.0
         self.turned: dict[str, float] = {}
         self.spatial: dict[str, float] = {}
         self.wound: dict[str, float] = {}
