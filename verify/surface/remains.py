@@ -142,32 +142,31 @@ class Rays(NamedTuple):
     residual: F64
 
 
-def vanished(left: Remains, rays: Rays, deep: NDArray[np.int64], even: int, tolerance: float) -> NDArray[np.int64]:
-    """Rays where no cut is deeper than the tolerance and yet nothing is left, for the far side is cut too.
+def vanished(left: Remains, rays: Rays, even: int, tolerance: float) -> NDArray[np.int64]:
+    """Rays with nothing left of the part as near as the tolerance, for cuts take its whole thickness.
 
     left      : Remains
     rays      : Rays
-    deep      : (k,) int64, index, those that are cut deeper than the tolerance
     even      : count of rays that lie evenly over the part; others are not asked
     tolerance : mm
 
-    Returns (m,) int64, index. Of two cuts that make a thickness vanish one takes half of it or more, so the part is
-    t <= 2 a thick under its rays, and rays near their far ends are cut by t - a. Cuts of less than ``SHALLOW`` of the
-    tolerance are not asked. Then the rays of the far side are asked. One ray of each cell of ``APART_ASKED`` mm is
-    asked for all that may be gone there: how deep each is cut is measured later.
+    Returns (m,) int64, index. Of two cuts that make a thickness vanish, perhaps neither deeper than the tolerance, one
+    takes half of it or more. So the part is t <= 2 a thick under its rays, and rays near their far ends are cut by
+    t - a. Cuts of less than ``SHALLOW`` of the tolerance are not asked. Then the rays of the far side are asked. One
+    ray of each cell of ``APART_ASKED`` mm is asked for all that may be gone there: how deep each is cut is measured
+    later.
     """
     cut = -rays.residual[:even]
-    rows = np.flatnonzero((cut >= SHALLOW * tolerance) & (cut <= tolerance))
+    rows = np.flatnonzero(cut >= SHALLOW * tolerance)
     thick = _thickness(left.tree, rays, rows, 2.0 * cut[rows])
     rows, thick = rows[np.isfinite(thick)], thick[np.isfinite(thick)]
     over = cut[rows] + _cut_at(rays, rows, thick, np.flatnonzero(cut > CLOSE)) - thick
     rows, over = rows[over > -STARTS], over[over > -STARTS]
     found = rows[_gone_by_cell(left, rays.points[rows], over, tolerance)]
-    both = np.union1d(deep, found)
-    if not len(both):
-        return both
-    rest = np.setdiff1d(np.arange(even), both)
-    over = _over_from_behind(left.tree, rays, rest, both, tolerance)
+    if not len(found):
+        return found
+    rest = np.setdiff1d(np.arange(even), found)
+    over = _over_from_behind(left.tree, rays, rest, found, tolerance)
     rest, over = rest[over >= 0.0], over[over >= 0.0]
     return np.union1d(found, rest[_gone_by_cell(left, rays.points[rest], over, tolerance)])
 
@@ -194,8 +193,9 @@ def _cut_at(rays: Rays, rows: NDArray[np.int64], thick: F64, among: NDArray[np.i
     among       : (m,) int64, index, the rays that may be there
     """
     out = np.zeros(len(rows))
-    if len(rows) and len(among):
-        behind = rays.points[rows] - thick[:, None] * rays.normals[rows]
+    behind = rays.points[rows] - thick[:, None] * rays.normals[rows]
+    among = among[_in_cells(rays.points[among], behind)]
+    if len(among):
         away, k = cKDTree(rays.points[among]).query(behind, FEW, distance_upper_bound=BESIDE)
         there = among[np.where(np.isfinite(away), k, 0)]
         turned = np.abs(np.einsum("ij,ikj->ik", rays.normals[rows], rays.normals[there]))
@@ -278,12 +278,27 @@ class LeftOnRays:
         return np.asarray(cKDTree(ends[kept]).query(points)[0], dtype=np.float64)
 
 
+def _in_cells(points: F64, others: F64) -> NDArray[np.bool_]:
+    """Whether one of (m, 3) others may be within ``BESIDE`` of points (n, 3), mm, (n,) bool."""
+    if not len(others):
+        return np.zeros(len(points), np.bool_)
+    low = np.floor(others.min(axis=0) / BESIDE) - 1.0
+    size = np.floor(others.max(axis=0) / BESIDE) - low + 2.0
+    scale = np.array([size[1] * size[2], size[2], 1.0])
+    around = np.stack(np.meshgrid(*[np.arange(-1.0, 2.0)] * 3), axis=-1).reshape(-1, 3) @ scale
+    wanted = np.unique(((np.unique(np.floor(others / BESIDE), axis=0) - low) @ scale)[:, None] + around)
+    cell = np.floor(points / BESIDE) - low
+    inside = ((cell >= 0.0) & (cell < size)).all(axis=1)
+    inside[inside] = np.isin(cell[inside] @ scale, wanted)
+    return inside
+
+
 def _over_from_behind(tree: TriangleTree, rays: Rays, rows: NDArray[np.int64], deep: NDArray[np.int64],
                       tolerance: float) -> F64:
     """How far a cut from the far side may reach over the ends of rays, (k,) float64, mm; -inf where it does not.
 
     rows : (k,) int64, index, the rays
-    deep : (d,) int64, index, those that are cut deeper than the tolerance, or where nothing is left
+    deep : (d,) int64, index, those where nothing is left
 
     From 0 on the ends may be gone. It is said of some that stand, too: a cut of the tolerance counts everywhere.
     """
@@ -324,8 +339,9 @@ def depths_both_ways(left: Remains, rays: Rays, deep: NDArray[np.int64], thin: N
     ends[deep[~whole]] = False
     size = float(np.linalg.norm(np.diff(left.tree.mesh.bounds, axis=0)))
     rows = np.flatnonzero(ends)
-    over = _over_from_behind(left.tree, rays, rows, deep, tolerance)
-    there = LeftOnRays(left.tree, rays, rows[over < 0.0], size)
+    if thin.any():
+        rows = rows[_over_from_behind(left.tree, rays, rows, deep[thin], tolerance) < 0.0]
+    there = LeftOnRays(left.tree, rays, rows, size)
 
     def second(rows: NDArray[np.int64], first: float, last: float) -> NDArray[np.int64]:
         bound = there.bounds(points[rows])

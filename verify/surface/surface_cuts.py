@@ -276,7 +276,7 @@ def _deepened(taken: list[_Table], even: int, tree: TriangleTree, shot: _Shootin
     table = _joined(kept)
     rays = Rays(table.points, table.normals, table.residual)
     rows = np.flatnonzero((table.residual < -tolerance) & (table.mover >= 0))
-    thin = vanished(left, rays, rows, even, tolerance)
+    thin = vanished(left, rays, even, tolerance)
     rows = np.union1d(rows, thin)
     if len(rows):
         table.residual[rows] = -depths_both_ways(left, rays, rows, np.isin(rows, thin), even, tolerance,
