@@ -57,7 +57,8 @@ _DEF = re.compile(rf"TOOL DEF\s+(\"[^\"]*\"|{NUMBER}|QS?[0-9]+)((?:\s+[LR]\s*{VA
 _SIZE = re.compile(rf"([LR])\s*({VALUE})")
 _IDLE = ("BLK FORM", "* -", "*", "FUNCTION PROG PATH OFF", "FUNCTION MODE MILL", "FUNCTION FEED DWELL",
          "FUNCTION S-PULSE RESET",
-         "FUNCTION DWELL", "WMAT", "CYCL DEF 13.", "FUNCTION COUNT", "FUNCTION FILE", "OPEN TABLE",
+         "FUNCTION DWELL", "WMAT", "CYCL DEF 13.", "FUNCTION FILE", "OPEN TABLE",
+         *(f"FUNCTION COUNT {word}" for word in ("INC", "RESET", "ADD", "SET", "TARGET")),
          "FUNCTION FEED RESET",
          "FUNCTION AFC", "SEL TABLE", "FUNCTION DCM", "CYCL DEF 14.",
          "FUNCTION DRESS OFF")
@@ -73,6 +74,7 @@ _REFUSED = {
     "FUNCTION POLARKIN": "polar kinematics", "SEL CORR-TABLE": "a correction table",
     "FUNCTION CORRDATA": "a correction table",
     "TRANS DATUM TABLE": "a datum table", "SEL TABLE": "a datum table", "FUNCTION TURNING": "turning",
+    "FUNCTION COUNT": "a jump that the counter of the control decides",
     "FUNCTION PROG PATH": "a path along the contour, not of the tool",
     "CALL PGM": "another program", "FUNCTION S-PULSE P-TIME": "a spindle speed that swings",
 }

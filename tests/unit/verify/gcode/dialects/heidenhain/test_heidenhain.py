@@ -165,6 +165,7 @@ REFUSED = [
     ("LX+1", "cannot read"),
     ("CYCL DEF 247 Q339=+40", "a setup can name"), ("L X+5 RL\nL Z+0 FMAX M91", "M91 with radius"),
     ("SPL X+1", "a spline"), ("FUNCTION PROG PATH IS CONTOUR", "a path along the contour"),
+    ("LBL 1\nL X+1 F99\nFUNCTION COUNT REPEAT LBL 1", "a jump that the counter"),
     ("TOOL CALL 1 Z S900 DR2+1\nLN X+1 Y+0 Z+3 NX+1 NY+0 NZ+0 F99", "DR2"),
     ("FUNCTION TCPM F TCP AXIS POS PATHCTRL AXIS REFPNT CENTER-CENTER", "REFPNT CENTER-CENTER"),
     ("CT X+5 Y+5", "no move came"), ("L X+9 RL M197", "M197 (other corners"), ("L X+9 M104",
