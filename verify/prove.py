@@ -34,7 +34,7 @@ from verify.checks.program_sequence import (
     strays_of,
 )
 from verify.checks.repeated_passes import repeats
-from verify.checks.sideways_cuts import sideways_findings, tapped_out, torn_threads
+from verify.checks.sideways_cuts import sideways_findings, tapped_out, torn_threads, turned_backwards
 from verify.checks.table_clearance import table_findings
 from verify.checks.tap_holes import tap_holes
 from verify.checks.thread_teeth import drawn_thread_mills, taps_in_holes
@@ -153,6 +153,7 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     took = np.concatenate([np.zeros(0), *(minutes_of(p.program, setup) for p in framed)])
     in_cut = cut_sequence(framed, known, run, moves, source, tools, stretches, of, took[known], met.spacing)
     slack = setup.scallop_height + setup.gouge_tolerance + setup.stock_allowance
+    backwards = _joined([p.program.reversed_by for p in framed], known)
     tapped = taps_in_holes(moves, tools, tree, slack)
     loaded, cautions = loads(in_cut, tools, setup.cutting, run.cut | tapped.any(axis=1))
     drills = drill_loads(in_cut, tools, setup.cutting, setup, tree, threads)
@@ -170,7 +171,9 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                 *idle_programs(source.names, run.cut, moves, source, no_trace, asked),
                 *again, *sideways_findings(moves, run.cut, tools, source),
                 *torn_threads(moves, run.cut, tapped[:, 0], tools, source),
-                *tapped_out(moves, run.cut, tapped[:, 0], tools, source, [p.program.taps for p in framed]),
+                *tapped_out(moves, run.cut, tapped[:, 0], tools, source, [p.program.taps for p in framed],
+                            backwards),
+                *turned_backwards(moves, backwards, tools, source),
                 *drawn_thread_mills(moves, run.cut, tools, source, tree, slack, _pitches(setup)),
                 *(box_findings(moves, slides, *dogleg_limits(part.mesh, moves, tools, setup), source)
                   if setup.dogleg else ()),
@@ -182,9 +185,10 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
         measured = Measured(scored.samples, cuts.residual, cuts.mover, cuts.reach,
                             error_bound([p.program for p in framed]))
         unread = None if asked.whole is None else unread_work(asked.whole, framed[0], measured, cutting, tools)
+        zeros = _joined([p.program.counts_in for p in framed], known)
         work, left = work_done(asked, measured, cutting, run.cut, source, unread)
         findings += [*cuts.allowance, *left,
-                     *idle_tools(run.cut, _speeds(framed, known), _zeros(framed, known), source, scored.samples,
+                     *idle_tools(run.cut, _speeds(framed, known), zeros, source, scored.samples,
                                  slack + asked.facet + measured.error, cutting, no_trace),
                      *deep_findings(scored.samples, cuts.residual, cuts.mover, cutting, source),
                      *slot_findings(scored.samples, cuts.residual, cutting, source)]
@@ -230,13 +234,9 @@ def _speeds(read: Sequence[FramedProgram], known: NDArray[np.bool_]) -> F64:
     return np.concatenate([np.zeros(0), *speeds])[known]
 
 
-def _zeros(read: Sequence[FramedProgram], known: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(m,) int64, dimensionless, number of the coordinates that each move counts in, as ``Program.zeros`` has them."""
-    out = [np.zeros(0, np.int64)]
-    for p in (r.program for r in read):
-        begun, number = np.array(p.zeros or [(0, 0)], np.int64).T
-        out.append(number[np.searchsorted(begun, np.arange(len(p)), side="right") - 1])
-    return np.concatenate(out)[known]
+def _joined(of_programs: Sequence[NDArray[np.int64]], known: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(m,) int64, dimensionless, numbers of the moves of all programs, of those that are known."""
+    return np.concatenate([np.zeros(0, np.int64), *of_programs])[known]
 
 
 def _settled(scored: ScoredSamples, part: Part, tools: Sequence[ToolBody], setup: ProofSetup, moves: Moves,

@@ -1,4 +1,4 @@
-"""Drills and taps that cut sideways, and taps that leave their thread at rapid.
+"""Drills and taps that cut sideways, taps that leave their thread the wrong way, and tools that turn backwards.
 
 Lips and leads cut along the axis only. A tap comes out of its thread at the pitch, so it feeds out. Coordinates are in
 the setup frame, lengths in mm.
@@ -7,6 +7,7 @@ the setup frame, lengths in mm.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,12 +68,16 @@ def torn_threads(moves: Moves, cut: NDArray[np.bool_], inside: NDArray[np.bool_]
 
 
 def tapped_out(moves: Moves, cut: NDArray[np.bool_], inside: NDArray[np.bool_], tools: Sequence[ToolBody],
-               source: Source, taps: Sequence[Mapping[int, bool]]) -> list[Finding]:
+               source: Source, taps: Sequence[Mapping[int, bool]], reversed_by: NDArray[np.int64]) -> list[Finding]:
     """One finding for each line in which a tap is fed out of its thread although the spindle is not reversed.
 
     cut    : (m,) bool, whether each move removes stock
     inside : (m,) bool, whether the teeth touch the part where each move begins
     taps   : by program, ``Program.taps``; another tool than a tap in such a line is a finding too
+    reversed_by : (m,) int64, index, as ``Program.reversed_by``
+
+    A floating chuck (G63) lets the program reverse the spindle by M3 and M4, so what counts is how the spindle turned
+    in the last feed of the tap into the part.
     """
     if not any(taps) and not any(t.kind == "tap" for t in tools) or len(moves) < 2:
         return []
@@ -83,7 +88,11 @@ def tapped_out(moves: Moves, cut: NDArray[np.bool_], inside: NDArray[np.bool_], 
     follows = np.zeros(len(moves), np.bool_)
     follows[1:] = (moves.tool[1:] == moves.tool[:-1]) & (source.program[1:] == source.program[:-1]) & cut[:-1]
     out = np.flatnonzero(is_tap & moves.feed & (rise > ASIDE) & (follows | inside))
-    torn = np.array([m for m in out.tolist() if not taps[source.program[m]].get(int(source.line[m]), False)], np.intp)
+    way_in = np.maximum.accumulate(np.where(is_tap & moves.feed & (rise < -ASIDE), np.arange(len(moves)), -1))[out]
+    back = ((way_in >= 0) & (moves.tool[way_in] == moves.tool[out]) & (source.program[way_in] == source.program[out])
+            & ((reversed_by[way_in] > 0) != (reversed_by[out] > 0)))
+    torn = np.array([m for m in out[~back].tolist() if not taps[source.program[m]].get(int(source.line[m]), False)],
+                    np.intp)
     odd = np.concatenate([np.zeros(0, np.int64), *(np.flatnonzero(
         ~is_tap & moves.feed & (way > ASIDE) & (source.program == k) & np.isin(source.line, sorted(lines)))
         for k, lines in enumerate(taps))])
@@ -92,6 +101,23 @@ def tapped_out(moves: Moves, cut: NDArray[np.bool_], inside: NDArray[np.bool_], 
         "back")), *one_a_line(odd, way, moves.start, source, lambda m: (
             f"T{source.tool[m]} is a {tools[moves.tool[m]].kind.replace('_', ' ')} and no tap, and the cycle turns it "
             "back in its hole"))]
+
+
+def turned_backwards(moves: Moves, reversed_by: NDArray[np.int64], tools: Sequence[ToolBody],
+                     source: Source) -> list[Finding]:
+    """One finding for each word by which the spindle turns backwards in a feed of a tool that cuts forwards.
+
+    reversed_by : (m,) int64, index, as ``Program.reversed_by``
+
+    A tap may turn backwards on its way out.
+    """
+    up = np.tile([0.0, 0.0, 1.0], (len(moves), 1)) if moves.axes is None else moves.axes.axis
+    leaves = np.einsum("ij,ij->i", moves.end - moves.start, up) > 0.0
+    is_tap = np.array([t.kind == "tap" for t in tools], np.bool_)[moves.tool]
+    bad = np.flatnonzero((reversed_by > 0) & moves.feed & ~(is_tap & leaves))
+    words = replace(source, line=reversed_by.astype(np.int32))
+    return one_a_line(bad, np.zeros(len(moves)), moves.start, words, lambda m: (
+        f"M4 turns the spindle backwards, and T{source.tool[m]} feeds in line {source.line[m]}"))
 
 
 def one_a_line(bad: NDArray[np.intp], depth: F64, at: F64, source: Source,
@@ -115,4 +141,4 @@ def one_a_line(bad: NDArray[np.intp], depth: F64, at: F64, source: Source,
     return out
 
 
-__all__ = ["one_a_line", "sideways_findings", "tapped_out", "torn_threads"]
+__all__ = ["one_a_line", "sideways_findings", "tapped_out", "torn_threads", "turned_backwards"]

@@ -152,8 +152,7 @@ class Modes(ToolChanges):
             s.tool, s.spindle, self.loaded = s.selected, False, True
         if 3 in ms or 4 in ms:
             s.spindle = True
-        if 4 in ms:
-            self.log.remark("m4", "M4 turns the spindle backwards")
+            self.log.spins(4 in ms)
         if 5 in ms or 19 in ms:  # LinuxCNC stops or orients the spindle before the motion of the block
             s.spindle = False
 

@@ -103,7 +103,8 @@ class Reader(BlockMotion):
                        swaps=tuple(log.swaps), unplaced=tuple(log.unplaced), by_joints=frozenset(log.by_joints),
                        lifts=tuple(log.lifts), kept_on=tuple(log.kept_on), ways_told=frozenset(log.ways_told),
                        taps={int(table[row, 9]): out for row, out in log.taps if row < len(table)},
-                       own_speed=self.control is not None and self.control.own_speed, zeros=tuple(log.zeros))
+                       own_speed=self.control is not None and self.control.own_speed, zeros=tuple(log.zeros),
+                       senses=tuple(log.senses))
 
     def _blocks(self, text: str, lines: list[str]) -> Iterable[tuple[int, str]]:
         """Blocks of the program with their lines, in the words of this reader and the order they run."""

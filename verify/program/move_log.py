@@ -33,7 +33,7 @@ class Log:
     lengths : mm by T number, the first length that the program gives a tool, and its line
     functions : first line of each M word that counts as a function of the machine
     speeds, unknown, stops, blend, leaves, changes, unbounded, pauses, places, dwells, swaps, unplaced,
-    by_joints, lifts, kept_on, ways_told : as in ``Program``
+    by_joints, lifts, kept_on, ways_told, senses : as in ``Program``
     taps : move that begins a tapping cycle, and whether the spindle turns back on the way out
     rows : latest moves as (start x, y, z, end x, y, z, kind, feed, tool, line), mm and mm/min; call ``flush`` at 65 536
     """
@@ -76,6 +76,7 @@ class Log:
         self._remedy: str | None = None
         self._states: list[tuple[int, float, bool]] = [(0, 0.0, False)]
         self.zeros: list[tuple[int, int]] = [(0, 0)]
+        self.senses: list[tuple[int, int]] = [(0, 0)]
         self._coordinates: dict[tuple[float, ...], int] = {(): 0}
 
     def pass_line(self, line: int) -> None:
@@ -148,6 +149,11 @@ class Log:
         """Record spindle speed, 1/min (0: it stands), and coolant from the next move on."""
         if (speed, coolant) != self._states[-1][1:]:
             self._states.append((self.count, speed, coolant))
+
+    def spins(self, backwards: bool) -> None:
+        """The spindle turns that way from the next move on; the line of the word that reversed it is kept."""
+        if backwards != (self.senses[-1][1] > 0):
+            self.senses.append((self.count, self.line if backwards else 0))
 
     def counts_in(self, coordinates: tuple[float, ...]) -> None:
         """Record the coordinates of the next move on: shift, mm, and matrices of frames; () for those of the setup."""

@@ -172,6 +172,7 @@ class Program:
     unbounded : whether, somewhere, no word bounds the deviation from the path: ``leaves`` does not hold there
     pauses  : in order
     zeros   : coordinates in force: number of moves before, and a number that is the same for the same coordinates
+    senses  : of the spindle: number of moves before, and the line of the word that turns it backwards, 0 for forwards
     """
 
     name: str
@@ -215,9 +216,26 @@ class Program:
     ways_told: frozenset[int] = frozenset()
     starts: tuple[RotaryStart, ...] = ()
     zeros: tuple[tuple[int, int], ...] = ()
+    senses: tuple[tuple[int, int], ...] = ()
 
     def __len__(self) -> int:
         return len(self.start)
+
+    @property
+    def reversed_by(self) -> NDArray[np.int64]:
+        """(m,) int64, index, line of the word that has the spindle turn backwards in each move, 0 where it does not."""
+        return _in_force(self.senses, len(self))
+
+    @property
+    def counts_in(self) -> NDArray[np.int64]:
+        """(m,) int64, dimensionless, number of the coordinates that each move counts in, as ``zeros`` has them."""
+        return _in_force(self.zeros, len(self))
+
+
+def _in_force(changes: tuple[tuple[int, int], ...], count: int) -> NDArray[np.int64]:
+    """(count,) int64, dimensionless, the value in force in each move; changes: number of moves before, value."""
+    begun, value = np.array(changes or [(0, 0)], np.int64).T
+    return value[np.searchsorted(begun, np.arange(count), side="right") - 1]
 
 
 @dataclass

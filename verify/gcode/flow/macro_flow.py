@@ -382,6 +382,9 @@ class MacroFlow:
     def _return(self, words: dict[str, float], at: int, section: _Section) -> tuple[_Section, int]:
         if not self.calls:
             return section, self._label(words["P"], at, section)
+        if "L" in words:
+            raise BlockError("M99 with L: controls differ in how often the subprogram runs then",
+                             "leave L out and count in M98")
         call = self.calls[-1]
         if call.left > 0 and "P" not in words:
             call.left -= 1

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.hand_parts import tool
-from verify.checks.sideways_cuts import sideways_findings, tapped_out, torn_threads
+from verify.checks.sideways_cuts import sideways_findings, tapped_out, torn_threads, turned_backwards
 from verify.findings import Source
 from verify.moves import Moves
 
@@ -59,7 +59,24 @@ def test_a_tap_is_fed_out_by_a_cycle_that_turns_it_back(kind, taps, lines):
     moves, cut, source = case(tips, [True, True, False, True], [True, False, False, False])
     none = np.zeros(4, bool)
     for cuts, inside in ((cut, none), (none, np.array([0, 1, 0, 0], bool))):
-        found = tapped_out(moves, cuts, inside, [drill(kind)], source, [taps])
+        found = tapped_out(moves, cuts, inside, [drill(kind)], source, [taps], np.zeros(4, int))
         assert [f.line for f in found] == lines
         assert not found or found[-1].depth == pytest.approx(8.0)
-    assert tapped_out(moves, none, none, [drill("tap")], source, [{}]) == []
+    assert tapped_out(moves, none, none, [drill("tap")], source, [{}], np.zeros(4, int)) == []
+
+
+@pytest.mark.parametrize(("ways", "torn"), [((0, 7), []), ((7, 0), []), ((0, 0), [2]), ((7, 7), [2])])
+def test_a_floating_chuck_is_fed_out_with_the_spindle_reversed(ways, torn):
+    """G63 in with M3 and out with M4, and the other way round for a left-hand thread."""
+    moves, cut, source = case([(0, 0, 5), (0, 0, -3), (0, 0, 5)], [True, True], [True, False])
+    found = tapped_out(moves, cut, ~cut & cut, [drill("tap")], source, [{}], np.array(ways))
+    assert [f.line for f in found] == torn
+
+
+@pytest.mark.parametrize(("kind", "ways", "line"), [
+    ("tap", (0, 7), []), ("tap", (7, 0), [7]), ("flat", (0, 0), []), ("flat", (0, 7), [7]), ("drill", (7, 7), [7])])
+def test_only_a_tap_on_its_way_out_turns_backwards(kind, ways, line):
+    moves, _, source = case([(0, 0, 5), (0, 0, -3), (0, 0, 5)], [True, True], [True, False])
+    found = turned_backwards(moves, np.array(ways), [drill(kind)], source)
+    assert [f.line for f in found] == line
+    assert not found or "M4 turns the spindle backwards, and T3 feeds in line" in found[0].message

@@ -115,6 +115,9 @@ class HeidenhainReader(HeidenhainPaths):
             return self._switched((skipped[1] or "") + raw[skipped.end():])
         text = block_text(raw)
         if not text or text.startswith(_IDLE) and not text.startswith("SEL TABLE"):
+            if text.startswith("FUNCTION AFC CUT BEGIN"):
+                self.machine.log.note("FUNCTION AFC lets the control change feeds by the load of the spindle; the "
+                                      "proof takes the feeds of the program")
             return []
         if (moved := self.motion_blocks(text)) is not None:
             return self._called_after(moved)

@@ -67,6 +67,7 @@ def test_macros_compute_and_branch(body, expected):
     ("#1=#5221\nM30\n", 8, "#5221 is a variable of the control"), ("#5221=3.\nM30\n", 8, "#5221 is a variable"),
     ("#3000=1 (NO TOOL)\nM30\n", 8, "stops here with an alarm"), ("GOTO 77\nM30\n", 8, "N77 is not in the program"),
     ("/GOTO 5\nN5 M30\n", 8, "a / before a statement"), ("/M98 P20\nM30\nO20\nM99\n", 8, "a / before M98"),
+    ("M98 P20\nM30\nO20\nG91 G1 X1. F100.\nM99 L2\n", 12, "M99 with L"),
     ("END1\nM30\n", 8, "END without DO"), ("WHILE[1]DO1\nM30\n", 8, "WHILE without DO and END"),
     ("G65 P20 X10\nM30\nO20\nM99\n", 8, "X10 of G65 without a decimal point"),
     ("M97 P5\nN5 M99\n", 8, "a local call of Haas"), ("M96 P5\nM30\n", 8, "an interrupt"),

@@ -107,6 +107,12 @@ def test_bore_milling_stays_in_its_bore():
     assert np.ptp(angles) > math.tau - 0.2  # a whole turn at the bottom
 
 
+def test_feeds_that_the_control_may_change_are_told():
+    p = read("FUNCTION AFC CUT BEGIN TIME20\nL X+1 F100\nFUNCTION AFC CUT END", "heidenhain")
+    assert sum("FUNCTION AFC lets the control change feeds" in note for note in p.notes) == 1
+    assert not any("AFC" in note for note in read("FUNCTION AFC CTRL\nL X+1 F100", "heidenhain").notes)
+
+
 def test_inches():
     """F counts tenths of an inch per minute."""
     given = ("BEGIN PGM A INCH\nTOOL CALL 1 Z S1000 F100\nM3\nL X+0 Y+0 Z+2 FMAX\nTRANS DATUM AXIS X+1\nL X+1 IY+0.5 "
