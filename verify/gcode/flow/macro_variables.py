@@ -34,7 +34,7 @@ MODES: dict[int, tuple[str, tuple[float, ...]]] = {
     4006: ("_metric", (20, 21)), 4010: ("_retract_r_plane", (98, 99)),
     4109: ("_feed", ()), 4119: ("_rpm", ()), 4120: ("_current_tool", ())}
 """Modal words by the variable that holds them: their name in the reader, and the G words of 0 and 1."""
-IDLE = frozenset({3003, 3004, 3005, 3006, 3007})
+IDLE = frozenset({3003, 3004, 3006})
 """Variables that stop, show messages or lock switches, but move nothing."""
 ALARM = 3000
 _COMMON = (range(100, 200), range(500, 1000))
@@ -107,7 +107,7 @@ class MacroVariables(Parameters):
             return
         if n == 0 or not (n <= LOCALS or any(n in r for r in _COMMON)):
             raise BlockError(f"#{n} is a variable of the control; the proof does not know the effect of setting it",
-                             "use G10 or G52 to move program zero")
+                             "leave it out; words state zeros and units (G10, G52, G20, G21)")
         held = self.frame.numbers if n <= LOCALS else self._numbers
         self.changes += held.get(n) != value
         held[n] = value

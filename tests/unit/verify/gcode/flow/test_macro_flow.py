@@ -65,6 +65,7 @@ def test_macros_compute_and_branch(body, expected):
     ("#2=#1\nG1 Z#2 F100.\nM30\n", 8, "an assignment uses #1, which has no value"),
     ("G65 P20 X1.\nM30\nO20\n#26=#26*2.\nM99\n", 11, "#26*2. uses #26, which has no value"),
     ("#1=#5221\nM30\n", 8, "#5221 is a variable of the control"), ("#5221=3.\nM30\n", 8, "#5221 is a variable"),
+    ("#3005=4\nM30\n", 8, "#3005 is a variable of the control"), ("#3007=0\nM30\n", 8, "#3007 is a variable"),
     ("#3000=1 (NO TOOL)\nM30\n", 8, "stops here with an alarm"), ("GOTO 77\nM30\n", 8, "N77 is not in the program"),
     ("/GOTO 5\nN5 M30\n", 8, "a / before a statement"), ("/M98 P20\nM30\nO20\nM99\n", 8, "a / before M98"),
     ("M98 P20\nM30\nO20\nG91 G1 X1. F100.\nM99 L2\n", 12, "M99 with L"),
