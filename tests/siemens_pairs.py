@@ -81,6 +81,7 @@ PAIRS = {
                          "G0 X10\nG1 Z48\nG0 Z50\nX20\nG1 Z48\nG0 Z50\nX30"),
     # cycles
     "drill": ("G0 X5 Y5\nCYCLE82(10,0,2,-8,,1)\nX9", "G0 X5 Y5\nZ2\nG1 Z-8\nG4 F1\nG0 Z10\nX9"),
+    "drill with a low retraction plane": ("G0 X5 Y5\nCYCLE81(6.2,6,1,-2)\nX9", "G0 X5 Y5\nZ7\nG1 Z-2\nG0 Z6.2\nX9"),
     "drill by its depth": ("G0 X5 Y5\nCYCLE81(10,1,2,,8)\nG1 X9", "G0 X5 Y5\nZ3\nG1 Z-7\nG0 Z10\nG1 X9"),
     "modal drill": ("MCALL CYCLE81(5,0,1,-4)\nG0 X1 Y1\nX2\nMCALL\nX3",
                     "G0 X1 Y1\nZ1\nG1 Z-4\nG0 Z5\nX2\nZ1\nG1 Z-4\nG0 Z5\nX3"),

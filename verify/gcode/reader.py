@@ -56,10 +56,14 @@ class Reader(BlockMotion):
 
     dialect      : of the program
     leaves_modes : what the next run of the program takes for granted
+    full_turns   : whether ATAN and ASIN of Fanuc give 0 to 360 deg; parameter 6004#0 decides
+    angle_line   : first line of an angle that would differ then, 0 for none
     """
 
     dialect = LINUXCNC
     leaves_modes: tuple[Assumed, ...] = ()
+    full_turns = False
+    angle_line = 0
     _noted: tuple[object, ...] = (None, None, 0.0, 0.0, 0.0)
 
     def read(self, text: str, report: Report = silent, dialect: str = LINUXCNC) -> Program:
@@ -90,6 +94,7 @@ class Reader(BlockMotion):
         table = log.table()
         self._path_mode(table)
         self._judge_lengths()
+        self._turn_angles(begin, text, lines, table)
         self._run_again(begin, text, lines, table, compensated)
         speed, coolant = log.states()
         start, end, feed = (np.ascontiguousarray(table[:, k]) for k in (slice(0, 3), slice(3, 6), 7))
@@ -167,6 +172,17 @@ class Reader(BlockMotion):
                     "Heidenhain decide)",
                     "state them at the beginning of the program, or set them back at its end"),)
 
+    def _turn_angles(self, begin: Reader, text: str, lines: list[str], table: F64) -> None:
+        """Remark where the range of ATAN and ASIN, which a parameter of the control decides, changes the moves."""
+        if not self.angle_line:
+            return
+        again = begin._copy()
+        again.full_turns = True
+        if change := again._change(text, lines, table):
+            self.log.remark("angles", "ATAN or ASIN gives a negative angle here, or 360 deg more, as parameter 6004#0 "
+                            f"decides; with the other range the program has {change.what} in line {change.line}: add "
+                            "360 where the angle is less than 0", line=self.angle_line)
+
     def _change(self, text: str, lines: list[str], table: F64) -> Change | None:
         """The first line at which this reader, which stands at the beginning, runs otherwise than ``table`` (m, 10)."""
         try:
@@ -186,6 +202,11 @@ class Reader(BlockMotion):
         return (*self.leaves_modes, Assumed(AssumedKind.TIP_CONTROL, f"off ({self.log.name}, line {self.by_axes})",
                         "kinematics such as xyzac-trt start with it on: X, Y and Z are then the tip, and the tool goes "
                         "elsewhere", "program M428 or M429 before the rotary axes turn"),)
+
+    def angle(self, degrees: float) -> float:
+        """An angle from -180 to 180 deg in the range that this reading takes for ATAN and ASIN."""
+        self.angle_line = self.angle_line or (self.log.line if degrees < 0.0 else 0)
+        return degrees + 360.0 if degrees < 0.0 and self.full_turns else degrees
 
     def served(self, key: int | str) -> float:
         """A parameter that the control serves (``verify.gcode.flow.system_parameters``)."""

@@ -44,6 +44,9 @@ class Machine(Protocol):
     def served(self, key: int | str) -> float:
         """A parameter that the control serves."""
 
+    def angle(self, degrees: float) -> float:
+        """An angle from -180 to 180 deg in the range that this reading takes for ATAN and ASIN."""
+
 
 class DialectReader:
     """Reader of the words of one control, line by line; it keeps the state that later lines depend on.

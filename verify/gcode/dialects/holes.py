@@ -100,16 +100,13 @@ def hole_blocks(hole: DrilledHole, here: Sequence[float], axis: int, unit: float
     Raises
     ------
     BlockError
-        A plane below another; a place that is not stated.
+        A depth above the place where its feed begins; a place that is not stated.
     """
     across = [v for k, v in enumerate(here) if k != axis]
     if any(math.isnan(v) for v in across):
         raise BlockError("a drilling cycle at a place that the program has not stated")
     if hole.bottom > hole.clear + 1e-9:
         raise BlockError(f"a drilling cycle whose depth, {hole.bottom:g} mm, is above the place where its feed begins, "
-                         f"{hole.clear:g} mm")
-    if hole.back < hole.clear - 1e-9:
-        raise BlockError(f"a drilling cycle that retracts to {hole.back:g} mm, below the place where its feed begins, "
                          f"{hole.clear:g} mm")
     out: list[str] = []
     at = here[axis]

@@ -2,7 +2,7 @@
 
 Precedence in LinuxCNC, from the highest: ** ; * / MOD ; + - ; EQ NE GT GE LT LE ; AND OR XOR. Operators of one level
 run from left to right, and a sign belongs to the value after it. Angles are degrees. EQ and NE treat numbers within
-1e-5 as equal. Another ``Grammar`` has other functions, operators and levels (``verify.gcode.flow.macro_variables``).
+1e-4 as equal. Another ``Grammar`` has other functions, operators and levels (``verify.gcode.flow.macro_variables``).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from verify.gcode.flow.parameters import Parameters
 Value = Callable[[Parameters], float]
 
 MAX_BRACKETS = 40
-EQUAL = 1e-5
+EQUAL = 1e-4  # TOLERANCE_EQUAL of the interpreter; GT, GE, LT and LE compare all digits
 
 _NUMBER = re.compile(NUMBER)
 _NAME = re.compile(r"<([^<>]*)>")
@@ -165,14 +165,16 @@ class ExpressionReader:
             return lambda scope: float(scope.exists(target.name))
         if pair := self.grammar.pairs.get(name):
             if (both := self._both(pair)) is not None:
-                return both
+                return _angle(both) if name == "atan" else both
         first = self.bracket()
         if name == "atan":
             self.take("/")
-            return _join(lambda y, x: math.degrees(math.atan2(y, x)), first, self.bracket())
+            return _angle(_join(lambda y, x: math.degrees(math.atan2(y, x)), first, self.bracket()))
         if name not in self.grammar.functions:
             raise BlockError(f"{name.upper()} takes two values in its bracket")
         function = self.grammar.functions[name]
+        if name == "asin":
+            return _angle(lambda scope: function(first(scope)))
         return lambda scope: function(first(scope))
 
 
@@ -188,6 +190,11 @@ class ExpressionReader:
         right = _finite(self._joined(1))
         self.take("]")
         return _join(function, left, right)
+
+
+def _angle(value: Value) -> Value:
+    """An angle, deg, in the range of the control."""
+    return lambda scope: scope.angle(value(scope))
 
 
 def _finite(value: Value) -> Value:

@@ -132,7 +132,7 @@ class MacroFlow:
 
     def __init__(self, lines: Sequence[str], machine: Machine, haas: bool = False) -> None:
         self.lines, self.machine, self.haas = lines, machine, haas
-        self.scope = MacroVariables(machine.served)
+        self.scope = MacroVariables(machine.served, None if haas else machine.angle)
         self.sections = _sections(lines)
         self.calls: list[_Call] = []
         self.jumps = 0

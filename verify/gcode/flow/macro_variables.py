@@ -48,13 +48,19 @@ class MacroVariables(Parameters):
 
     vacant  : the latest number that was read without a value
     ignored : words of the latest block that the control ignores
+    angle   : gives an angle, deg, from -180 to 180, in the range of the control; None: as it is
     """
 
     vacant = 0
 
-    def __init__(self, served: Callable[[int | str], float]) -> None:
+    def __init__(self, served: Callable[[int | str], float], angle: Callable[[float], float] | None = None) -> None:
         super().__init__(served)
         self.ignored: list[str] = []
+        self._angle = angle
+
+    def angle(self, degrees: float) -> float:
+        """An angle that ATAN or ASIN gives, deg, in the range of the control."""
+        return degrees if self._angle is None else self._angle(degrees)
 
     def numbered(self, number: float) -> float:
         """Value of a variable, nan where it is vacant.

@@ -65,6 +65,10 @@ class Parameters:
             raise BlockError(f"#{n} has no value yet; set it first")
         return held[n]
 
+    def angle(self, degrees: float) -> float:
+        """An angle that ATAN or ASIN gives, deg, from -180 to 180, in the range of the control."""
+        return degrees
+
     def named(self, name: str) -> float:
         """Value of a named parameter.
 

@@ -130,10 +130,15 @@ def test_tool_change_needs_its_length_again():
 
 @pytest.mark.parametrize("body, word", [
     ("G55 G0 X1\n", "G55"), ("G43 H3 Z5\n", "H3"), ("G49\nG1 Z1 F100\n", "G43"), ("M5\nG1 Z1 F100\n", "spindle"),
-    ("/G0 X1\n", "/"), ("M4\n", "M4")])
+    ("/G0 X1\n", "/")])
 def test_remarks_name_what_should_not_run(body, word):
     p = read(body)
     assert any(word in r.message for r in p.remarks) and all(r.line >= 7 for r in p.remarks)
+
+
+def test_each_move_knows_the_word_that_reversed_the_spindle():
+    p = read("G1 Z1 F100\nM4\nX1\nX2\nM5\nM3\nX3\n")
+    assert p.reversed_by[-4:].tolist() == [0, 8, 8, 0]
 
 
 @pytest.mark.parametrize("body, line, words", [

@@ -111,8 +111,11 @@ def _hole(call: DrillingCall, machine: Machine) -> DrilledHole:
     if call.number(12 if call.name in ("CYCLE83", "CYCLE84") else 11 if call.name == "CYCLE840" else 99) not in (0, 3):
         raise BlockError(f"{call.name} along another axis than that of the tool (AXN)")
     _check_modes(call)
-    clear = reference + abs(call.number(2))
-    hole = unit * clear, unit * bottom, unit * max(top, clear)
+    if top < reference or (top == reference and below):
+        raise BlockError(f"{call.name} with its retraction plane at {top:g} and its reference plane at {reference:g}: "
+                         "the control stops with alarm 61101")
+    # the retraction plane may lie below the safety distance, and the tool then stays as low between holes
+    hole = unit * (reference + abs(call.number(2))), unit * bottom, unit * top
     dwell = _dwell(call, machine)
     if call.name == "CYCLE83":
         return _deep(call, machine, hole, dwell)

@@ -300,6 +300,20 @@ def same(a: Value, b: Value) -> bool:
     return abs(a - b) <= 1e-12 * max(abs(a), abs(b))
 
 
+def _exceeds(a: float, b: float) -> bool:
+    """Whether a is greater than b.
+
+    Raises
+    ------
+    BlockError
+        They differ by so little that a control may take them for equal (Job Planning, precision correction; MD10280).
+    """
+    if a != b and same(a, b):
+        raise BlockError(f"{a!r} is compared with {b!r}: machine data decide whether the control takes both for equal",
+                         "compare with a number between two values, or count in whole numbers")
+    return a > b
+
+
 def _bits(function: Callable[[int, int], int]) -> Callable[[float, float], float]:
     return lambda a, b: float(function(_whole(a), _whole(b)))
 
@@ -307,9 +321,9 @@ def _bits(function: Callable[[int, int], int]) -> Callable[[float, float], float
 _OPERATIONS: dict[str, Callable[[float, float], float]] = {
     "*": operator.mul, "/": operator.truediv, "+": operator.add, "-": operator.sub,
     "DIV": lambda a, b: certain("DIV", math.trunc)(a / b), "MOD": math.fmod,
-    "==": lambda a, b: float(same(a, b)), "<>": lambda a, b: float(not same(a, b)), "<": lambda a, b: float(a < b),
-    ">": lambda a, b: float(a > b), "<=": lambda a, b: float(a < b or same(a, b)),
-    ">=": lambda a, b: float(a > b or same(a, b)),
+    "==": lambda a, b: float(same(a, b)), "<>": lambda a, b: float(not same(a, b)),
+    "<": lambda a, b: float(_exceeds(b, a)), ">": lambda a, b: float(_exceeds(a, b)),
+    "<=": lambda a, b: float(a < b or same(a, b)), ">=": lambda a, b: float(a > b or same(a, b)),
     "AND": lambda a, b: float(a != 0 and b != 0), "OR": lambda a, b: float(a != 0 or b != 0),
     "XOR": lambda a, b: float((a != 0) != (b != 0)), "B_AND": _bits(operator.and_), "B_OR": _bits(operator.or_),
     "B_XOR": _bits(operator.xor),

@@ -86,5 +86,17 @@ def test_a_loop_without_end_is_named(body):
     assert caught.value.code in ("program_too_long", "bad_program"), caught.value.message
 
 
+@pytest.mark.parametrize(("body", "told"), [
+    ("#1=ATAN[-1]/[1]\nIF [#1 LT 0] GOTO 5\nG1 X1. F100.\nN5 G1 X2. F100.\nM30\n", 8),
+    ("G1 Y1. F100.\n#1=ASIN[-0.5]\nG1 X#1\nM30\n", 9), ("#1=ATAN[1]/[1]\nG1 X#1 F100.\nM30\n", 0),
+    ("#1=ATAN[-1]/[1]\nG1 X[10*COS[#1]] Y[10*SIN[#1]] F100.\nM30\n", 0),
+    ("#1=ATAN[-1]/[1]\nIF [#1 LT 0] THEN #1=#1+360\nG1 X#1 F100.\nM30\n", 0)])
+def test_the_range_of_an_angle_is_told_where_it_changes_the_moves(body, told):
+    """Parameter 6004#0 of Fanuc gives 0 to 360 or -180 to 180 deg; Haas has no such parameter."""
+    lines = [r.line for r in read_program(HEAD + body + "%\n", dialect="fanuc").remarks if "6004" in r.message]
+    assert lines == ([told] if told else [])
+    assert not any("6004" in r.message for r in read_program(HEAD + body + "%\n", dialect="haas").remarks)
+
+
 def test_a_call_in_a_comment_is_none():
     assert places("(CALL M98 P20 WITH #1)\nG1 X1. F100.\nM30\n") == [(1, 0)]

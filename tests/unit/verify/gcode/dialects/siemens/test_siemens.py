@@ -85,7 +85,7 @@ REFUSED = [
     ("ENDWHILE", "has no counterpart"), ("ROT X30", "tilts the coordinates"), ("G500\nX1",
                                                                                "G500 without a work offset"),
     ("A3=0 B3=0 C3=1 X1", "no rotary axes"), ("CYCLE81(5,0,1)", "without a depth"),
-    ("CYCLE81(-5,0,1,3)", "above the place"),
+    ("CYCLE81(5,0,1,3)", "above the place"),
     ("CYCLE801(1)", "a pattern of holes"), ("CALL BLOCK A TO B", "is not a variable"), ("G1 X=(1", "')' is missing"),
     ("CT X5 Y5", "no move came before"), ("G1 X=\"A\"", "a text"),
     ("/IF R1==1", "a / before IF"), ("DEF FRAME F", "cannot read")
@@ -306,6 +306,20 @@ def test_a_cycle_that_turns_the_spindle_backwards_is_told_as_m4_is(line, back):
     assert (read(f"F50\n{line}\nG1 X9 F100", "siemens").reversed_by[-1] > 0) == back
 
 
+@pytest.mark.parametrize("condition", ["R1>0.3", "0.3<R1"])
+def test_a_comparison_that_machine_data_decide_is_refused(condition):
+    """0.1 * 3 is greater than 0.3 by rounding alone; >= and == take both for one number on every control."""
+    with pytest.raises(ProgramError, match="machine data decide"):
+        read(f"R1=0.1*3\nIF {condition}\nG1 X1 F99\nENDIF", "siemens")
+    assert len(read("R1=0.1*3\nIF R1>=0.3\nG1 X7 F99\nENDIF\nIF R1>0.2\nG1 X8 F99\nENDIF", "siemens")) == 3
+
+
+@pytest.mark.parametrize("planes", ["5,6,1,-2", "6,6,1,,8"])
+def test_a_retraction_plane_below_the_reference_plane_is_an_alarm(planes):
+    with pytest.raises(ProgramError, match="alarm 61101"):
+        read(f"F50\nCYCLE81({planes})", "siemens")
+
+
 def test_another_master_spindle_is_refused():
     with pytest.raises(ProgramError, match=r"SETMS\(2\): another spindle becomes the master"):
         read("SETMS(2)", "siemens")
@@ -365,7 +379,7 @@ def test_a_corner_behind_more_than_three_blocks_without_a_move_is_told(between, 
 
 
 @pytest.mark.parametrize(("condition", "holds"), [
-    ("R1==0.3", True), ("R1<>0.3", False), ("R1<=0.3", True), ("0.3>=R1", True), ("R1>0.3", True), ("0.3<R1", True),
+    ("R1==0.3", True), ("R1<>0.3", False), ("R1<=0.3", True), ("0.3>=R1", True),
     ("R1==0.3000001", False), ("R1<=0.2999999", False)])
 def test_comparisons_with_equality_are_relative(condition, holds):
     """Job Planning, precision correction on comparison errors: 1e-12; < and > compare all digits."""
