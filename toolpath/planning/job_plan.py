@@ -15,6 +15,7 @@ from itertools import pairwise
 from operator import itemgetter
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from geometry.cutting_mechanics import effective_diameter
@@ -22,6 +23,7 @@ from geometry.mesh import F64
 from toolpath.counterexamples import WatchedExamples
 from toolpath.feeds.feed_scheduling import Pace
 from toolpath.five_axis.oriented_motion import THICK
+from toolpath.lines import Line
 from toolpath.linking.linker import Linker
 from toolpath.linking.ways_in import FLUTE_SHARE
 from toolpath.passes.contours import dilated
@@ -50,6 +52,7 @@ from toolpath.roughing.layer_areas import at_or_under, cleared, layer_areas
 from toolpath.roughing.layers_over_floors import Columns, Floors, even_between, left_to_floors
 from toolpath.roughing.loose_pieces import loose_pieces
 from toolpath.roughing.rings_ahead import RingsAhead
+from toolpath.roughing.separate_places import SeparatePlaces, nearest_first
 from toolpath.roughing.sized_walls import SizedWalls
 from toolpath.stock.cut_history import Depths, Walked
 from toolpath.stock.engagement import SKIN_SHARE, UNBOUNDED
@@ -376,26 +379,19 @@ class _Layers:
 
         Where even stock is required the cuts between them follow as another workingstep.
         """
-        field, cut, settings, tool = self.field, self.cut, self.settings, self.field.tool
+        field, cut, settings = self.field, self.cut, self.settings
         linker = self._linker()
         between: list[float] = []
-        with RingsAhead(field, self.allowance, depth_layers.ring_spacing(tool)) as ahead:
-            while self.left and self.left[0][0] >= lowest - 1e-9:
-                settle()
-                z, place = self.left.pop(0)
-                self.stock.settle()
-                if not place.floor:
-                    between.extend(depth_layers.between(self.above, z, cut.step_down))
-                    self.above = z
-                for line in depth_layers.strip_lines(field, self.stock, z, place.area, self.tips, self.allowance,
-                                                     settings.budget.chord):
-                    linker.add(turned(line, settings))
-                laid = ahead.of(z)
-                if self.left and self.left[0][0] >= lowest - 1e-9 and not self.bounded:
-                    ahead.begin(*self.left[0], self.stock)
-                self._walk(linker, z, place, 0.0 if settings.semi_finishing else ISLAND * cut.step_down, laid)
-                if not place.floor:
-                    self._cut_rims(linker, z, place, lowest, sized)
+        with RingsAhead(field, self.allowance, depth_layers.ring_spacing(field.tool)) as ahead:
+            while stretch := self._stretch(lowest):
+                for z, place in stretch:
+                    if not place.floor:
+                        between.extend(depth_layers.between(self.above, z, cut.step_down))
+                        self.above = z
+                self._cut_stretch(linker, stretch, ahead, lowest, settle)
+                z, place = stretch[-1]
+                if not place.floor and self._rims_due(z, lowest):
+                    self._cut_rims(linker, z, place, sized)
         if not self.left:
             field.forget()
         made = self._step(number, "roughing", linker)
@@ -406,16 +402,71 @@ class _Layers:
             self._walk(linker, z, LayerArea(at_or_under(field, self.tips, z)))
         return made + self._step(number + len(made), "semi_finishing", linker)
 
-    def _cut_rims(self, linker: Linker, z: float, place: LayerArea, lowest: float, sized: SizedWalls) -> None:
-        """Cut the rims of the layer at z, mm, unless the flutes reach up to them from a deeper layer of this band.
+    def _stretch(self, lowest: float) -> list[tuple[float, LayerArea]]:
+        """The next layers of a band down to the first with rims, taken from those left; ``lowest`` as in
+        ``down_to``."""
+        out: list[tuple[float, LayerArea]] = []
+        while self.left and self.left[0][0] >= lowest - 1e-9:
+            out.append(self.left.pop(0))
+            if not out[-1][1].floor and self._rims_due(out[-1][0], lowest):
+                break
+        return out
 
-        lowest, sized : as in ``down_to``
+    def _cut_stretch(self, linker: Linker, stretch: Sequence[tuple[float, LayerArea]], ahead: RingsAhead,
+                     lowest: float, settle: Callable[[], None]) -> None:
+        """Cut layers without their rims, in each separate place all of them before the next.
+
+        lowest, settle : as in ``down_to``
         """
+        field, stock, settings = self.field, self.stock, self.settings
+        island = 0.0 if settings.semi_finishing else ISLAND * self.cut.step_down
+        # where the engaged angle is bounded, its fronts go through all places of a layer
+        places = None if self.bounded or len(stretch) < 2 else SeparatePlaces(field, stock, stretch)
+        laid: dict[int, tuple[list[Line], LayerRings | None]] = {}
+
+        def lines_of(k: int, *, shared: bool) -> tuple[list[Line], LayerRings | None]:
+            """Lines along strips, and rings, of a layer; shared: several places ask for them."""
+            if k not in laid:
+                z, place = stretch[k]
+                strips = depth_layers.strip_lines(field, z, place.area, self.tips, self.allowance,
+                                                  settings.budget.chord)
+                rings = ahead.of(z)
+                if rings is None and shared:
+                    rings = depth_layers.layer_rings(field, z, place, depth_layers.standing_above(field, stock, z),
+                                                     self.allowance, depth_layers.ring_spacing(field.tool))
+                later = [*stretch[k + 1:k + 2], *(one for one in self.left[:1] if one[0] >= lowest - 1e-9)]
+                if later and not self.bounded:
+                    ahead.begin(*later[0], stock)
+                laid[k] = strips, rings
+            return laid[k]
+
+        def go_down(first: int, mask: NDArray[np.bool_] | None) -> None:
+            for k in range(first, len(stretch)):
+                apart = [] if places is None else places.of(k, mask)
+                for one in nearest_first(apart, linker.at):
+                    go_down(k, one.mask)
+                if apart:
+                    return
+                settle()
+                stock.settle()
+                strips, rings = lines_of(k, shared=mask is not None)
+                mine = depth_layers.parts_within(field.lattice, strips, mask)
+                for line in depth_layers.strips_in_stock(mine, stock, field.tool, self.allowance):
+                    linker.add(turned(line, settings))
+                self._walk(linker, *stretch[k], island, rings, mask)
+
+        go_down(0, None)
+
+    def _rims_due(self, z: float, lowest: float) -> bool:
+        """Whether the layer at z, mm, has rims: the flutes do not reach up to them from a deeper layer of this band."""
+        return (not self.settings.finishing or z <= self.swept - self.rim_depth
+                or not any(a >= lowest - 1e-9 and not p.floor for a, p in self.left))
+
+    def _cut_rims(self, linker: Linker, z: float, place: LayerArea, sized: SizedWalls) -> None:
+        """Cut the rims of the layer at z, mm; sized : as in ``down_to``."""
         field, cut, settings, lat = self.field, self.cut, self.settings, self.field.lattice
         finished = lat.mask(self.walls[np.abs(self.walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
         unseen = z <= self.swept - self.rim_depth
-        if settings.finishing and not unseen and any(a >= lowest - 1e-9 and not p.floor for a, p in self.left):
-            return
         self.swept = z if unseen else self.swept
         deep = self.rim_depth + cut.step_down if unseen or settings.finishing else cut.step_down
         at_size = sized.along(lat, z + field.tool.corner_radius, z + deep)
@@ -460,14 +511,17 @@ class _Layers:
                       cut.engaged)
 
     def _walk(self, linker: Linker, z: float, place: LayerArea, island: float = 0.0,
-              laid: LayerRings | None = None) -> None:
-        """Cut the stock above a height, mm, in an area, down to it; ``island`` mm of it may stay between rings."""
+              laid: LayerRings | None = None, within: NDArray[np.bool_] | None = None) -> None:
+        """Cut the stock above a height, mm, in an area, down to it; ``island`` mm of it may stay between rings.
+
+        laid, within : as in ``depth_layers.layer``
+        """
         settings, side, fine = self.settings, depth_layers.ring_spacing(self.field.tool), 0.1 * self.field.lattice.step
         linker.go.loose = min(LOOSE * fine, LOOSE_SHARE * self.allowance)
         if self.bounded:
             Clearing(linker, z, place.area, self.allowance, side, settings.cut_direction,
                      depth_layers.STOCK_WORTH, fine).walk()
-        for lines in depth_layers.layer(self.field, self.stock, z, place, self.allowance, side, island, laid):
+        for lines in depth_layers.layer(self.field, self.stock, z, place, self.allowance, side, island, laid, within):
             for line in nearest_order(lines, linker.at, False):
                 linker.add(turned(line, settings), fine)
         linker.go.loose = 0.0

@@ -109,6 +109,16 @@ def standing_above(field: TipField, stock: StockMap, z: float) -> NDArray[np.boo
     return stock.above(z + STOCK_WORTH, field.lattice)
 
 
+def active_nodes(field: TipField, place: LayerArea, standing: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(ny, nx) bool on the lattice: nodes where a layer may have rings.
+
+    standing     : (ny, nx) bool on the lattice, nodes over which the layer finds stock
+    field, place : as in ``layer``
+    """
+    wide = field.tool.radius / field.lattice.step
+    return dilated(place.area, wide) & dilated(standing, 2.0 * wide)
+
+
 def layer_rings(field: TipField, z: float, place: LayerArea, standing: NDArray[np.bool_], allowance: float,
                 side_step: float) -> LayerRings:
     """The rings of one layer; they depend on nothing else, so another thread may compute them.
@@ -116,15 +126,15 @@ def layer_rings(field: TipField, z: float, place: LayerArea, standing: NDArray[n
     standing : (ny, nx) bool on the lattice, nodes over which the layer finds stock
     field, z, place, allowance, side_step : as in ``layer``
     """
-    wide = field.tool.radius / field.lattice.step
-    active = dilated(place.area, wide) & dilated(standing, 2.0 * wide)
+    active = active_nodes(field, place, standing)
     inwards, between = (list(rings(field, z, active, (first,), side_step))
                         for first in (allowance, allowance + 0.5 * side_step))
     return LayerRings(standing, inwards, between)
 
 
 def layer(field: TipField, stock: StockMap, z: float, place: LayerArea, allowance: float,
-          side_step: float, island: float = 0.0, laid: LayerRings | None = None) -> Iterator[list[Line]]:
+          side_step: float, island: float = 0.0, laid: LayerRings | None = None,
+          within: NDArray[np.bool_] | None = None) -> Iterator[list[Line]]:
     """Lines of one layer, ring by ring from the outside of the stock to ``allowance`` from the walls.
 
     field     : TipField
@@ -135,6 +145,7 @@ def layer(field: TipField, stock: StockMap, z: float, place: LayerArea, allowanc
     side_step : mm between rings
     island    : mm, stock between the rings up to which it is left to the next layer, where ``place`` is not bare
     laid      : the rings of this layer for the stock as it was before; used where that still stands
+    within    : (ny, nx) bool on the lattice, where lines are wanted; None: everywhere
 
     Yields
     ------
@@ -143,8 +154,11 @@ def layer(field: TipField, stock: StockMap, z: float, place: LayerArea, allowanc
     """
     lat, tool = field.lattice, field.tool
     standing = standing_above(field, stock, z)
-    if laid is None or not np.array_equal(laid.standing, standing):
+    if laid is None or not _same(laid.standing, standing, within):
         laid = layer_rings(field, z, place, standing, allowance, side_step)
+    if within is not None:
+        laid = LayerRings(laid.standing, *([parts_within(lat, lines, within) for lines in lists]
+                                           for lists in (laid.rings, laid.between)))
     beyond = min((SURE_RIM + 0.8) * stock.lattice.step + lat.step, 0.6 * tool.radius)
     walled = field.nearest_blocked(z) is not None
     worth = _Worth(lat, place.bare, max(STOCK_WORTH, island))
@@ -153,6 +167,23 @@ def layer(field: TipField, stock: StockMap, z: float, place: LayerArea, allowanc
     # Where rings turn sharply, islands stay between them; rings half a step off take these.
     for lines in laid.between:
         yield from filter(None, [_in_stock(stock, tool, lines, worth, beyond)])
+
+
+def _same(one: NDArray[np.bool_], other: NDArray[np.bool_], within: NDArray[np.bool_] | None) -> bool:
+    return np.array_equal(one, other) if within is None else not bool(((one != other) & within).any())
+
+
+def parts_within(lattice: Lattice, lines: Sequence[Line], within: NDArray[np.bool_] | None) -> list[Line]:
+    """The parts of lines whose nearest nodes are in a mask; whole lines where all of them are, or it is None.
+
+    within : (ny, nx) bool on the lattice
+    """
+    if within is None:
+        return list(lines)
+    out: list[Line] = []
+    for line in lines:
+        out.extend(pieces_where(line, within[lattice.cells(line.points[:, :2])], 0.0, 0.0))
+    return out
 
 
 @dataclass(frozen=True)
@@ -228,29 +259,35 @@ def rim(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], fin
     return out
 
 
-def strip_lines(field: TipField, stock: StockMap, z: float, area: NDArray[np.bool_], tips: F64, allowance: float,
-                tolerance: float) -> Iterator[Line]:
-    """Lines of a layer along strips too narrow for a ring, where more stands than rims are made for.
+def strip_lines(field: TipField, z: float, area: NDArray[np.bool_], tips: F64, allowance: float,
+                tolerance: float) -> list[Line]:
+    """Lines of a layer along strips too narrow for a ring, whatever stands there.
 
     area : (ny, nx) bool on the lattice, where this tool has something to finish below
     tips : (n, 3) float64, mm, of samples to finish, access frame: those below show strips that nodes do not meet
     z, allowance, tolerance : mm, as in ``rim``
+    """
+    lat, tool = field.lattice, field.tool
+    free = (field.height <= z + LEVEL_TOLERANCE) & dilated(area, tool.radius / lat.step)
+    # a ring less than a step from the middle of its strip falls to pieces, and so do the nodes of a narrow strip
+    narrow = _beside_no_ring(field, z, allowance + lat.step, free | lat.mask(tips[tips[:, 2] <= z, :2]))
+    mine = dilated(narrow, APART)
+    return contour_pieces(field, z, mine, mine, 0.5 * tool.radius, 2.0 * tool.radius, tolerance)
 
-    Stock is left to the rims, and to the second wall of a strip, where it is no thicker than twice the allowance.
+
+def strips_in_stock(lines: Sequence[Line], stock: StockMap, tool: ToolBody, allowance: float) -> Iterator[Line]:
+    """The parts of lines of ``strip_lines`` where more stands than rims are made for.
+
+    Stock is left to the rims, and to the second wall of a strip, where it is no thicker than twice the allowance, mm.
 
     Yields
     ------
     Line
         Where stock stands when it is asked for.
     """
-    lat, tool = field.lattice, field.tool
-    free = (field.height <= z + LEVEL_TOLERANCE) & dilated(area, tool.radius / lat.step)
-    # a ring less than a step from the middle of its strip falls to pieces, and so do the nodes of a narrow strip
-    narrow = _beside_no_ring(field, z, allowance + lat.step, free | lat.mask(tips[tips[:, 2] <= z, :2]))
-    mine, beyond = dilated(narrow, APART), 0.5 * tool.radius
-    for line in contour_pieces(field, z, mine, mine, beyond, 2.0 * tool.radius, tolerance):
+    for line in lines:
         seen = stock.overlap(line.points, tool, -2.0 * allowance / stock.lattice.step - SURE_RIM, lower_bound=0.0)
-        yield from pieces_where(line, seen > STOCK_WORTH, beyond, 2.0 * tool.radius)
+        yield from pieces_where(line, seen > STOCK_WORTH, 0.5 * tool.radius, 2.0 * tool.radius)
 
 
 def _slots(field: TipField, z: float, allowance: float) -> NDArray[np.bool_]:
