@@ -304,6 +304,8 @@ class Iso14649Reader:
         for attribute in ("approach", "retract"):
             if self.data.one(number, entity, attribute) is not None:
                 raise self.file.error(number, f", {attribute}: $ expected; the tool path contains it")
+        if self.data.maybe(number, entity, "start_point") is not None:
+            raise self.file.error(number, ", start_point: $ expected; a control may go there before the tool path")
         self._take(self.data.ref(number, entity, "its_tool"), self.file.line(number))
         technology = self.data.ref(number, entity, "its_technology")
         functions = self.data.ref(number, entity, "its_machine_functions")

@@ -422,6 +422,16 @@ def test_a_plane_in_the_part_is_a_finding():
     assert not [f for f in way_findings(ours, low, wanted.tools, setup) if "plane" in f.message]
 
 
+def test_a_place_where_an_operation_starts_is_refused():
+    """A control may go there before the tool path, and nothing says how."""
+    whole = write_stepnc_arm(plan())
+    point = next(k for k in re.findall(r"#([0-9]+)=CARTESIAN_POINT", whole))
+    moved = re.sub(r"(FREEFORM_OPERATION\([^']*'[^']*',[0-9.]*,)\$", rf"\g<1>#{point}", whole, count=1)
+    assert moved != whole
+    with pytest.raises(ProgramError, match=r"start_point: \$ expected"):
+        read_stepnc(moved, tools=plan().tools)
+
+
 def test_a_way_home_and_its_path_are_followed():
     """A RETURN_HOME is read like a rapid movement: its path at rapid, its plane, then a stop."""
     wanted = plan()
