@@ -70,7 +70,7 @@ class CutSequence:
     speed   : (m,) float64, 1/min; coolant : (m,) bool
     minutes : (m,) float64, min, time of each move
     cutter  : (m,) int64, count of tool changes and stops before each move: a fresh cutter may be in the spindle
-    dwells  : line, program, move before and s of each dwell
+    dwells  : line, program, move before and s of each dwell, inf where the operator ends it
     spacing : mm, of the stock
     """
 
@@ -118,7 +118,8 @@ def cut_sequence(read: Sequence[FramedProgram], known: NDArray[np.bool_], run: S
         stops = np.zeros(len(p) + 1, np.int64)
         np.add.at(stops, [s.moves for s in p.pauses if s.event in ("tool change", "M0")], 1)
         changed.append(np.cumsum(stops[:-1]) + (changed[-1][-1] + 1 if len(changed[-1]) else 0))
-        dwells.extend((line, k, int(row[begun + before - 1]), seconds) for line, before, seconds in p.dwells
+        waits = [(s.line, s.moves, math.inf) for s in p.pauses if s.event in ("M0", "M1")]
+        dwells.extend((line, k, int(row[begun + before - 1]), seconds) for line, before, seconds in (*p.dwells, *waits)
                       if before > 0 and row[begun + before - 1] >= 0)
         begun += len(p)
     return CutSequence(moves, source, run, parts(moves, tools), stretches, of, feed, half, speed, coolant,
@@ -441,6 +442,11 @@ class _Judge:
         """Dwells at the end of a cut."""
         cuts, mine = self.cuts, set(self.rows.tolist())
         for line, program, before, seconds in cuts.dwells:
+            if before in mine and math.isinf(seconds):
+                yield ProgramCaution("dwell", self.tool.number, cuts.source.names[program], line,
+                                     f"T{self.tool.number}: stands in its cut until the operator goes on",
+                                     float(cuts.speed[before]), 0.0, "lift the tool before the program stops")
+                continue
             turns = seconds * cuts.speed[before] / 60.0
             if before in mine and turns > DWELL_TURNS:
                 yield ProgramCaution("dwell", self.tool.number, cuts.source.names[program], line,

@@ -289,6 +289,13 @@ def test_a_dwell_in_the_cut(wait, harm):
     assert "dwell" not in judged(["G4 P1", "G0 X-26 Y12", "Z0.1", "G1 X26 F600", "X40", "G4 P1"])[1]
 
 
+@pytest.mark.parametrize("stop", ["M0", "M1"])
+def test_a_program_stop_in_the_cut(stop):
+    cautions = judged(["G0 X-26 Y12", "Z0.1", "G1 X0 F600", stop, "X26"])[1]
+    assert cautions["dwell"].line == 9 and "until the operator goes on" in cautions["dwell"].message
+    assert "dwell" not in judged(["G0 X-26 Y12", "Z0.1", "G1 X26 F600", "X40", stop, "X41"])[1]
+
+
 def test_a_plunge_that_is_too_fast():
     lines = ["G0 X-12 Y12", "Z1", "G1 Z0.2 F3000", "X26 F600"]
     assert judged(lines)[1]["plunge_feed"].line == 8
