@@ -10,6 +10,7 @@ from geometry.binning import limits_of
 from geometry.mesh import F64
 
 AT_ONCE = 500_000  # points asked for in one call, whose results take as much memory as they
+FEW = 10_000  # points whose answers take no longer than it takes to start two threads for them
 APART = 4.0  # times the extent of the points: how far one key is from the next along the added axis
 
 
@@ -45,6 +46,7 @@ class KeyedPoints:
         for first in range(0, len(known), AT_ONCE):
             asked = known[first:first + AT_ONCE]
             at = np.column_stack([points[asked], self.step * place[asked]])
-            _, row = self.tree.query(at, k=list(range(1, k + 1)), distance_upper_bound=self.reach, workers=2)
+            _, row = self.tree.query(at, k=list(range(1, k + 1)), distance_upper_bound=self.reach,
+                                     workers=2 if len(at) > FEW else 1)
             out[asked] = np.where(row < self.tree.n, row, -1)
         return out

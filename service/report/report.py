@@ -169,10 +169,13 @@ def dry_report(ready: Prepared) -> dict[str, Any]:
     """zones.json without a plan: the zones that the tools of the setup reach, and the remainder."""
     rest = ~ready.zoning.taken
     first = ready.views[0]
-    items = explain(first.samples.subset(rest), first.labels.subset(rest), ready.views, ready.decomposition, ready.lift,
-                    clear=ready.inputs.clearances)
-    return {**_shape(ready), **_areas(ready), "zones": [_zone(ready, z) for z in ready.zones],
-            "remainder": _remainder(ready, items), "proposal": _proposal(ready)}
+    with ComputedAhead({PROPOSAL: partial(_proposal, ready)}) as ahead:
+        ahead.begin()
+        items = explain(first.samples.subset(rest), first.labels.subset(rest), ready.views, ready.decomposition,
+                        ready.lift, clear=ready.inputs.clearances)
+        zones = [_zone(ready, z) for z in ready.zones]
+        return {**_shape(ready), **_areas(ready), "zones": zones, "remainder": _remainder(ready, items),
+                "proposal": ahead.value(PROPOSAL)}
 
 
 def job_report(ready: Prepared, known: ComputedAhead[dict[str, Any]], made: Plan, proof: Proof, dense: SurfaceSamples,
