@@ -52,7 +52,7 @@ from toolpath.roughing.layer_areas import at_or_under, cleared, layer_areas
 from toolpath.roughing.layers_over_floors import Columns, Floors, even_between, left_to_floors
 from toolpath.roughing.loose_pieces import loose_pieces
 from toolpath.roughing.rings_ahead import RingsAhead
-from toolpath.roughing.separate_places import SeparatePlaces, nearest_first
+from toolpath.roughing.separate_places import Place, SeparatePlaces, nearest_first
 from toolpath.roughing.sized_walls import SizedWalls
 from toolpath.stock.cut_history import Depths, Walked
 from toolpath.stock.engagement import SKIN_SHARE, UNBOUNDED
@@ -440,11 +440,12 @@ class _Layers:
                 laid[k] = strips, rings
             return laid[k]
 
-        def go_down(first: int, mask: NDArray[np.bool_] | None) -> None:
+        def go_down(first: int, place: Place | None) -> None:
+            mask = None if place is None else place.mask
             for k in range(first, len(stretch)):
-                apart = [] if places is None else places.of(k, mask)
+                apart = [] if places is None else places.of(k, place)
                 for one in nearest_first(apart, linker.at):
-                    go_down(k, one.mask)
+                    go_down(k, one)
                 if apart:
                     return
                 settle()

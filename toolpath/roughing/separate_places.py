@@ -18,6 +18,7 @@ from geometry.mesh import F64
 from toolpath.passes.contours import dilated
 from toolpath.stock.stock_map import StockMap
 from toolpath.strategies.depth_layers import LayerArea, active_nodes, standing_above
+from zones.lattice import blocked_beside
 from zones.reach.tip_field import TipField
 
 BESIDE = np.ones((3, 3))  # nodes of one place touch by sides or corners
@@ -27,11 +28,13 @@ BESIDE = np.ones((3, 3))  # nodes of one place touch by sides or corners
 class Place:
     """A place of some layers.
 
-    mask  : (ny, nx) bool on the lattice of the tool, the nodes that are nearest to it
-    nodes : (k, 2) float64, mm, plan of the access frame, where its rings may be
+    mask   : (ny, nx) bool on the lattice of the tool, the nodes that are nearest to it
+    window : rows and columns that hold the mask
+    nodes  : (k, 2) float64, mm, plan of the access frame, where its rings may be
     """
 
     mask: NDArray[np.bool_]
+    window: tuple[slice, slice]
     nodes: F64
 
 
@@ -52,34 +55,36 @@ class SeparatePlaces:
             self._below.append(active | self._below[-1] if self._below else active)
         self._below.reverse()
 
-    def of(self, first: int, mask: NDArray[np.bool_] | None) -> list[Place]:
-        """The places of the layers from ``first`` on in a part of the lattice, none where there is one at most.
+    def of(self, first: int, place: Place | None) -> list[Place]:
+        """The places of the layers from ``first`` on in one of those before, none where there is one at most.
 
-        mask : (ny, nx) bool on the lattice; None: all of it
+        place : of the layers down to ``first``; None: the whole lattice
 
         Two places are one where the tool in one of them could meet the stock of the other: with a cutter that is wider
         than the way between them, or with shank and holder once it is down.
         """
-        field, lat = self._field, self._field.lattice
-        found = self._below[first] if mask is None else self._below[first] & mask
-        rows, cols = np.flatnonzero(found.any(axis=1)), np.flatnonzero(found.any(axis=0))
-        if not len(rows):
+        field, lat, below = self._field, self._field.lattice, self._below[first]
+        window = (slice(0, lat.ny), slice(0, lat.nx)) if place is None else place.window
+        found = below[window] if place is None else below[window] & place.mask[window]
+        if not found.any():
             return []
         wide = max([field.tool.radius, *(field.disc_radius(disc, 1.0) for disc in field.discs
                                          if self._lowest + disc.height < self._highest)])
         grow = int(np.ceil(0.5 * wide / lat.step))
-        near = np.pad(found[rows[0]:rows[-1] + 1, cols[0]:cols[-1] + 1], grow)
-        joined, count = ndimage.label(dilated(near, float(grow)), BESIDE)
+        joined, count = ndimage.label(dilated(np.pad(found, grow), float(grow)), BESIDE)
         if count < 2:
             return []
-        of_all = np.zeros(found.shape, np.int64)
-        of_all[found] = joined[near]
-        i, j = ndimage.distance_transform_edt(of_all == 0, return_distances=False, return_indices=True)
-        owner = of_all[i, j]
-        inside = np.ones(found.shape, np.bool_) if mask is None else mask
+        of_all = np.where(found, joined[grow:-grow, grow:-grow], 0)
+        i, j = blocked_beside(of_all == 0, lat.step)[1]
+        owner = np.zeros((lat.ny, lat.nx), np.int64)
+        owner[window] = of_all[i, j]
+        if place is not None:
+            owner[~place.mask] = 0
         rows, cols = np.nonzero(of_all)
-        nodes, numbers = lat.nodes(rows, cols, 0.0)[:, :2], of_all[rows, cols]
-        return [Place((owner == k) & inside, nodes[numbers == k]) for k in range(1, count + 1)]
+        nodes = lat.nodes(rows + window[0].start, cols + window[1].start, 0.0)[:, :2]
+        numbers = of_all[rows, cols]
+        return [Place(owner == k, box, nodes[numbers == k])
+                for k, box in enumerate(ndimage.find_objects(owner), start=1)]
 
 
 def nearest_first(places: Sequence[Place], at: F64 | None) -> Iterator[Place]:

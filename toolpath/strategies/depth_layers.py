@@ -160,7 +160,7 @@ def layer(field: TipField, stock: StockMap, z: float, place: LayerArea, allowanc
         laid = LayerRings(laid.standing, *([parts_within(lat, lines, within) for lines in lists]
                                            for lists in (laid.rings, laid.between)))
     beyond = min((SURE_RIM + 0.8) * stock.lattice.step + lat.step, 0.6 * tool.radius)
-    walled = field.nearest_blocked(z) is not None
+    walled = bool((field.height > z + LEVEL_TOLERANCE).any())
     worth = _Worth(lat, place.bare, max(STOCK_WORTH, island))
     yield from filter(None, _outwards(stock, tool, laid.rings, beyond, worth) if walled else
                       (_in_stock(stock, tool, lines, _Worth(lat), beyond) for lines in laid.rings))
@@ -178,11 +178,16 @@ def parts_within(lattice: Lattice, lines: Sequence[Line], within: NDArray[np.boo
 
     within : (ny, nx) bool on the lattice
     """
-    if within is None:
+    if within is None or not lines:
         return list(lines)
+    begins = np.cumsum([0, *(len(line.points) for line in lines[:-1])])
+    there = within[lattice.cells(np.vstack([line.points[:, :2] for line in lines]))]
+    some, whole = np.logical_or.reduceat(there, begins), np.logical_and.reduceat(there, begins)
     out: list[Line] = []
-    for line in lines:
-        out.extend(pieces_where(line, within[lattice.cells(line.points[:, :2])], 0.0, 0.0))
+    for k in np.flatnonzero(some).tolist():
+        line, first = lines[k], begins[k]
+        out.extend([line] if whole[k] else
+                   pieces_where(line, there[first:first + len(line.points)], 0.0, 0.0))
     return out
 
 

@@ -69,11 +69,11 @@ def test_a_place_falls_apart_further_down():
     (lower,) = [len(places.of(1, None))]
     assert len(places.of(0, None)) == 0 and lower == 2
     left, right = places.of(1, None)
-    assert places.of(1, left.mask) == [] and places.of(1, right.mask) == []
+    assert places.of(1, left) == [] and places.of(1, right) == []
 
 
 def test_the_nearest_place_comes_first():
-    places = [Place(X > x, np.array([[x, 0.0], [x + 1.0, 0.0]])) for x in (9.0, -15.0, 2.0, -4.0)]
+    places = [Place(X > x, np.s_[:, :], np.array([[x, 0.0], [x + 1.0, 0.0]])) for x in (9.0, -15.0, 2.0, -4.0)]
     order = [p.nodes[0, 0] for p in nearest_first(places, np.array([3.5, 1.0, 8.0]))]
     assert order == [2.0, -4.0, -15.0, 9.0]
     assert [p.nodes[0, 0] for p in nearest_first(places[:2], None)] == [9.0, -15.0]
