@@ -431,9 +431,11 @@ class _Layers:
                 strips = depth_layers.strip_lines(field, z, place.area, self.tips, self.allowance,
                                                   settings.budget.chord)
                 rings = ahead.of(z)
-                if rings is None and shared:
-                    rings = depth_layers.layer_rings(field, z, place, depth_layers.standing_above(field, stock, z),
-                                                     self.allowance, depth_layers.ring_spacing(field.tool))
+                if shared:
+                    standing = depth_layers.standing_above(field, stock, z)
+                    if rings is None or not np.array_equal(rings.standing, standing):
+                        rings = depth_layers.layer_rings(field, z, place, standing, self.allowance,
+                                                         depth_layers.ring_spacing(field.tool))
                 later = [*stretch[k + 1:k + 2], *(one for one in self.left[:1] if one[0] >= lowest - 1e-9)]
                 if later and not self.bounded:
                     ahead.begin(*later[0], stock)

@@ -66,7 +66,7 @@ class SeparatePlaces:
         field, lat, below = self._field, self._field.lattice, self._below[first]
         window = (slice(0, lat.ny), slice(0, lat.nx)) if place is None else place.window
         found = below[window] if place is None else below[window] & place.mask[window]
-        if not found.any():
+        if ndimage.label(found, BESIDE)[1] < 2:  # one at most, and growing them joins more
             return []
         wide = max([field.tool.radius, *(field.disc_radius(disc, 1.0) for disc in field.discs
                                          if self._lowest + disc.height < self._highest)])

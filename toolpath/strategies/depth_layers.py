@@ -145,7 +145,8 @@ def layer(field: TipField, stock: StockMap, z: float, place: LayerArea, allowanc
     side_step : mm between rings
     island    : mm, stock between the rings up to which it is left to the next layer, where ``place`` is not bare
     laid      : the rings of this layer for the stock as it was before; used where that still stands
-    within    : (ny, nx) bool on the lattice, where lines are wanted; None: everywhere
+    within    : (ny, nx) bool on the lattice, where lines are wanted, and ``laid`` is used in any case: what was cut
+                elsewhere since takes no stock from there; None: everywhere
 
     Yields
     ------
@@ -154,7 +155,7 @@ def layer(field: TipField, stock: StockMap, z: float, place: LayerArea, allowanc
     """
     lat, tool = field.lattice, field.tool
     standing = standing_above(field, stock, z)
-    if laid is None or not _same(laid.standing, standing, within):
+    if laid is None or within is None and not np.array_equal(laid.standing, standing):
         laid = layer_rings(field, z, place, standing, allowance, side_step)
     if within is not None:
         laid = LayerRings(laid.standing, *([parts_within(lat, lines, within) for lines in lists]
@@ -167,10 +168,6 @@ def layer(field: TipField, stock: StockMap, z: float, place: LayerArea, allowanc
     # Where rings turn sharply, islands stay between them; rings half a step off take these.
     for lines in laid.between:
         yield from filter(None, [_in_stock(stock, tool, lines, worth, beyond)])
-
-
-def _same(one: NDArray[np.bool_], other: NDArray[np.bool_], within: NDArray[np.bool_] | None) -> bool:
-    return np.array_equal(one, other) if within is None else not bool(((one != other) & within).any())
 
 
 def parts_within(lattice: Lattice, lines: Sequence[Line], within: NDArray[np.bool_] | None) -> list[Line]:

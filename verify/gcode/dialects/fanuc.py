@@ -236,7 +236,7 @@ class FanucReader(FanucPlanes):
                 self.hole = False
             elif 73 <= code <= 89:
                 self.hole = True
-            elif code in (43, 43.4, 43.5, 49):
+            elif code in (43, 43.4, 43.5, 49, 234):  # 234 is 43.4 of Haas
                 self.dropped = ""
 
     def _bare(self, raw: str) -> str:

@@ -293,3 +293,12 @@ def test_a_plane_takes_the_position_of_the_axes_that_is_within_their_range(limit
             "G68.2 X0. Y0. Z0. I0. J30. K0.\nG53.1\nG0 X1. Y1.\nZ80.\nG69\nM30\n%\n")
     p = read_program(text, dialect="fanuc", kinematics=machine, gauge_length={1: 60.0})
     assert np.degrees(p.poses.end_turn[p.line == 9][-1]) == pytest.approx(turn)
+
+
+@pytest.mark.parametrize("on", ["G234 H01 X40. Y-8. Z34.", "G43.4 H01 X40. Y-8. Z34."])
+def test_g234_of_haas_takes_the_length_that_g28_drops(on):
+    """Haas manual: G234 H01 turns tool centre point control on with length offset 1."""
+    text = (f"%\nO1\nG21 G17 G90 G94\nG91 G28 Z0.\nG90\nT1 M6\nG54\nS5000 M3\nG0 B45. C0.\n{on}\n"
+            "G1 X20. F500.\nG0 Z60.\nG49\nM30\n%\n")
+    machine = Kinematics("table-table-BC", ((0.0, 0.0, -50.0), (0.0, 0.0, -50.0)))
+    assert read_program(text, dialect="haas", kinematics=machine, gauge_length={1: 100.0}).remarks == ()
