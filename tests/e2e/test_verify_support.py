@@ -9,6 +9,7 @@ import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.sampling import sample_surface
+from tests.hand_parts import as_part, terraces
 from tests.thin_wall_case import (
     FOOT,
     LEFT,
@@ -62,6 +63,16 @@ def test_both_sides_in_turn_are_right_and_told_as_far_as_they_are_free(depth):
     assert proof.no_findings and not proof.support.found and proof.support.over == 0
     assert proof.support.walls == 1 and proof.support.limit == 10.0
     assert proof.support.most * THICK == pytest.approx(depth, abs=0.3)
+
+
+def test_a_wall_at_the_face_of_the_blank_is_held_by_the_stock_of_its_other_side():
+    """Its outer side is that of a sawn block, and loses no stock. Roughed to the foot, the inner side holds it not."""
+    part = as_part(terraces([LEFT, RIGHT, 12.5], [0, 16], [[TOP, FOOT]]))
+    block, asked = replace(SETUP, margin=0.0), scored(part)
+    proof = run(program(whole("right")), setup=block, part=part, asked=asked)
+    assert proof.no_findings and proof.support.walls == 1 and proof.support.most < 3.0
+    roughed = run(program([*whole("right", 0.3), *whole("right")]), setup=block, part=part, asked=asked)
+    assert roughed.counts == {"support": 1} and roughed.findings[0].depth == pytest.approx(TOP - FOOT, abs=0.3)
 
 
 def test_bands_deeper_than_the_limit_are_found_in_those_that_are():

@@ -42,7 +42,8 @@ NEVER = np.iinfo(np.int64).max
 class CutTimes:
     """Times of n places: when each is done, and when its stock is gone.
 
-    gone  : (n,) int64, index, piece of the path on which the stock stops supporting the wall, -1 before the first cut
+    gone  : (n,) int64, index, piece of the path on which the stock stops supporting the wall, -1 before the first cut,
+            NEVER also where the blank had none
     done  : (n,) int64, index, piece on which the cut ends, NEVER where no move cuts it
     mover : (n,) int64, index, the move after which it is done, -1 where none
     """
@@ -109,7 +110,8 @@ def _times(points: F64, normals: F64, thickness: F64, spacing: float, bounds: F6
     left = np.minimum(stock_on_normals(points, normals, bounds, setup, float(thickness.max())), thickness)
     rest = REST * setup.scallop_height + RAY_ERROR
     enough = setup.stock_allowance + rest
-    holds = np.minimum(thickness, HOLDS * stock_on_normals(points, normals, bounds, setup, np.inf))
+    had = stock_on_normals(points, normals, bounds, setup, np.inf)
+    holds = np.minimum(thickness, HOLDS * had)
     near = moves.only(beside := moves.feed & _beside(moves, tools, points, thickness))
     final, by = residual_on_normals(points, normals, left, near, tools, threads=threads,
                                     progress=lambda f: report(0.3 * f))
@@ -120,7 +122,7 @@ def _times(points: F64, normals: F64, thickness: F64, spacing: float, bounds: F6
     level = np.concatenate([holds[stands] - RAY_ERROR, target[open_]])
     piece, of = _first_pieces(points[rows], normals[rows], level, spacing, near, tools, threads,
                               lambda f: report(0.3 + 0.7 * f))
-    gone = np.where(stands, NEVER, -1)
+    gone = np.where(stands | (had <= enough), NEVER, -1)  # a side that never had stock loses none
     done, mover = np.where(left <= enough, -1, NEVER), np.full(len(points), -1, np.int64)
     count = int(stands.sum())
     gone[stands] = piece[:count]
