@@ -74,6 +74,7 @@ class FanucReader(FanucPlanes):
 
     further : G word of the work offsets after G59; counts : letters of whole numbers in a drilling cycle
     refused_g : G words that are refused, and what they are
+    length_words : G words that say whether the length offset holds
     rigid   : M word that begins rigid tapping; None: every tapping cycle is rigid
     """
 
@@ -89,6 +90,7 @@ class FanucReader(FanucPlanes):
     rigid: int | None = 29
     looks_ahead = 1.0
     home_from, gives_up_length = 0, True
+    length_words: tuple[float, ...] = (43, 43.4, 43.5, 49)
 
     def __init__(self) -> None:
         super().__init__()
@@ -236,7 +238,7 @@ class FanucReader(FanucPlanes):
                 self.hole = False
             elif 73 <= code <= 89:
                 self.hole = True
-            elif code in (43, 43.4, 43.5, 49, 234):  # 234 is 43.4 of Haas
+            elif code in self.length_words:
                 self.dropped = ""
 
     def _bare(self, raw: str) -> str:

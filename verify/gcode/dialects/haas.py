@@ -36,6 +36,7 @@ class HaasReader(FanucReader):
     refused_m = HAAS_M
     refused_g = REFUSED | WORDS
     rigid = None
+    length_words = (*FanucReader.length_words, 234)
     looks_ahead = 80.0
     shrinking_pecks = True
 

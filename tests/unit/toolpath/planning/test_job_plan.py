@@ -14,7 +14,8 @@ from tests.plan_checks import SlowStock, brute_residual, dense, worst_meeting
 from toolpath.lines import Line
 from toolpath.passes.pass_family import FinishTarget
 from toolpath.plan_settings import CutData, Pattern, PlanSettings
-from toolpath.planning.job_plan import AGAIN_SHARE, ISLAND, LOOSE_SHARE, plan_job
+from toolpath.planning.job_plan import AGAIN_SHARE, plan_job
+from toolpath.planning.tool_layers import ISLAND, LOOSE_SHARE
 from toolpath.planning.zone_finishing import Finish
 from toolpath.planning.zone_layout import ZoneLayout
 from toolpath.stock.cut_history import OVERLAP, Depths, Walked

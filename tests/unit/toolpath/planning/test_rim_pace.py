@@ -9,7 +9,7 @@ import pytest
 from geometry.cutting_mechanics import compliance
 from tests.hand_parts import box_mesh, field_of, tool
 from toolpath.plan_settings import CutData
-from toolpath.planning.job_plan import _Layers
+from toolpath.planning.tool_layers import ToolLayers
 from toolpath.tool_deflection import DeflectionModel
 
 DEEPEST = 6.0
@@ -20,7 +20,7 @@ def pace(limit: float):
     body = tool(4.0, 0.0, neck=10.0, stickout=16.0)
     finish = CutData(4000.0, 400.0, 100.0, 3000.0, 1.0,
                      bending=DeflectionModel(body, compliance(body), 1700.0, 0.23, limit, 4, 4000.0, True))
-    layers = _Layers.__new__(_Layers)
+    layers = ToolLayers.__new__(ToolLayers)
     layers.field, layers.allowance = field_of(box_mesh([0, 0, 0], [8, 5, 4]), body), 0.15
     layers.cut = CutData(4000.0, 400.0, 100.0, 3000.0, 1.0, finish=finish)
     return layers._rim_pace(DEEPEST)

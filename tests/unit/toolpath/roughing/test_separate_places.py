@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.hand_parts import ball, plan_part, slope_field, tool
-from toolpath.planning import job_plan
+from toolpath.planning import tool_layers
 from toolpath.roughing.separate_places import Place, SeparatePlaces, nearest_first
 from toolpath.stock.stock_map import StockMap
 from toolpath.strategies.depth_layers import LayerArea
@@ -98,7 +98,7 @@ def test_two_hollows_are_cut_one_after_the_other(monkeypatch):
         return stock.top, layers, int(np.diff(sides).sum())
 
     apart, its_layers, changes = planned()
-    monkeypatch.setattr(job_plan.SeparatePlaces, "of", lambda *_: [])
+    monkeypatch.setattr(tool_layers.SeparatePlaces, "of", lambda *_: [])
     together, layers, more = planned()
     assert changes == 1 < more
     np.testing.assert_allclose(apart, together, rtol=0.0, atol=0.05)
