@@ -217,7 +217,7 @@ class Linker:
             way: Way | None = self.ways.straight_on(led, False) or (arc[:1], led, False)
         else:
             way = (self.ways.straight_on(points, closed) or self.ways.from_air(points)
-                   or self.ways.ramped(points, closed))
+                   or self.ways.down(points, closed))
         if way is None:
             return False
         entry, cut, joined = way

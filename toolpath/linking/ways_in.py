@@ -9,6 +9,7 @@ The linker tries them in this order.
    before, and in from there.
 3. Down a ramp along the pass, round a closed one from where least stock is touched, back and forth on an open one. Its
    top is in air or just above an earlier cut, or a free place close beside it is.
+4. Instead of a ramp longer than an open pass: down in air over its end, and back along it to its start.
 
 A pass along a wall begins and ends on an arc (``toolpath.linking.lead_arcs``) where the tool is free on it and clear of
 stock at its far end; ways 1 and 2 lead to that end. Where the engaged angle has a limit
@@ -30,12 +31,12 @@ from numpy.typing import NDArray
 from geometry.mesh import F64
 from toolpath.lines import Line, dense
 from toolpath.linking.lead_arcs import arcs_along
-from toolpath.linking.ramp_entry import digs_down, head_of, ramped_part, steepest_ramp, way_down
+from toolpath.linking.ramp_entry import ROUNDING, digs_down, head_of, ramped_part, steepest_ramp, way_down
 from toolpath.linking.rapid_travel import Travel
 from toolpath.scallop_budget import LEAD_SHARE
 from toolpath.stock.cut_history import Depths
 from toolpath.stock.engagement import UNBOUNDED, within
-from toolpath.stock.stock_map import SURE_RIM
+from toolpath.stock.stock_map import SKIN, SURE_RIM
 from zones.reach.tip_field import LEVEL_TOLERANCE
 
 FLUTE_SHARE = 0.8  # flute lengths: highest stock over a pass
@@ -280,6 +281,41 @@ class WaysIn:
             if ramp is not None and entry is not None:
                 return entry, ramp, False
         return None
+
+    def down(self, points: F64, closed: bool) -> Way | None:
+        """Down along a pass, on a ramp or from its other end, whichever is shorter; None where there is neither.
+
+        points : (n, 3) float64, mm, access frame, of the pass
+        """
+        ramp, length = self.ramped(points, closed), Line(points, closed).length
+        if closed or ramp is not None and Line(ramp[1], False).length <= 2.0 * length:
+            return ramp
+        return self._back_along(points) or ramp
+
+    def _back_along(self, points: F64) -> Way | None:
+        """Down in air over the end of an open pass, or beside it, and back along the pass to its start.
+
+        points : (n, 3) float64, mm, access frame, of the pass
+
+        On the way back the tool loses a skin at most. None where it would go down steeper than a ramp through more
+        than that, or where the way breaks the limit of the engaged angle.
+        """
+        tool = self.field.tool
+        care = self.found.care(tool, points)
+        slope, skin = steepest_ramp(self.motions.ramp_angle, care), care * SKIN * tool.diameter
+        back = np.ascontiguousarray(points[::-1])
+        s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(back[:, :2], axis=0).T))])
+        lift = min(skin, slope * float(s[-1])) * (1.0 - s / max(float(s[-1]), 1e-12))
+        back = back + np.column_stack([np.zeros((len(back), 2)), lift])
+        drop, run = -np.diff(back[:, 2]), np.diff(s)
+        for k in np.flatnonzero(drop > slope * run * (1.0 + 1e-9) + ROUNDING):
+            over = self.stock.overlap(dense(back[k:k + 2], LOOK_EVERY * tool.radius), tool, LOOK_RIM, lower_bound=0.0)
+            if float(over.max()) > skin:
+                return None
+        if not self._lane(dense(back, LOOK_EVERY * tool.radius), MAX_OVER * self.motions.step_down):
+            return None
+        way = self.from_air(back)
+        return None if way is None else (way[0], np.vstack([back, points[1:]]), False)
 
     def _beside(self, top: F64) -> F64 | None:
         """Where to come down to the top of a ramp: there, or off the wall where no rim can be left.

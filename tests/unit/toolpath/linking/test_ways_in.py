@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -306,3 +308,25 @@ def test_a_way_down_goes_down_no_faster_than_straight_down_it_may():
         way = np.diff(t.points, axis=0)
         assert (-way[:, 2] / np.linalg.norm(way, axis=1)).max() * t.feed == pytest.approx(10.0)
     assert [t.feed for t in link.trajectories if t.motion is TrajectoryKind.CUT][-1] == 800
+
+
+@pytest.mark.parametrize(("length", "falls"), [(6.0, 0.0), (6.0, 0.5), (9.0, 0.8)])
+def test_a_pass_that_ends_in_air_is_run_back_instead_of_a_longer_ramp(length, falls):
+    """It begins inside the stock and ends beyond it; a ramp along it would be more than as long as the pass."""
+    ways = linker(step_down=1.0).ways
+    points = np.array([[length - 3.0, 15.0, TOP - 1.0 + falls], [-3.0, 15.0, TOP - 1.0]])
+    ramp = ways.ramped(points, False)
+    entry, cut, _ = ways.down(points, False)
+    assert entry[0, 0] == -3.0 and (cut[0, :2] == points[1, :2]).all()  # it comes down beyond the stock
+    assert (cut[-2:] == points).all()  # and ends with the whole pass in its own direction
+    assert ramp is None or Line(ramp[1], False).length > Line(cut, False).length
+    back = np.diff(cut[:-1], axis=0)
+    assert (-back[:, 2] <= math.tan(RAMP) * np.hypot(back[:, 0], back[:, 1])).all()
+    assert 0.0 < cut[0, 2] - points[1, 2] <= SKIN * 4.0
+
+
+def test_a_pass_is_not_run_back_downhill_through_more_than_a_skin():
+    ways = linker(step_down=1.0).ways
+    rising = np.array([[3.0, 15.0, TOP - 1.5], [-3.0, 15.0, TOP - 0.5]])
+    assert ways._back_along(rising) is None  # back it falls by 1 mm, up to 1.5 mm deep in the stock
+    assert ways._back_along(rising + [0.0, 0.0, 1.7]) is not None  # and here in air
