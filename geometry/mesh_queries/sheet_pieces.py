@@ -156,11 +156,12 @@ def sheet_pieces(tree: TriangleTree, thickest: float, length: float) -> SheetPie
     place = np.full(len(points), -1, np.int64)
     place[thick] = np.arange(len(thick))
     node[thick] = sheets + _components(len(thick), place[a[both]], place[b[both]])
-    joints = np.unique(np.sort(np.column_stack([node[a], node[b]]), axis=1), axis=0)
     low = np.zeros(int(node.max(initial=-1)) + 1, np.bool_)
+    first, second = np.minimum(node[a], node[b]), np.maximum(node[a], node[b])
+    joints = np.column_stack(np.divmod(np.unique((first * len(low) + second)[first < second]), len(low)))
     floor = float(tree.mesh.bounds[0, 2])
     low[node[points[:, 2] <= max(floor, float(points[:, 2].min())) + 1e-3]] = True
-    return SheetPieces(points, middle, node, sheets, joints[joints[:, 0] != joints[:, 1]], low)
+    return SheetPieces(points, middle, node, sheets, joints, low)
 
 
 def _components(count: int, a: INT, b: INT) -> INT:

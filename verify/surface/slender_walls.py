@@ -128,7 +128,10 @@ def thin_walls(tree: TriangleTree, samples: SurfaceSamples, ratio: float, lie: L
     stride = max(1, -(-len(samples) // MAX_SAMPLES))
     tried = np.arange(0, len(samples), stride)
     tried = tried[(np.abs(samples.normals[tried, 2]) >= LEVEL) == (lie is Lie.LEVEL)]
-    far, hit = first_hits(tree, samples.points[tried], -samples.normals[tried], t_min=skin)
+    # no place is so thick that is high or like one that is
+    way = float(np.hypot(*size[:2])) if lie is Lie.LEVEL else float(size[2]) / math.sqrt(1.0 - LEVEL**2)
+    most = HELD / ratio * way
+    far, hit = first_hits(tree, samples.points[tried], -samples.normals[tried], t_min=skin, t_max=most)
     beyond = tree.mesh.normals[np.maximum(hit, 0)]
     sheet = (hit >= 0) & ((beyond * samples.normals[tried]).sum(axis=1) < FACING)
     row, far, beyond = tried[sheet], far[sheet], beyond[sheet]
