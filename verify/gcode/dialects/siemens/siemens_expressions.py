@@ -22,6 +22,7 @@ MAX_DEPTH = 40
 MAX_ELEMENTS = 100_000
 _NUMBER = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:EX[+-]?[0-9]{1,3})?")
 _NAME = re.compile(r"\$?[A-Z_][A-Z_0-9]*")
+_CODED = re.compile(r"'(?:H([0-7]?[0-9A-F]{1,7})|B([01]{1,31}))'")  # hexadecimal and binary, no sign bit
 _TEXT = re.compile(r'"([^"]*)"')
 _OPERATOR = re.compile(r"\s*(==|<>|<=|>=|<<|[*/+<>-]|(?:DIV|MOD|B_AND|B_XOR|B_OR|AND|XOR|OR)(?![A-Z_0-9]))")
 _LEVELS = {"*": 10, "/": 10, "DIV": 10, "MOD": 10, "+": 9, "-": 9, "B_AND": 8, "B_XOR": 7, "B_OR": 6, "AND": 5,
@@ -204,6 +205,9 @@ class ValueReader:
         if m := _NUMBER.match(self.text, self.at):
             self.at, written = m.end(), m[0].replace("EX", "E")
             return _finite(m[0], lambda: float(written))
+        if m := _CODED.match(self.text, self.at):
+            self.at = m.end()
+            return float(int(m[1], 16) if m[1] else int(m[2], 2))
         if m := _NAME.match(self.text, self.at):
             self.at = m.end()
             return self._named(m[0])

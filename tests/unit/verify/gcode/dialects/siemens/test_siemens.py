@@ -42,6 +42,14 @@ def test_inches():
     assert apart(first, second) < 1e-6 and same_feeds(first, second)
 
 
+def test_hexadecimal_and_binary_numbers():
+    given, plain = "R1='H1F'\nG1 X=R1+'B101' Y='h0a' F9", "G1 X36 Y10 F9"
+    assert apart(read(given, "siemens"), read(plain, "siemens")) < 1e-9
+    for word in ("'B2'", "'H'", "'HFFFFFFFF'", "'3'"):
+        with pytest.raises(ProgramError, match="cannot read a value"):
+            read(f"R1={word}", "siemens")
+
+
 def test_tools_by_name():
     for word, number in (('T="MILL_D10"', 1), ('T="mill_d10"', 1), ('T="drill 8"', 2), ("T=3", 3), ('T="3"', 3),
                          ("T3", 3)):
