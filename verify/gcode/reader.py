@@ -19,7 +19,7 @@ from __future__ import annotations
 import copy
 import math
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from verify.gcode.block_motion import BlockMotion
 from verify.gcode.block_words import Block, BlockError, parse_block, straight, used_letters
 from verify.gcode.dialects import CONTROLS, DIALECTS, LINUXCNC, translated_blocks
 from verify.gcode.flow.control_flow import Flow, has_flow
+from verify.gcode.flow.input_increment import INCH_STEP, STEP, Way, first_drift
 from verify.gcode.flow.second_run import KEPT_BY_LINUXCNC, KEPT_MODES, TABLES, Change, first_change, left_modes
 from verify.gcode.flow.system_parameters import served
 from verify.gcode.machine_words import functions_note
@@ -58,12 +59,16 @@ class Reader(BlockMotion):
     leaves_modes : what the next run of the program takes for granted
     full_turns   : whether ATAN and ASIN of Fanuc give 0 to 360 deg; parameter 6004#0 decides
     angle_line   : first line of an angle that would differ then, 0 for none
+    counts       : whether words count in the least input increment of the control
+    fine_line    : first line of a word that is finer, and may add up with others; 0 for none
     """
 
     dialect = LINUXCNC
     leaves_modes: tuple[Assumed, ...] = ()
     full_turns = False
     angle_line = 0
+    counts = False
+    fine_line = 0
     _noted: tuple[object, ...] = (None, None, 0.0, 0.0, 0.0)
 
     def read(self, text: str, report: Report = silent, dialect: str = LINUXCNC) -> Program:
@@ -95,6 +100,7 @@ class Reader(BlockMotion):
         self._path_mode(table)
         self._judge_lengths()
         self._turn_angles(begin, text, lines, table)
+        self._count_words(begin, text, lines, table)
         self._run_again(begin, text, lines, table, compensated)
         speed, coolant = log.states()
         start, end, feed = (np.ascontiguousarray(table[:, k]) for k in (slice(0, 3), slice(3, 6), 7))
@@ -183,12 +189,43 @@ class Reader(BlockMotion):
                             f"decides; with the other range the program has {change.what} in line {change.line}: add "
                             "360 where the angle is less than 0", line=self.angle_line)
 
-    def _change(self, text: str, lines: list[str], table: F64) -> Change | None:
-        """The first line at which this reader, which stands at the beginning, runs otherwise than ``table`` (m, 10)."""
+    def _count_words(self, begin: Reader, text: str, lines: list[str], table: F64) -> None:
+        """Remark where a control that counts in its least input increment goes elsewhere."""
+        if not self.fine_line:
+            return
+        again = begin._copy()
+        again.counts = True
+        step = STEP if self.s.scale == 1.0 else INCH_STEP
+        first = self._way(table)
+        if change := again._change(text, lines, table, lambda: first_drift(
+                first, again._way(again.log.table()), again.log.errors, step, self._reach(table))):
+            self.log.remark("increment", "this word is finer than the least input increment (IS-B: 0.001 mm, 0.0001 "
+                            "inch, 0.001 deg): a control rounds it where it takes a variable, and drops the digits of "
+                            f"a number behind it. So it has {change.what} in line {change.line}: write absolute places "
+                            "(G90), or round the variables before they add up", line=self.fine_line)
+
+    def _way(self, table: F64) -> Way:
+        """The reading as ``first_drift`` compares it; ``table`` (m, 10) is its log."""
+        poses = self.log.turned.poses(len(table), self.machine)
+        return Way(table, None if poses is None else poses.end_turn)
+
+    def _reach(self, table: F64) -> float:
+        """mm, how far the tip may be from a rotary axis."""
+        if self.machine is None or self.machine.pivots is None or not len(table):
+            return 0.0
+        far = float(np.nanmax(np.abs(table[:, :6]), initial=0.0)) * math.sqrt(3.0)
+        return far + max(math.hypot(*p) for p in self.machine.pivots) + max(self.gauge.values(), default=0.0)
+
+    def _change(self, text: str, lines: list[str], table: F64,
+                compared: Callable[[], Change | None] | None = None) -> Change | None:
+        """The first line at which this reader, which stands at the beginning, runs otherwise than ``table`` (m, 10).
+
+        compared : gives that line once this reader has run; None: any difference counts
+        """
         try:
             self._scan(self._blocks(text, lines), bytearray(len(lines) + 2))
             self._finish()
-            return first_change(table, self.log.table(), self.log.errors)
+            return compared() if compared else first_change(table, self.log.table(), self.log.errors)
         except ProgramError:  # it is too long, which the first run is not
             return Change(self.log.line, "too many moves")
 

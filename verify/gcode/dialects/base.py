@@ -27,6 +27,8 @@ class Machine(Protocol):
     radii   : mm by T number, radius of the tools of the setup
     teeth   : numbers of teeth by T number, of the tools for which the setup states it
     elements : number of moves of compensated contours so far; idle : blocks since the last one
+    counts  : whether words count in the least input increment in this reading
+    fine_line : first line of a word that is finer, and may add up with others; 0 for none
     """
 
     s: State
@@ -37,6 +39,8 @@ class Machine(Protocol):
     teeth: dict[int, int]
     elements: int
     idle: int
+    counts: bool
+    fine_line: int
 
     def here(self) -> list[float]:
         """(3,) mm, the programmed place in the coordinates of the blocks; nan where it is unknown."""

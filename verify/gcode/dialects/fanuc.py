@@ -18,6 +18,7 @@ from verify.assumptions import Assumed, AssumedKind
 from verify.gcode.block_words import FURTHER, bare
 from verify.gcode.dialects.base import NUMBER, BlockError, Machine
 from verify.gcode.dialects.fanuc_planes import FanucPlanes
+from verify.gcode.flow.input_increment import counted, is_fine, without_fine_digits
 from verify.gcode.flow.macro_flow import MacroFlow, has_macros
 from verify.gcode.machine_words import FANUC_M
 
@@ -105,9 +106,36 @@ class FanucReader(FanucPlanes):
         """As in the base class; ``verify.gcode.flow.macro_flow`` follows subprograms, macros, jumps and variables."""
         self.machine = machine
         lines = self._without_leader(lines)
-        if has_macros(lines):
-            return MacroFlow(lines, machine, self.local_calls).lines_run()
-        return super().order(lines, machine)
+        run = (MacroFlow(lines, machine, self.local_calls, self._taken).lines_run() if has_macros(lines)
+               else super().order(lines, machine))
+        return self._short(run) if machine.counts else run
+
+    def _short(self, run: Iterator[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+        """The lines without the digits that the control drops (``verify.gcode.flow.input_increment``)."""
+        for number, raw in run:
+            yield number, without_fine_digits(raw, self._inch, self.vectors)
+
+    def _taken(self, letter: str, number: float, codes: frozenset[float]) -> float:
+        """The number that this reading takes for a word of a variable; notes the line where a control takes another."""
+        short = counted(letter, number, codes, self._inch, self.vectors)
+        if self.machine.counts:
+            return short
+        if not self.machine.fine_line and is_fine(number, short, letter, self._inch):
+            self.machine.fine_line = self.machine.log.line
+        return number
+
+    @property
+    def _inch(self) -> bool:
+        return self.machine.s.scale != 1.0
+
+    def _note_fine(self, raw: str) -> None:
+        """Note a line in G91 whose digits a control drops, and a shift (G92) from a place that it does not count."""
+        if self.machine.fine_line or self.machine.counts:
+            return
+        adds = (self.machine.s.relative or "91" in raw) and without_fine_digits(raw, self._inch, self.vectors) != raw
+        if adds or ("92" in raw and any(is_fine(at, counted("X", at, (), False), "X", False)
+                                        for at in self.machine.here() if at == at)):
+            self.machine.fine_line = self.machine.log.line
 
     def _without_leader(self, lines: Sequence[str]) -> Sequence[str]:
         """The lines, those before the first % empty: a control reads from there. Lines that may be blocks stay."""
@@ -129,6 +157,8 @@ class FanucReader(FanucPlanes):
         """
         if self.drops:  # by the line before
             self.dropped, self.drops = self.drops, ""
+        if self.machine.s.relative or "9" in raw:
+            self._note_fine(raw)
         if not self.polar and not self.taps and _PLAIN.fullmatch(raw):
             return [raw]
         text = self._bare(raw)

@@ -35,6 +35,7 @@ _IDLE = frozenset({"popen", "pclos", "dprnt", "bprnt", "setvn"})
 _WORD = re.compile(rf"([A-Z])({NUMBER})")
 _COUNTS = "GMNTHDLPSO"
 _POINTED = "XYZABCIJKRUVW"
+Taken = Callable[[str, float, frozenset[float]], float]
 
 
 @dataclass
@@ -79,10 +80,11 @@ class _Call:
 
 @dataclass(frozen=True)
 class _Filled:
-    """A block with variables: its letters, each with what is written behind it and the value of that."""
+    """A block with variables: its letters, each with what is written behind it and the value of that; its G words."""
 
     head: str
     words: tuple[tuple[str, str, Value | None], ...]
+    codes: frozenset[float] = frozenset()
 
     @classmethod
     def read(cls, text: str) -> _Filled:
@@ -101,10 +103,13 @@ class _Filled:
             value = reading.value()
             written = text[start:reading.at].upper()
             words.append((letter, written, None if re.fullmatch(NUMBER, written) else value))
-        return cls(head, tuple(words))
+        return cls(head, tuple(words), frozenset(float(w) for a, w, v in words if a == "G" and v is None))
 
-    def text(self, scope: MacroVariables) -> str:
-        """The block with numbers in the place of its variables and expressions, without words of vacant variables."""
+    def text(self, scope: MacroVariables, taken: Taken) -> str:
+        """The block with numbers in the place of its variables and expressions, without words of vacant variables.
+
+        taken : gives the number that the control takes for a letter, from its value and the G words of the block
+        """
         out = self.head
         for letter, written, value in self.words:
             if value is None:
@@ -114,7 +119,8 @@ class _Filled:
             if found != found and written.startswith("#") and scope.emptied():
                 scope.ignored.append(f"{letter}{written}")
                 continue
-            number = digits(letter, scope.known(found, f"{letter}{written}"))
+            known = scope.known(found, f"{letter}{written}")
+            number = digits(letter, known if 65 in self.codes else taken(letter, known, self.codes))
             out += letter + (number if "." in number or letter in _COUNTS else number + ".")
         return out
 
@@ -128,10 +134,12 @@ class MacroFlow:
     lines   : its text
     machine : the reader
     haas    : whether M97 is known and P of M98 has no count
+    taken   : gives the number that the control takes for a word of a variable: letter, value, G words of the block
     """
 
-    def __init__(self, lines: Sequence[str], machine: Machine, haas: bool = False) -> None:
+    def __init__(self, lines: Sequence[str], machine: Machine, haas: bool = False, taken: Taken | None = None) -> None:
         self.lines, self.machine, self.haas = lines, machine, haas
+        self.taken = taken or (lambda letter, number, codes: number)
         self.scope = MacroVariables(machine.served, None if haas else machine.angle)
         self.sections = _sections(lines)
         self.calls: list[_Call] = []
@@ -173,7 +181,7 @@ class MacroFlow:
             if not isinstance(step, _Filled):
                 at = step(at, section)
                 continue
-            rest, call = self._split(step.text(self.scope))
+            rest, call = self._split(step.text(self.scope, self.taken))
             if self.scope.ignored:
                 self.machine.log.note(f"line {at + 1}: {' and '.join(self.scope.ignored)} is ignored, as its variable "
                                       "is vacant")
