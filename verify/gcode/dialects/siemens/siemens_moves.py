@@ -48,6 +48,7 @@ class SiemensMoves(SiemensCorners):
     motion    : G number or name of the motion in force, None before the first
     tolerance : mm or inch, of the path (CTOL); rounding : of corners (ADIS)
     follows   : the name of the value that bounds the rounding in force (CTOL, ADIS), '' for none
+    by_data   : whether machine data decide which of the two counts (G642 to G645; MD20480)
     cycle     : the drilling cycle that MCALL repeats after each move
     end       : (3,) mm, end of the latest move in the coordinates of the control
     """
@@ -57,7 +58,7 @@ class SiemensMoves(SiemensCorners):
         self.motion: int | str | None = None
         self.tolerance: float | None = None
         self.rounding: float | None = None
-        self.follows = ""
+        self.follows, self.by_data = "", False
         self.least_speed, self.top_speed = 0.0, math.inf  # 1/min, of G25 S and G26 S
         self.cycle: DrillingCall | None = None
         self.end = [math.nan] * 3
@@ -346,25 +347,29 @@ class SiemensMoves(SiemensCorners):
             self.tolerance, again = values["CTOL"] if values["CTOL"] >= 0 else None, "CTOL"
         if "ADIS" in values or "ADISPOS" in values:
             self.rounding, again = max(values.get("ADIS", 0.0), values.get("ADISPOS", 0.0)), again or "ADIS"
-        if not {9, 60, 64, 641, 642, 643, 644, 645}.isdisjoint(line.codes):
-            self.follows = ""
+        if not {60, 64, 641, 642, 643, 644, 645}.isdisjoint(line.codes):
+            self.follows, self.by_data = "", not UNBOUNDED.difference({64}).isdisjoint(line.codes)
         if 641 in line.codes or (again == self.follows == "ADIS"):
             if self.rounding is None:
                 raise BlockError("G641 without ADIS in its block or before: the rounding of corners is unknown")
             self.follows = "ADIS"
             self.bound(True)
             return [f"G64 P{self.rounding:.6f}"]
-        rounds = not UNBOUNDED.isdisjoint(line.codes)
-        if (rounds and 64 not in line.codes) or "COMPRESS" in values:
+        if self.by_data or "COMPRESS" in values:
             self.follows = "CTOL"
-        if (rounds or "COMPRESS" in values or again == self.follows == "CTOL") and self.tolerance is not None \
-                and 64 not in line.codes:
+        rounds = not UNBOUNDED.isdisjoint(line.codes)
+        begins = (rounds and 64 not in line.codes) or "COMPRESS" in values
+        by_data = (self.rounding or 0.0) if self.by_data else 0.0
+        if (begins or again == self.follows == "CTOL") and self.tolerance is not None and 64 not in line.codes:
             self.bound(True)
-            return [f"G64 P{self.tolerance:.6f}"]
+            return [f"G64 P{max(self.tolerance, by_data):.6f}"]
         if rounds:
-            self.notes.append("G64 or G642 to G645 without a tolerance (ADIS, CTOL): machine data decide how far the "
-                              "control rounds corners; the error bound does not include it")
+            self.notes.append("G64 or G642 to G645 without a tolerance (CTOL): machine data decide how far the control "
+                              "rounds corners; the error bound does not include it")
             self.bound(False)
+        if by_data and (rounds or again == "ADIS"):
+            return [f"G64 P{by_data:.6f}"]
+        if rounds:
             return []
         if "COMPRESS" in values:
             self.notes.append("a compressor (COMPON, COMPCURV, COMPCAD, COMPSURF) without CTOL: machine data decide "

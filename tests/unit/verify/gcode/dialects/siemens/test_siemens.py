@@ -368,13 +368,19 @@ def test_limits_of_axes_are_read():
 
 
 @pytest.mark.parametrize("lines", ["CTOL=1\nCOMPCAD", "COMPCAD\nCTOL=1", "COMPCAD CTOL=1", "G642\nG1 X1\nCTOL=1",
-                                   "G641 ADIS=1", "G641 ADIS=0.001\nG1 X1\nADIS=1", "ADIS=1\nG641"])
+                                   "G641 ADIS=1", "G641 ADIS=0.001\nG1 X1\nADIS=1", "ADIS=1\nG641",
+                                   "G641 ADIS=0.001\nG9 G1 X1\nADIS=1",
+                                   # MD20480 decides whether ADIS counts here, and the larger one of both is read
+                                   "G642 ADIS=1", "G643\nG1 X1\nADISPOS=1", "ADIS=1\nG644", "G645\nG9 X1\nADIS=1",
+                                   "CTOL=0.001\nG642\nADIS=1", "G642\nADIS=1\nCTOL=0.001"])
 def test_a_tolerance_counts_wherever_it_stands(lines):
     p = read(f"{lines}\nG1 X5 F100", "siemens")
     assert any("lets the control leave the path by 1 mm" in r.message for r in p.remarks)
 
 
-@pytest.mark.parametrize("lines", ["CTOL=1", "ADIS=1", "G641 ADIS=0.001\nG60\nADIS=1", "COMPCAD\nG60\nCTOL=1"])
+@pytest.mark.parametrize("lines", ["CTOL=1", "ADIS=1", "G641 ADIS=0.001\nG60\nADIS=1", "COMPCAD\nG60\nCTOL=1",
+                                   "COMPCAD CTOL=0.001\nADIS=1", "G642 ADIS=0.001\nG60\nADIS=1",
+                                   "G642 ADIS=0.001"])
 def test_a_tolerance_that_no_mode_uses_counts_not(lines):
     assert not any("leave the path" in r.message for r in read(f"{lines}\nG1 X5 F100", "siemens").remarks)
 
