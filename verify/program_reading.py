@@ -29,13 +29,14 @@ CHORD_SHARE, FINEST_CHORD = 0.25, 2e-4  # of the gouge tolerance, and mm: chords
 def read_one(nc: NcProgram, tools: Sequence[ToolBody], *, work_offset: str = "G54", gouge_tolerance: float = 0.01,
              kinematics: Kinematics | None = None, gauge_length: Mapping[int, float] | None = None,
              spindle_tool: int = 0, report: Report = silent, change: Sequence[float] | None = None,
-             gauge_given: Collection[int] = (), teeth: Mapping[int, int] | None = None) -> Program:
+             gauge_given: Collection[int] = (), teeth: Mapping[int, int] | None = None,
+             max_feed: float | None = None) -> Program:
     """Read one program, NC text or STEP-NC, in its own frame.
 
     work_offset     : of the setup; that of the program counts where it has one
     gouge_tolerance : mm
     gauge_given     : T numbers of the tools whose gauge length was measured
-    kinematics, gauge_length, spindle_tool, report, change, teeth : as ``verify.gcode.reader.read_program``
+    kinematics, gauge_length, spindle_tool, report, change, teeth, max_feed : as ``verify.gcode.reader.read_program``
 
     Raises
     ------
@@ -52,7 +53,7 @@ def read_one(nc: NcProgram, tools: Sequence[ToolBody], *, work_offset: str = "G5
         blend_limit=max(BLEND, BLEND_SHARE * gouge_tolerance), kinematics=kinematics,
         gauge_length=gauge_length, spindle_tool=spindle_tool, report=report, dialect=nc.dialect,
         radii={t.number: t.radius for t in tools}, names={t.id: t.number for t in tools}, change=change,
-        teeth=teeth,
+        teeth=teeth, max_feed=max_feed,
         lengths={t.number: gauge_length[t.number] for t in tools if gauge_length and t.number in gauge_length
                  and (t.holder or t.number in gauge_given)}, measured=gauge_given,
         chord=min(CHORD, max(CHORD_SHARE * gouge_tolerance, FINEST_CHORD)))

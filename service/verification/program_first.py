@@ -82,7 +82,8 @@ def read_first(setup: Setup, text: str, *, access: str | None = None, spindle_to
         return read_one(program, tools, work_offset=own.work_offset, gouge_tolerance=setup.quality.gouge_tolerance_mm,
                         kinematics=of, gauge_length={**gauges, **(longer or {})}, spindle_tool=spindle_tool,
                         change=change_in_frame(setup.machine.change_position, level=level),
-                        gauge_given=gauges_given(setup.tools), teeth=teeth)
+                        gauge_given=gauges_given(setup.tools), teeth=teeth,
+                        max_feed=setup.machine.max_feed_mm_min)
 
     if dialect is None and not is_exchange_file(text):
         assumed.extend(_assumed_dialect(nc.dialect, others(may, _stated_dialects(setup))))

@@ -116,7 +116,7 @@ def read_each(programs: Sequence[NcProgram], part: Part, tools: Sequence[ToolBod
         read.append(read_one(
             nc, tools, work_offset=own.work_offset, gouge_tolerance=setup.gouge_tolerance, kinematics=setup.kinematics,
             gauge_length=setup.gauge_length, spindle_tool=spindle_tool, report=share, change=own.change_position,
-            gauge_given=setup.gauge_given))
+            gauge_given=setup.gauge_given, max_feed=setup.max_feed))
         done += len(nc.text)
     return read
 

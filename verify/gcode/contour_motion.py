@@ -34,17 +34,23 @@ from verify.program.move_log import MAX_MOVES_A_BLOCK
 from verify.program.program import NAN, StopPoint
 
 UNPLACED = "a rapid in Z alone, before X and Y are stated,"
+ACCELERATION = 1e4
+"""mm/s², the largest to the centre of an arc that a machine is taken to make."""
 _UNSETTLED = "cutter radius compensation is on: end it with G40 first"
 
 
 @dataclass(frozen=True)
 class _Way:
-    """What else a move of a contour has: kind, mm/min, (3,) mm where it starts and ends, as programmed."""
+    """What else a move of a contour has: kind, mm/min, (3,) mm where it starts and ends, as programmed.
+
+    constant : whether the feed is that of the contour, not of the tool's centre
+    """
 
     kind: int
     feed: float
     start: list[float]
     end: list[float]
+    constant: bool = False
 
 
 @dataclass(frozen=True)
@@ -63,6 +69,7 @@ class ContourMotion(Origins):
     names   : T numbers by the ids of the tools of the setup
     actual  : (3,) mm, place of the tool where it is not the programmed one, None elsewhere
     chord   : mm, by which chords may leave their arcs
+    max_feed : mm/min, of the machine, or None
     across  : whether the running block has a word of an axis of the plane
     elements, idle : as in ``verify.gcode.dialects.base.Machine``
     """
@@ -76,6 +83,7 @@ class ContourMotion(Origins):
         self.contour: Contour | None = None
         self.actual: list[float] | None = None
         self.across, self.chord = False, CHORD
+        self.max_feed: float | None = None
         self.elements = self.idle = 0
         self._composed: tuple[tuple[object, ...], Frame | None] | None = None
         self._stated: tuple[Frame, list[float]] | None = None  # coordinates of a place that is not known whole
@@ -238,7 +246,7 @@ class ContourMotion(Origins):
             raise BlockError("cutter radius compensation at a place that the program has not stated")
         self._write_pieces(self._add(self.contour, Element(
             complex(start[i], start[j]), complex(target[i], target[j]), centre, sweep, self.log.line,
-            tag=_Way(FEED, feed, start, target))))
+            tag=_Way(FEED, feed, start, target, self.control is not None and self.control.contour_feed))))
         self._stand_at(target)
 
     def _add(self, contour: Contour, element: Element) -> Iterable[Piece | object]:
@@ -293,9 +301,24 @@ class ContourMotion(Origins):
         points = swept_points(start, end, (piece.centre.real, piece.centre.imag), piece.sweep, (i, j, k), self.chord,
                               MAX_MOVES_A_BLOCK).tolist()
         self.log.room(len(points))
+        feed = way.feed
+        if way.constant and not piece.link and self.s.feed_mode != 93:
+            feed = self._centre_feed(feed, piece.element.radius, abs(piece.start - piece.centre))
         for p in points:
-            self._line_to(p, way.kind, way.feed)
+            self._line_to(p, way.kind, feed)
         return None
+
+    def _centre_feed(self, feed: float, contour: float, path: float) -> float:
+        """Feed of the tool's centre where that of the contour is ``feed``, mm/min, not less than that.
+
+        contour, path : mm, radii of an arc and of the way of the centre beside it
+        """
+        fastest = min(60.0 * math.sqrt(ACCELERATION * path), math.inf if self.max_feed is None else self.max_feed)
+        centre = max(feed, min(feed * path / max(contour, 1e-9), fastest))
+        if centre > feed:
+            self.log.note("F is the feed of the contour under G41 and G42 (CFC, as delivered): on outside arcs the "
+                          "centre of the tool is faster; CFTCP makes it the feed of the centre")
+        return centre
 
     def _line_to(self, target: list[float], kind: int, feed: float, turn: list[float] | None = None,
                  minutes: float = NAN) -> None:

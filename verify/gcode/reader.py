@@ -445,7 +445,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
                  report: Report = silent, dialect: str = LINUXCNC, radii: Mapping[int, float] | None = None,
                  names: Mapping[str, int] | None = None, change: Sequence[float] | None = None,
                  lengths: Mapping[int, float] | None = None, teeth: Mapping[int, int] | None = None,
-                 measured: Collection[int] = (), chord: float = CHORD) -> Program:
+                 measured: Collection[int] = (), chord: float = CHORD, max_feed: float | None = None) -> Program:
     """Read a program of three, four or five axes.
 
     text        : the program
@@ -465,6 +465,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
     teeth       : numbers of teeth by T number, where they are known, for feeds per tooth
     measured    : T numbers of those whose length the setup states
     chord       : mm, from 0.0002 to 0.001, by which chords may leave their arcs
+    max_feed    : mm/min of the machine, above which no word of the control takes the tool; None: not known
 
     Returns
     -------
@@ -503,7 +504,7 @@ def read_program(text: str, *, name: str = "program", tools: Collection[int] | N
                            remedy="give a tool of the table as spindle_tool")
     reader = Reader(Log(name), tools, work_offset, blend_limit, kinematics, gauge_length, spindle_tool)
     reader.radii, reader.names, reader.teeth = dict(radii or {}), dict(names or {}), dict(teeth or {})
-    reader.chord = chord
+    reader.chord, reader.max_feed = chord, max_feed
     reader.measured = frozenset(lengths or ()) & frozenset(measured)
     reader.change = None if change is None else tuple(change)
     reader.hangs, reader.stays = {0: 0.0, **(lengths or {})}, dialect == LINUXCNC

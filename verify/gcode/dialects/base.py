@@ -74,6 +74,7 @@ class DialectReader:
     names   : T numbers by the names (ids) of the tools of the setup
     shrinking_pecks : whether I, J, K of G73 and G83 are the first peck, by how much each is shorter, and the shortest
     own_speed : whether a word has made each axis go at its own speed in a rapid
+    contour_feed : whether, on outside arcs of compensated contours, F is the feed of the contour, not of the centre
     dropped : word that has dropped the length offset, other than G49; '' for none
     looks_ahead : most blocks without a move in the plane between two moves of a compensated contour through which the
               control finds the second one
@@ -89,6 +90,7 @@ class DialectReader:
     gives_up_length = False
     own_speed = False
     shrinking_pecks = False
+    contour_feed = False
     looks_ahead: float = math.inf
 
     def __init__(self) -> None:

@@ -25,7 +25,9 @@ from verify.gcode.dialects.siemens.siemens_moves import CURVES, Line
 from verify.gcode.dialects.siemens.siemens_sections import LABEL, NUMBERED, PLAIN, statement
 from verify.gcode.dialects.siemens.siemens_words import (
     COMPRESSORS,
+    CONTOUR_FEED,
     ENVELOPES,
+    FEEDS,
     IDLE,
     IDLE_CALLS,
     IDLE_CODES,
@@ -72,6 +74,7 @@ class SiemensReader(SiemensCalls):
 
     home_from, gives_up_length = 1, True
     looks_ahead = 3.0
+    contour_feed = True  # CFC, as delivered (MD20150)
     style, refused_m = SIEMENS_STYLE, SIEMENS_M
 
     def __init__(self) -> None:
@@ -240,7 +243,7 @@ class SiemensReader(SiemensCalls):
         return self._name(name[0], line)
 
     def _is_word(self, name: str) -> bool:
-        return name in IDLE or name in REFUSED or name in COMPRESSORS or name in _ORIENTS
+        return name in IDLE or name in FEEDS or name in REFUSED or name in COMPRESSORS or name in _ORIENTS
 
     def _indexed(self, name: str, reader: ValueReader, line: Line, behind: int, end: int) -> None:
         """NAME[...]= : an element of an array, a value of the control, or a limit of an axis."""
@@ -433,6 +436,8 @@ class SiemensReader(SiemensCalls):
             line.values["COMPRESS"] = 1.0
         elif word in ("CUT2D", "CUT2DF"):
             self.in_frame = word == "CUT2DF"
+        elif word in FEEDS:
+            self.contour_feed = word == CONTOUR_FEED
         elif word == "RTLIOF":
             self.own_speed = True
         elif word in CURVES:

@@ -121,7 +121,8 @@ class SiemensCalls(SiemensMoves):
     def _modes(self) -> Callable[[], str]:
         """A call that restores the modes and the programmable frame of now; it gives the words for what is left."""
         s = self.machine.s
-        kept, frames, named = replace(s), (self.swivel, self.programmed), (self.motion, self.circle, self.style)
+        kept, frames, named = replace(s), (self.swivel, self.programmed), (
+            self.motion, self.circle, self.style, self.contour_feed)
 
         def restore() -> str:
             if self.swivel is not frames[0] or (s.work_offset, s.side) != (kept.work_offset, kept.side):
@@ -129,7 +130,7 @@ class SiemensCalls(SiemensMoves):
                                  "radius compensation: machine data decide whether its return brings it back")
             if self.programmed is not frames[1]:
                 self.program_again(frames[1])
-            self.motion, self.circle, self.style = named
+            self.motion, self.circle, self.style, self.contour_feed = named
             words = [f"G{kept.plane}", "G91" if kept.relative else "G90"]
             words += [f"G{kept.feed_mode}"] if s.feed_mode != kept.feed_mode else []
             words += ["G710" if kept.scale == 1.0 else "G700"] if s.scale != kept.scale else []

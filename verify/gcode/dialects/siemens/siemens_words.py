@@ -33,12 +33,18 @@ MOVES = {5: "an oblique plunge", 7: "an oblique plunge", 33: "thread cutting", 3
 """G words that are not followed, and what they do."""
 
 IDLE = frozenset("""
-    ACTBLOCNO BLSYNC BRISK CDOF CDOF2 CDON CFC CFIN CFTCP COMPOF CORROF CP CPRECOF CPRECON CUT2D CUT2DF
+    ACTBLOCNO BLSYNC BRISK CDOF CDOF2 CDON COMPOF CORROF CP CPRECOF CPRECON CUT2D CUT2DF
     DELAYFSTOF DELAYFSTON DIAMOF DISPLOF DISPLON DRIVE DYNFINISH DYNNORM DYNPOS DYNPREC DYNROUGH
     DYNSEMIFIN FFWOF FFWON FIFOCTRL FNORM FTOCOF GWPSOF IPTRLOCK IPTRUNLOCK NORM ORISOF ORISON OSC OSD OSOF
     OSS OSSE OST PAROTOF RTLION SAVE SBLOF SBLON SOFT SPATH SPCOF SPCON STARTFIFO STOPFIFO STOPRE SUPD
     TOROTOF TOWSTD UPATH WALIMOF WALIMON""".split())
 """Words that change speed, smoothing, display or the flow of blocks only."""
+
+CONTOUR_FEED = "CFC"
+"""The word that makes F the feed of a compensated contour on arcs, as delivered (MD20150)."""
+
+FEEDS = frozenset({CONTOUR_FEED, "CFTCP", "CFIN"})
+"""Words of its group: CFTCP and CFIN leave F to the centre of the tool, on outside arcs at least."""
 
 COMPRESSORS = frozenset({"COMPON", "COMPCURV", "COMPCAD", "COMPSURF"})
 """Words after which the control may leave the path, by CTOL where it is stated."""
@@ -144,6 +150,6 @@ def factor_of_feeds(percent: float) -> float:
     return percent / 100.0
 
 
-__all__ = ["COMPRESSORS", "ENVELOPES", "IDLE", "IDLE_CALLS", "IDLE_CODES", "IDLE_VALUES",
+__all__ = ["COMPRESSORS", "CONTOUR_FEED", "ENVELOPES", "FEEDS", "IDLE", "IDLE_CALLS", "IDLE_CODES", "IDLE_VALUES",
            "LENGTH_BY_PLANE", "MOVES", "NOT_FOLLOWED", "REFUSED", "SAME", "SHARP_STYLE", "SIEMENS_STYLE", "UNBOUNDED",
            "UNITS", "VALUES", "check_limit", "factor_of_feeds"]

@@ -392,6 +392,23 @@ def test_a_corner_behind_more_than_three_blocks_without_a_move_is_told(between, 
     assert any("without a move in the plane stand before this corner" in r.message for r in p.remarks) == told
 
 
+@pytest.mark.parametrize(("words", "arc", "feed"), [
+    ("", "G2 X31 Y-1 CR=1", 600.0), ("CFC", "G2 X31 Y-1 CR=1", 600.0), ("CFTCP", "G2 X31 Y-1 CR=1", 100.0),
+    ("CFIN", "G2 X31 Y-1 CR=1", 100.0), ("CFTCP\nCFC", "G2 X31 Y-1 CR=1", 600.0), ("G451", "G2 X31 Y-1 CR=1", 600.0),
+    ("", "G3 X40 Y10 CR=10", 100.0), ("", "G1 X31 Y-1", 100.0), ("F9900", "G2 X31 Y-1 CR=1", 14696.94),
+    ("F20000", "G2 X31 Y-1 CR=1", 20000.0)])
+def test_the_centre_is_faster_on_outside_arcs(words, arc, feed):
+    """Manual: with CFC the centre runs at F (R + r) / R, here 6 F. A way of radius 6 takes sqrt(1e4 mm/s2 x 6 mm)."""
+    p = read(f"G0 X0 Y20\nF100\n{words}\nG41 G1 X10 Y0\nX30\n{arc}\nG1 Y-50\nG40 X0", "siemens")
+    assert p.feed[p.kind == FEED].max() == pytest.approx(feed)
+    assert any("CFC" in note for note in p.notes) == (feed in (600.0, 14696.94))
+
+
+def test_the_centre_is_no_faster_than_the_machine():
+    p = read("G0 X0 Y20\nF1000\nG41 G1 X10 Y0\nX30\nG2 X31 Y-1 CR=1\nG1 Y-50\nG40 X0", "siemens", max_feed=2500.0)
+    assert p.feed[p.kind == FEED].max() == 2500.0
+
+
 @pytest.mark.parametrize(("condition", "holds"), [
     ("R1==0.3", True), ("R1<>0.3", False), ("R1<=0.3", True), ("0.3>=R1", True),
     ("R1==0.3000001", False), ("R1<=0.2999999", False)])
