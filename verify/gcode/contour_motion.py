@@ -36,6 +36,8 @@ from verify.program.program import NAN, StopPoint
 UNPLACED = "a rapid in Z alone, before X and Y are stated,"
 ACCELERATION = 1e4
 """mm/s², the largest to the centre of an arc that a machine is taken to make."""
+LEAN_ROOM = 10.0
+"""Times the deviation that path blending may have: how far a tool axis off its way may take the rim of the tool."""
 _UNSETTLED = "cutter radius compensation is on: end it with G40 first"
 
 
@@ -91,9 +93,16 @@ class ContourMotion(Origins):
     def _zero_name(self, name: str) -> str:
         return name if self.control is None else self.control.zero_names.get(name, name)
 
-    def _turned_tip(self, was: Sequence[float]) -> None:
-        if self.control is not None and self.machine is not None:
-            self.control.tip_turned(self.machine, was, self.s.turn)
+    def _turned_tip(self, was: Sequence[float], kind: int) -> None:
+        if self.control is None or self.machine is None:
+            return
+        self.control.tip_turned(self.machine, was, self.s.turn)
+        off = self.radii.get(self.s.tool, 0.0) * math.sin(math.radians(min(self.control.lean, 90.0)))
+        if kind == FEED and off > LEAN_ROOM * self.blend_limit:
+            self.log.remark("lean", f"the control may turn the tool axis {self.control.lean:g} deg off its way here, "
+                            f"which takes the rim of T{self.s.tool} {off:.3g} mm off (limit "
+                            f"{LEAN_ROOM * self.blend_limit:g} mm): state a smaller tolerance of the tool axis",
+                            self.s.tool)
 
     @property
     def _foreign(self) -> bool:

@@ -157,7 +157,7 @@ class Rotary:
         if not (s.tcp or self.tip_told or self.by_axes):
             self.by_axes = log.line
         if turning and s.tcp:
-            self._turned_tip(was)
+            self._turned_tip(was, kind)
         gauge = 0.0 if s.tcp else self._gauge()
         if gauge is None:
             self._no_tips()
@@ -204,8 +204,8 @@ class Rotary:
             log.move(points[k], points[k + 1], kind, feed, s.tool, 0)
         return None
 
-    def _turned_tip(self, was: Sequence[float]) -> None:
-        """A block has turned the axes from ``was``, (2,) deg, while the control keeps the tip."""
+    def _turned_tip(self, was: Sequence[float], kind: int) -> None:
+        """A block of a kind has turned the axes from ``was``, (2,) deg, while the control keeps the tip."""
 
     def _no_tips(self) -> None:
         """Refuse a move of the joints whose tip cannot be computed."""

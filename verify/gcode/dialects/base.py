@@ -75,6 +75,7 @@ class DialectReader:
     shrinking_pecks : whether I, J, K of G73 and G83 are the first peck, by how much each is shorter, and the shortest
     own_speed : whether a word has made each axis go at its own speed in a rapid
     contour_feed : whether, on outside arcs of compensated contours, F is the feed of the contour, not of the centre
+    lean    : deg, by which words let the control turn the tool axis off its way while it cuts, 0 where none states it
     dropped : word that has dropped the length offset, other than G49; '' for none
     looks_ahead : most blocks without a move in the plane between two moves of a compensated contour through which the
               control finds the second one
@@ -101,6 +102,7 @@ class DialectReader:
         self.unbounded = False
         self._free = False
         self.dropped = ""
+        self.lean = 0.0
         self.frame: Frame | None = None
         self.zero_names: dict[str, str] = {}
         self.names: Mapping[str, int] = {}

@@ -391,6 +391,7 @@ class HeidenhainReader(HeidenhainPaths):
                 raise BlockError(f"cannot read '{rest[:40]}' of cycle 32")
             tolerance = self.q.value(m[1]) if m[1] else 0.0
             self.bound(tolerance != 0.0)
+            self.lean = self.lean if tolerance else 0.0
             if tolerance:
                 return [f"G64 P{tolerance:.6f}"]
             self.notes.append("cycle 32 is off: machine parameters decide how far the control rounds corners; the "
@@ -399,7 +400,8 @@ class HeidenhainReader(HeidenhainPaths):
         m = re.fullmatch(rf"(?:HSC-MODE:[01])?\s*(?:TA\s*({VALUE}))?", rest)
         if m is None:
             raise BlockError(f"cannot read '{rest[:40]}' of cycle 32")
-        if m[1] and self.q.value(m[1]) > SMALL:
+        self.lean = self.q.value(m[1]) if m[1] else 0.0
+        if self.lean > SMALL:
             self.notes.append(f"cycle 32 allows rotary axes a deviation of {m[1]} deg: the error bound does not "
                               "include it")
         return []

@@ -39,6 +39,7 @@ from verify.gcode.dialects.siemens.siemens_words import (
     SAME,
     SHARP_STYLE,
     SIEMENS_STYLE,
+    SMOOTHS,
     UNBOUNDED,
     UNITS,
     VALUES,
@@ -243,7 +244,7 @@ class SiemensReader(SiemensCalls):
         return self._name(name[0], line)
 
     def _is_word(self, name: str) -> bool:
-        return name in IDLE or name in FEEDS or name in REFUSED or name in COMPRESSORS or name in _ORIENTS
+        return any(name in words for words in (IDLE, FEEDS, SMOOTHS, REFUSED, COMPRESSORS, _ORIENTS))
 
     def _indexed(self, name: str, reader: ValueReader, line: Line, behind: int, end: int) -> None:
         """NAME[...]= : an element of an array, a value of the control, or a limit of an axis."""
@@ -436,6 +437,9 @@ class SiemensReader(SiemensCalls):
             line.values["COMPRESS"] = 1.0
         elif word in ("CUT2D", "CUT2DF"):
             self.in_frame = word == "CUT2DF"
+        elif word in SMOOTHS:
+            name, begins = SMOOTHS[word]
+            (self.smooths.add if begins else self.smooths.discard)(name)
         elif word in FEEDS:
             self.contour_feed = word == CONTOUR_FEED
         elif word == "RTLIOF":

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from verify.gcode.dialects.base import NUMBER, BlockError
+from verify.gcode.dialects.base import BlockError
 from verify.gcode.dialects.orientation import needed
 from verify.gcode.dialects.siemens.siemens_cycles import TEXTS, DrillingCall, drilling_blocks, row_of_holes
 from verify.gcode.dialects.siemens.siemens_expressions import ValueReader, Variables
@@ -83,6 +83,7 @@ class SiemensCalls(SiemensMoves):
             self.notes.append("CYCLE832 is off: machine data decide how far the control rounds corners; the error "
                               "bound does not include it")
             self.bound(False)
+            self.cycle_lean = 0.0
             return []
         tolerance = self._number(parts[0])
         self._oriented_within(parts)
@@ -98,9 +99,9 @@ class SiemensCalls(SiemensMoves):
 
     def _oriented_within(self, parts: list[str]) -> None:
         """Keep a note for the first turning tool axis where CYCLE832 allows it more than a small deviation."""
-        stated = len(parts) > 2 and re.fullmatch("1[0-9]|_ORI_[A-Z]+", parts[1]) and re.fullmatch(NUMBER, parts[2])
-        self.loose = ""
-        if stated and float(parts[2]) <= SMALL:
+        stated = len(parts) > 2 and re.fullmatch("1[0-9]|_ORI_[A-Z]+", parts[1]) and parts[2]
+        self.loose, self.cycle_lean = "", self._number(parts[2]) if stated else 0.0
+        if stated and self.cycle_lean <= SMALL:
             return
         amount = f"of {parts[2]} deg" if stated else "that setting data decide"
         self.loose = f"CYCLE832 allows the tool axis a deviation {amount}: the error bound does not include it"

@@ -49,6 +49,8 @@ class SiemensMoves(SiemensCorners):
     tolerance : mm or inch, of the path (CTOL); rounding : of corners (ADIS)
     follows   : the name of the value that bounds the rounding in force (CTOL, ADIS), '' for none
     by_data   : whether machine data decide which of the two counts (G642 to G645; MD20480)
+    axis_tolerance : deg, of the tool axis (OTOL); cycle_lean : deg, of CYCLE832
+    smooths   : the words in force, besides G642 to G645, for which OTOL counts: ORISON, a compressor
     cycle     : the drilling cycle that MCALL repeats after each move
     end       : (3,) mm, end of the latest move in the coordinates of the control
     """
@@ -58,6 +60,8 @@ class SiemensMoves(SiemensCorners):
         self.motion: int | str | None = None
         self.tolerance: float | None = None
         self.rounding: float | None = None
+        self.axis_tolerance = self.cycle_lean = 0.0
+        self.smooths: set[str] = set()
         self.follows, self.by_data = "", False
         self.least_speed, self.top_speed = 0.0, math.inf  # 1/min, of G25 S and G26 S
         self.cycle: DrillingCall | None = None
@@ -341,6 +345,16 @@ class SiemensMoves(SiemensCorners):
         return self._restored([*([f"S{digits(speed)} M3"] if spin else []), block, *back, *([] if chuck else ["M5"])])
 
     def _path(self, line: Line) -> list[str]:
+        """Words that bound the rounding of corners, and how far the tool axis leans off."""
+        words = self._rounded(line)
+        if "OTOL" in line.values:
+            self.axis_tolerance = max(line.values["OTOL"], 0.0)
+        if "COMPRESS" in line.values:
+            self.smooths.add("COMPRESS")
+        self.lean = max(self.cycle_lean, self.axis_tolerance if self.smooths or self.by_data else 0.0)
+        return words
+
+    def _rounded(self, line: Line) -> list[str]:
         """Words that bound the rounding of corners."""
         values, again = line.values, ""
         if "CTOL" in values:

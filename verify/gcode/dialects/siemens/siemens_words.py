@@ -33,12 +33,16 @@ MOVES = {5: "an oblique plunge", 7: "an oblique plunge", 33: "thread cutting", 3
 """G words that are not followed, and what they do."""
 
 IDLE = frozenset("""
-    ACTBLOCNO BLSYNC BRISK CDOF CDOF2 CDON COMPOF CORROF CP CPRECOF CPRECON CUT2D CUT2DF
+    ACTBLOCNO BLSYNC BRISK CDOF CDOF2 CDON CORROF CP CPRECOF CPRECON CUT2D CUT2DF
     DELAYFSTOF DELAYFSTON DIAMOF DISPLOF DISPLON DRIVE DYNFINISH DYNNORM DYNPOS DYNPREC DYNROUGH
-    DYNSEMIFIN FFWOF FFWON FIFOCTRL FNORM FTOCOF GWPSOF IPTRLOCK IPTRUNLOCK NORM ORISOF ORISON OSC OSD OSOF
+    DYNSEMIFIN FFWOF FFWON FIFOCTRL FNORM FTOCOF GWPSOF IPTRLOCK IPTRUNLOCK NORM OSC OSD OSOF
     OSS OSSE OST PAROTOF RTLION SAVE SBLOF SBLON SOFT SPATH SPCOF SPCON STARTFIFO STOPFIFO STOPRE SUPD
     TOROTOF TOWSTD UPATH WALIMOF WALIMON""".split())
 """Words that change speed, smoothing, display or the flow of blocks only."""
+
+SMOOTHS: dict[str, tuple[str, bool]] = {
+    "ORISON": ("ORISON", True), "ORISOF": ("ORISON", False), "COMPOF": ("COMPRESS", False)}
+"""Words that begin or end a smoothing of the tool axis, its name and whether they begin it."""
 
 CONTOUR_FEED = "CFC"
 """The word that makes F the feed of a compensated contour on arcs, as delivered (MD20150)."""
@@ -151,5 +155,5 @@ def factor_of_feeds(percent: float) -> float:
 
 
 __all__ = ["COMPRESSORS", "CONTOUR_FEED", "ENVELOPES", "FEEDS", "IDLE", "IDLE_CALLS", "IDLE_CODES", "IDLE_VALUES",
-           "LENGTH_BY_PLANE", "MOVES", "NOT_FOLLOWED", "REFUSED", "SAME", "SHARP_STYLE", "SIEMENS_STYLE", "UNBOUNDED",
-           "UNITS", "VALUES", "check_limit", "factor_of_feeds"]
+           "LENGTH_BY_PLANE", "MOVES", "NOT_FOLLOWED", "REFUSED", "SAME", "SHARP_STYLE", "SIEMENS_STYLE", "SMOOTHS",
+           "UNBOUNDED", "UNITS", "VALUES", "check_limit", "factor_of_feeds"]

@@ -24,6 +24,15 @@ def test_the_same_moves(name):
     assert same_feeds(first, second) and first.dwell == second.dwell
 
 
+@pytest.mark.parametrize(("tolerance", "told"), [("HSC-MODE:1 TA5", 1), ("TA0.05", 0), ("HSC-MODE:1", 0)])
+def test_a_tool_axis_that_may_lean_off_while_it_cuts_is_told(tolerance, told):
+    """The rim of T1, of radius 5, goes 5 sin(TA) off, and 0.01 mm is allowed."""
+    p = read("CYCL DEF 32.0 TOLERANCE\nCYCL DEF 32.1 T0.001\nCYCL DEF 32.2 " + tolerance + "\nM126\n"
+             "L A+0 C+0 FMAX\nM128\nL X+0 Y+0 Z+9 FMAX\nL X+20 A+5", "heidenhain", "table-table-AC")
+    assert [r.message.split(" here,")[0] for r in p.remarks] == [
+        "the control may turn the tool axis 5 deg off its way"] * told
+
+
 def test_turns_over_a_full_circle():
     p = read("L X+10 Y+0 Z+0\nCC X+0 Y+0\nCP IPA-1800 IZ-5 DR-\nCP IPA+765 DR+", "heidenhain")
     assert apart(p, read("G1 X10 Z0\nG2 X10 Y0 Z-5 I-10 J0 P5\nG3 X7.0710678118655 Y7.0710678118655 I-10 J0 P3",

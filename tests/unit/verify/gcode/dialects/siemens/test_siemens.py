@@ -503,6 +503,20 @@ def test_smoothing_of_the_tool_axis_moves_nothing():
     assert not read("ORISON\nG1 X3\nORISOF", "siemens").remarks
 
 
+@pytest.mark.parametrize(("words", "degrees"), [
+    ("ORISON\nOTOL=5", 5), ("OTOL=2\nCOMPCAD", 2), ("G642 OTOL=5", 5), ("CYCLE832(0.001,_ORI_FINISH,5)", 5),
+    ("CYCLE832(0.001,11,3)", 3), ("R1=3\nCYCLE832(0.001,11,R1)", 3),
+    ("ORISON OTOL=0.05", 0), ("OTOL=5", 0), ("ORISON OTOL=5\nORISOF", 0), ("COMPCAD OTOL=5\nCOMPOF", 0),
+    ("CYCLE832(0.001,_ORI_FINISH,5)\nCYCLE832(0.001,_ORI_FINISH,0.05)", 0), ("CYCLE832(0.001,_FINISH,1)", 0)])
+def test_a_tool_axis_that_may_lean_off_while_it_cuts_is_told(words, degrees):
+    """The rim of T1, of radius 5, goes 5 sin(OTOL) off, and 0.01 mm is allowed."""
+    head = "TRAORI\nG54\nORIMKS\nORIAXES\nG0 X0 Y0 Z9 A20 C0\n" + words + "\nG1 X20 "
+    told = [r.message for r in read(head + "A25", "siemens", "table-table-AC").remarks if "off its way" in r.message]
+    assert len(told) == (degrees > 0) and all(f"axis {degrees} deg off" in m for m in told)
+    still = read(head + "Y5", "siemens", "table-table-AC").remarks
+    assert not any("off its way" in r.message for r in still), "the axes stand"
+
+
 def test_cycle800_without_its_last_argument():
     """As older controls have it, without the retract along the tool."""
     body = 'CYCLE800(1,"TC1",100000,57,0,0,0,20,30,0,0,0,0,-1{})\nG0 X10 Y20\nZ30\nG1 Z-2\nG0 G53 Z0\nCYCLE800()'
