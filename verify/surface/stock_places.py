@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,9 @@ from verify.model import Finding, FindingKind, ProofSetup
 
 LEAST_PLACE = 0.05  # mm²: a smaller place is five samples or fewer, which prove nothing
 CONNECTED = 0.5  # mm, or three distances of samples: so near samples are one place
+GAP = 6.0  # mm: smaller places this near are one if stock stands all the way between them
+GAP_STEP = 0.1  # mm
+MOST_GAPS = 2000
 SAME_WAY = 0.05  # dimensionless: ways of which the parts along the face differ by less are the same
 ROUND = 0.5  # mm, or 2.5 distances of samples: a height is the lower third so far around
 HIGHEST = 300  # samples of a place whose surroundings are looked at
@@ -44,12 +48,14 @@ class StandingStock:
         return StandingStock(self.height[rows], self.mover[rows], self.aside[rows])
 
 
-def stock_findings(samples: SurfaceSamples, stock: StandingStock, each: float, source: Source,
-                   setup: ProofSetup) -> tuple[list[Finding], BOOL]:
+def stock_findings(samples: SurfaceSamples, stock: StandingStock, each: float, source: Source, setup: ProofSetup,
+                   stands: Callable[[F64, F64], BOOL] | None = None) -> tuple[list[Finding], BOOL]:
     """A finding for each connected place of a face.
 
     samples : SurfaceSamples with stock, n of them, frame of the proof
     each    : how many samples each of them stands for
+    stands  : tells of points, (k, 3) float64, mm, and normals, (k, 3) float64, unit, in the frame of the proof whether
+              stock stands there, (k,) bool; None: places are not joined
 
     Returns the findings, and (n,) bool, whether a sample is part of one: places under ``LEAST_PLACE`` are none.
 
@@ -58,6 +64,9 @@ def stock_findings(samples: SurfaceSamples, stock: StandingStock, each: float, s
     The height of a place is the largest lower third of the heights within ``ROUND`` of a sample. So the scallop that a
     right pass leaves hardly counts: stock of height d under scallops of height c has the lower third d + c / 9. Where
     heights are measured along the face, as up a wall, each neighbour counts up to the same top.
+
+    A fin is narrower than samples are apart: they fall on it here and there. Places under ``LEAST_PLACE`` are one where
+    stock stands on the straight line between two samples.
     """
     found: list[Finding] = []
     told = np.zeros(len(samples), np.bool_)
@@ -65,6 +74,8 @@ def stock_findings(samples: SurfaceSamples, stock: StandingStock, each: float, s
         mine = np.flatnonzero(samples.face == face)
         spacing = float(np.sqrt(each * samples.area[mine].max()))
         group = _connected(samples.points[mine], max(CONNECTED, 3.0 * spacing))
+        if stands is not None:
+            group = _joined(samples.subset(mine), group, each, stands)
         for number in range(int(group.max()) + 1):
             rows = mine[group == number]
             area = each * float(samples.area[rows].sum())
@@ -81,6 +92,38 @@ def _connected(points: F64, apart: float) -> INT:
     pairs = cKDTree(cells).query_pairs(2.0, output_type="ndarray")  # cells whose middles are one apart
     graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells), len(cells)))
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)[of.reshape(-1)]
+
+
+def _joined(samples: SurfaceSamples, group: INT, each: float, stands: Callable[[F64, F64], BOOL]) -> INT:
+    """(n,) numbers of places as ``group``, small ones that stock connects being one.
+
+    samples : of one face; each, stands : as in ``stock_findings``
+    """
+    area = each * np.bincount(group, weights=samples.area)
+    rows = np.flatnonzero(area[group] < LEAST_PLACE)
+    if len(np.unique(group[rows])) < 2 or each * float(samples.area[rows].sum()) < LEAST_PLACE:
+        return group
+    points, of = samples.points[rows], group[rows]
+    pairs = cKDTree(points).query_pairs(GAP, output_type="ndarray")
+    pairs = pairs[of[pairs[:, 0]] != of[pairs[:, 1]]]
+    gap = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+    pairs = pairs[np.argsort(gap, kind="stable")]
+    _, nearest = np.unique(np.sort(of[pairs], axis=1), axis=0, return_index=True)  # the first pair of two places
+    pairs = pairs[np.sort(nearest)][:MOST_GAPS]
+    if not len(pairs):
+        return group
+    gap = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+    count = np.maximum(np.ceil(gap / GAP_STEP).astype(np.int64), 3)
+    pair = np.repeat(np.arange(len(pairs)), count)
+    share = ((np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[pair])[:, None]
+    a, b = rows[pairs[pair, 0]], rows[pairs[pair, 1]]
+    normal = (1.0 - share) * samples.normals[a] + share * samples.normals[b]
+    stood = stands((1.0 - share) * samples.points[a] + share * samples.points[b],
+                   normal / np.linalg.norm(normal, axis=1)[:, None])
+    whole = of[pairs[np.bincount(pair, weights=~stood, minlength=len(pairs)) == 0]]
+    places = len(area)
+    graph = coo_matrix((np.ones(len(whole)), (whole[:, 0], whole[:, 1])), shape=(places, places))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64)[group]
 
 
 def _lower_third(of: int, near: INT, points: F64, aside: F64, height: F64) -> float:

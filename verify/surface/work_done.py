@@ -127,7 +127,14 @@ def work_done(asked: Asked, measured: Measured, cutting: Cutting, cut: BOOL, sou
     few = s.subset(tried)
     standing, left, why = _standing(asked, measured, cutting, few, tried, tools, cutting_axes(cutting.moves, used))
     found = np.flatnonzero(left)
-    findings, told = stock_findings(few.subset(found), standing.subset(found), len(rows) / len(tried), source, setup)
+    face = _Limits.of(setup, measured, asked.facet).face
+
+    def stands(points: F64, normals: F64) -> BOOL:
+        length, _ = cutting.way_through_stock(points, normals, cutting.farthest, OFF_FACETS)
+        return np.asarray(length - setup.stock_allowance > face)
+
+    findings, told = stock_findings(few.subset(found), standing.subset(found), len(rows) / len(tried), source, setup,
+                                    stands)
     why[found] = np.where(told, "", LEFT)
     near = KeyedPoints(few.face.astype(np.int64), few.points)
     reason[rows] = why[near.nearest(s.face[rows].astype(np.int64), s.points[rows])[:, 0]]
