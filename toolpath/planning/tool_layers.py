@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
 from operator import itemgetter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +51,24 @@ LOOSE = 2.0  # of the tolerance of leaving out points: an arc through them finds
 LOOSE_SHARE = 0.25  # of the allowance, at most, that arcs of the layers leave them by
 TILTED_LAYERS = 2.0  # goes in which a tilted end takes the stairs of the layers: more take longer than a layer more
 THROUGH = 1e-3  # mm: as near as that to the underside of the blank a tool is through
+MAX_HELD = 2**28  # nodes of all layers that are laid out at a time
+_NOWHERE = np.zeros((0, 0), np.bool_)
 THIN = 2.0  # scallops: thickness on a wall that a finish leaves
+
+
+class _Layer(NamedTuple):
+    """A layer of a band.
+
+    z      : mm, tip height
+    place  : LayerArea
+    deep   : mm, depth above the layer to which its rims take walls to size; None where it has no rims
+    unseen : rims follow every wall, as in ``depth_layers.rim``
+    """
+
+    z: float
+    place: LayerArea
+    deep: float | None
+    unseen: bool
 
 
 class ToolLayers:
@@ -135,14 +153,11 @@ class ToolLayers:
         between: list[float] = []
         with RingsAhead(field, self.allowance, depth_layers.ring_spacing(field.tool)) as ahead:
             while stretch := self._stretch(lowest):
-                for z, place in stretch:
-                    if not place.floor:
-                        between.extend(depth_layers.between(self.above, z, cut.step_down))
-                        self.above = z
-                self._cut_stretch(linker, stretch, ahead, lowest, settle)
-                z, place = stretch[-1]
-                if not place.floor and self._rims_due(z, lowest):
-                    self._cut_rims(linker, z, place, sized)
+                for one in stretch:
+                    if not one.place.floor:
+                        between.extend(depth_layers.between(self.above, one.z, cut.step_down))
+                        self.above = one.z
+                self._cut_stretch(linker, stretch, ahead, sized, settle)
         if not self.left:
             field.forget()
         made = self._step(number, "roughing", linker)
@@ -153,32 +168,42 @@ class ToolLayers:
             self._walk(linker, z, LayerArea(at_or_under(field, self.tips, z)))
         return made + self._step(number + len(made), "semi_finishing", linker)
 
-    def _stretch(self, lowest: float) -> list[tuple[float, LayerArea]]:
-        """The next layers of a band down to the first with rims, taken from those left; ``lowest`` as in
-        ``down_to``."""
-        out: list[tuple[float, LayerArea]] = []
-        while self.left and self.left[0][0] >= lowest - 1e-9:
-            out.append(self.left.pop(0))
-            if not out[-1][1].floor and self._rims_due(out[-1][0], lowest):
+    def _stretch(self, lowest: float) -> list[_Layer]:
+        """The next layers of a band, with their rims, taken from those left; ``lowest`` as in ``down_to``."""
+        lat, settings = self.field.lattice, self.settings
+        out: list[_Layer] = []
+        for _ in range(max(1, MAX_HELD // (lat.nx * lat.ny))):
+            if not self.left or self.left[0][0] < lowest - 1e-9:
                 break
+            z, place = self.left.pop(0)
+            # rims are due where the flutes do not reach up to them from a deeper layer of this band
+            unseen = z <= self.swept - self.rim_depth
+            last = not any(a >= lowest - 1e-9 and not p.floor for a, p in self.left)
+            deep = None
+            if not place.floor and (not settings.finishing or unseen or last):
+                deep = self.cut.step_down + (self.rim_depth if unseen or settings.finishing else 0.0)
+                self.swept = z if unseen else self.swept
+            out.append(_Layer(z, place, deep, unseen))
         return out
 
-    def _cut_stretch(self, linker: Linker, stretch: Sequence[tuple[float, LayerArea]], ahead: RingsAhead,
-                     lowest: float, settle: Callable[[], None]) -> None:
-        """Cut layers without their rims, in each separate place all of them before the next.
+    def _cut_stretch(self, linker: Linker, stretch: Sequence[_Layer], ahead: RingsAhead, sized: SizedWalls,
+                     settle: Callable[[], None]) -> None:
+        """Cut layers, in each separate place all of them before the next.
 
-        lowest, settle : as in ``down_to``
+        sized, settle : as in ``down_to``
         """
         field, stock, settings = self.field, self.stock, self.settings
         island = 0.0 if settings.semi_finishing else ISLAND * self.cut.step_down
         # where the engaged angle is bounded, its fronts go through all places of a layer
-        places = None if self.bounded or len(stretch) < 2 else SeparatePlaces(field, stock, stretch)
+        places = None if self.bounded or len(stretch) < 2 else SeparatePlaces(field, stock,
+                                                                              [(one.z, one.place) for one in stretch])
         laid: dict[int, tuple[list[Line], LayerRings | None]] = {}
+        spared: dict[int, NDArray[np.uint8]] = {}  # packed: there are many layers
 
         def lines_of(k: int, *, shared: bool) -> tuple[list[Line], LayerRings | None]:
             """Lines along strips, and rings, of a layer; shared: several places ask for them."""
             if k not in laid:
-                z, place = stretch[k]
+                z, place = stretch[k].z, stretch[k].place
                 strips = depth_layers.strip_lines(field, z, place.area, self.tips, self.allowance,
                                                   settings.budget.chord)
                 rings = ahead.of(z)
@@ -187,11 +212,20 @@ class ToolLayers:
                     if rings is None or not np.array_equal(rings.standing, standing):
                         rings = depth_layers.layer_rings(field, z, place, standing, self.allowance,
                                                          depth_layers.ring_spacing(field.tool))
-                later = [*stretch[k + 1:k + 2], *(one for one in self.left[:1] if one[0] >= lowest - 1e-9)]
-                if later and not self.bounded:
-                    ahead.begin(*later[0], stock)
-                laid[k] = strips, rings
+                if k + 1 < len(stretch) and not self.bounded:
+                    ahead.begin(stretch[k + 1].z, stretch[k + 1].place, stock)
+                if not shared:
+                    return strips, rings
+                assert rings is not None
+                laid[k] = strips, rings._replace(standing=_NOWHERE)  # not looked at, and there are many layers
             return laid[k]
+
+        def spared_of(k: int) -> NDArray[np.bool_]:
+            """Where a layer gets no rims, (ny, nx) bool."""
+            if k not in spared:
+                spared[k] = np.packbits(self._without_rims(stretch[k], sized))
+            lat = field.lattice
+            return np.unpackbits(spared[k], count=lat.nx * lat.ny).view(np.bool_).reshape(lat.ny, lat.nx)
 
         def go_down(first: int, place: Place | None) -> None:
             mask = None if place is None else place.mask
@@ -207,29 +241,34 @@ class ToolLayers:
                 mine = depth_layers.parts_within(field.lattice, strips, mask)
                 for line in depth_layers.strips_in_stock(mine, stock, field.tool, self.allowance):
                     linker.add(turned(line, settings))
-                self._walk(linker, *stretch[k], island, rings, mask)
+                self._walk(linker, stretch[k].z, stretch[k].place, island, rings, mask)
+                if stretch[k].deep is not None:
+                    self._cut_rims(linker, stretch[k], spared_of(k), mask)
 
         go_down(0, None)
 
-    def _rims_due(self, z: float, lowest: float) -> bool:
-        """Whether the layer at z, mm, has rims: the flutes do not reach up to them from a deeper layer of this band."""
-        return (not self.settings.finishing or z <= self.swept - self.rim_depth
-                or not any(a >= lowest - 1e-9 and not p.floor for a, p in self.left))
+    def _without_rims(self, one: _Layer, sized: SizedWalls) -> NDArray[np.bool_]:
+        """Where a layer gets no rims because of faces left alone or walls that are finished, (ny, nx) bool."""
+        lat = self.field.lattice
+        alone = lat.mask(self.alone[np.abs(self.alone[:, 2] - one.z) <= 2.0 * self.cut.step_down, :2])
+        at_size = sized.along(lat, one.z + self.field.tool.corner_radius, one.z + (one.deep or 0.0))
+        return np.asarray(dilated(alone, self.alone_wide / lat.step) | at_size)
 
-    def _cut_rims(self, linker: Linker, z: float, place: LayerArea, sized: SizedWalls) -> None:
-        """Cut the rims of the layer at z, mm; sized : as in ``down_to``."""
-        field, cut, settings, lat = self.field, self.cut, self.settings, self.field.lattice
+    def _cut_rims(self, linker: Linker, one: _Layer, spared: NDArray[np.bool_],
+                  within: NDArray[np.bool_] | None) -> None:
+        """Cut the rims of a layer.
+
+        spared : (ny, nx) bool, where it gets none; within : the same, where they are wanted, None: everywhere
+        """
+        field, cut, settings, lat, z = self.field, self.cut, self.settings, self.field.lattice, one.z
+        assert one.deep is not None
         finished = lat.mask(self.walls[np.abs(self.walls[:, 2] - z) <= 2.0 * cut.step_down, :2])
-        unseen = z <= self.swept - self.rim_depth
-        self.swept = z if unseen else self.swept
-        deep = self.rim_depth + cut.step_down if unseen or settings.finishing else cut.step_down
-        at_size = sized.along(lat, z + field.tool.corner_radius, z + deep)
-        alone = lat.mask(self.alone[np.abs(self.alone[:, 2] - z) <= 2.0 * cut.step_down, :2])
-        rims = depth_layers.rim(field, self.stock, z, place.area, finished, self.allowance, settings.budget.chord,
-                                unseen, min(THIN * settings.scallop_height, 0.5 * self.allowance)
-                                if settings.finishing else 0.0, dilated(alone, self.alone_wide / lat.step) | at_size)
-        usual, linker.pace = linker.pace, self._rim_pace(deep)
-        for line in nearest_order(rims, linker.at, False):
+        area = one.place.area if within is None else one.place.area & within
+        rims = depth_layers.rim(field, self.stock, z, area, finished, self.allowance, settings.budget.chord,
+                                one.unseen, min(THIN * settings.scallop_height, 0.5 * self.allowance)
+                                if settings.finishing else 0.0, spared)
+        usual, linker.pace = linker.pace, self._rim_pace(one.deep)
+        for line in nearest_order(depth_layers.parts_within(lat, rims, within), linker.at, False):
             linker.add(turned(line, settings))
         linker.pace = usual
 

@@ -49,10 +49,11 @@ class SeparatePlaces:
     def __init__(self, field: TipField, stock: StockMap, layers: Sequence[tuple[float, LayerArea]]) -> None:
         self._field, self._highest = field, stock.highest
         self._lowest = min(z for z, _ in layers)
-        self._below: list[NDArray[np.bool_]] = []  # nodes with rings in a layer or in one under it
+        self._below: list[NDArray[np.uint8]] = []  # nodes with rings in a layer or in one under it, packed
+        below = np.zeros((field.lattice.ny, field.lattice.nx), np.bool_)
         for z, place in reversed(layers):
-            active = active_nodes(field, place, standing_above(field, stock, z))
-            self._below.append(active | self._below[-1] if self._below else active)
+            below = below | active_nodes(field, place, standing_above(field, stock, z))
+            self._below.append(np.packbits(below, axis=1))
         self._below.reverse()
 
     def of(self, first: int, place: Place | None) -> list[Place]:
@@ -63,7 +64,8 @@ class SeparatePlaces:
         Two places are one where the tool in one of them could meet the stock of the other: with a cutter that is wider
         than the way between them, or with shank and holder once it is down.
         """
-        field, lat, below = self._field, self._field.lattice, self._below[first]
+        field, lat = self._field, self._field.lattice
+        below = np.unpackbits(self._below[first], axis=1, count=lat.nx).view(np.bool_)
         window = (slice(0, lat.ny), slice(0, lat.nx)) if place is None else place.window
         found = below[window] if place is None else below[window] & place.mask[window]
         if ndimage.label(found, BESIDE)[1] < 2:  # one at most, and growing them joins more
