@@ -75,6 +75,7 @@ class SheetPieces:
     sheets : number of sheets
     joints : (k, 2) int64, index, pairs of nodes that are joined
     low    : (m,) bool, nodes that have one of the lowest places of the solid
+    spacing : mm, between places
     """
 
     points: F64
@@ -83,6 +84,7 @@ class SheetPieces:
     sheets: int
     joints: INT
     low: BOOL
+    spacing: float
 
     @cached_property
     def _thin(self) -> INT:
@@ -109,27 +111,30 @@ class SheetPieces:
         places : (n, 3) float64, mm, frame of the mesh, on the surface; what lies there is the nearest other node
         sheet  : (n,) int64, index, -1 for none
 
-        Returns (n,) bool, true for all places of a sheet that has all the lowest places.
+        Returns (n,) bool, true for all places of a sheet that has all the lowest places, and where nothing that hangs
+        on the sheet is sure to lie: it is farther away than neighbours are, or has fewer places than a place has
+        neighbours. What a sheet meets gradually, as a bar behind a large fillet, may be counted as part of the sheet.
         """
         out = np.ones(len(places), np.bool_)
         for number in np.unique(sheet[sheet >= 0]).tolist():
-            standing = self._standing(number)
+            standing, size = self._standing(number)
             if standing[np.arange(len(standing)) != number].all():
                 continue
             others = np.flatnonzero(self.node != number)
             rows = np.flatnonzero(sheet == number)
-            out[rows] = standing[self.node[others[cKDTree(self.points[others]).query(places[rows])[1]]]]
+            off, near = cKDTree(self.points[others]).query(places[rows])
+            node = self.node[others[near]]
+            out[rows] = standing[node] | (off > REACH * self.spacing) | (size[node] < NEIGHBOURS)
         return out
 
-    def _standing(self, sheet: int) -> BOOL:
-        """(m,) bool, nodes that are joined with a lowest place without one sheet."""
+    def _standing(self, sheet: int) -> tuple[BOOL, INT]:
+        """Of the m nodes, which are joined with a lowest place without one sheet, and how many places are joined."""
         low = self.low.copy()
         low[sheet] = False
-        if not low.any():
-            return np.ones(len(low), np.bool_)
         kept = self.joints[(self.joints != sheet).all(axis=1)]
         group = _components(len(low), kept[:, 0], kept[:, 1])
-        return np.isin(group, np.unique(group[low]))
+        size = np.bincount(group, np.bincount(self.node, minlength=len(low)))[group].astype(np.int64)
+        return (np.isin(group, np.unique(group[low])) if low.any() else np.ones(len(low), np.bool_)), size
 
 
 def sheet_pieces(tree: TriangleTree, thickest: float, length: float) -> SheetPieces:
@@ -161,7 +166,7 @@ def sheet_pieces(tree: TriangleTree, thickest: float, length: float) -> SheetPie
     joints = np.column_stack(np.divmod(np.unique((first * len(low) + second)[first < second]), len(low)))
     floor = float(tree.mesh.bounds[0, 2])
     low[node[points[:, 2] <= max(floor, float(points[:, 2].min())) + 1e-3]] = True
-    return SheetPieces(points, middle, node, sheets, joints, low)
+    return SheetPieces(points, middle, node, sheets, joints, low, spacing)
 
 
 def _components(count: int, a: INT, b: INT) -> INT:
