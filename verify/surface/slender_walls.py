@@ -82,6 +82,8 @@ class ThinWalls:
     free      : (n,) bool, the finished part does not support the sheet within ``limit``
     limit     : (n,) float64, mm, the ratio times the mean thickness of the sheet below the place; of a level sheet, in
                 the direction where it is thickest
+    support   : (n,) float64, mm, a way along the sheet to what holds it in the finished part, no more than ``limit``;
+                inf where ``free``
     wall      : (n,) int64, index, places of one sheet share a number
     spacing   : mm, size of the cells that hold at most one place
     """
@@ -94,6 +96,7 @@ class ThinWalls:
     thickness: F64
     free: BOOL
     limit: F64
+    support: F64
     wall: INT
     spacing: float
 
@@ -104,7 +107,7 @@ class ThinWalls:
         """The places where ``chosen`` (n,) bool is true."""
         return ThinWalls(self.row[chosen], self.points[chosen], self.normals[chosen], self.across[chosen],
                          self.beyond[chosen], self.thickness[chosen], self.free[chosen], self.limit[chosen],
-                         self.wall[chosen], self.spacing)
+                         self.support[chosen], self.wall[chosen], self.spacing)
 
 
 def thin_walls(tree: TriangleTree, samples: SurfaceSamples, ratio: float, lie: Lie = Lie.UPRIGHT,
@@ -150,12 +153,14 @@ def thin_walls(tree: TriangleTree, samples: SurfaceSamples, ratio: float, lie: L
     normals = samples.normals[row]
     ways = _Ways(tree, ratio, skin, _level_ways(normals) if lie is Lie.LEVEL else _upright_ways(normals),
                  lie, rests, HELD * float(far.max()))
-    free, limit = ways.free(points, normals, far)
-    free &= _high(tree, points, normals, limit, 1.0, lie)
+    support, limit = ways.support(points, normals, far)
+    free = np.isinf(support) & _high(tree, points, normals, limit, 1.0, lie)
+    support = np.where(free, np.inf, np.minimum(support, limit))
     if not free.any():
         return _none()
     wall = sheets_of(points - 0.5 * far[:, None] * normals, normals, np.maximum(2.5 * cell, far), far)
-    out = ThinWalls(row, points, normals, points - far[:, None] * normals, beyond, far, free, limit, wall, cell)
+    out = ThinWalls(row, points, normals, points - far[:, None] * normals, beyond, far, free, limit, support,
+                    wall, cell)
     return out.only(np.isin(wall, np.unique(wall[free])))
 
 
@@ -177,7 +182,8 @@ def _lower(points: F64, normals: F64, thickness: F64) -> F64:
 
 def _none() -> ThinWalls:
     none, rows = np.zeros((0, 3)), np.zeros(0, np.int64)
-    return ThinWalls(rows, none, none, none, none, np.zeros(0), np.zeros(0, np.bool_), np.zeros(0), rows, 0.0)
+    lengths = np.zeros(0)
+    return ThinWalls(rows, none, none, none, none, lengths, np.zeros(0, np.bool_), lengths, lengths, rows, 0.0)
 
 
 def _one_a_cell(points: F64, cell: float) -> INT:
@@ -220,31 +226,32 @@ class _Ways:
     thickest: float
     pieces: SheetPieces | None = None
 
-    def free(self, points: F64, normals: F64, thickness: F64) -> tuple[BOOL, F64]:
-        """Whether the sheet has no support within the limit of each place, and that limit, mm."""
-        held = np.zeros(len(points), np.bool_)
+    def support(self, points: F64, normals: F64, thickness: F64) -> tuple[F64, F64]:
+        """A way along the sheet to its support within the limit of each place, mm, inf for none, and that limit, mm."""
+        support = np.full(len(points), np.inf)
         if self.lie is Lie.LEVEL:
-            held = self.rests.hold(_lower(points, normals, thickness))
+            support[self.rests.hold(_lower(points, normals, thickness))] = 0.0
         limit = self.ratio * thickness
         for k, way in enumerate(self.ways):
-            left = np.flatnonzero(~held)
+            left = np.flatnonzero(np.isinf(support))
             if not len(left):
                 break
-            held[left], length, ends = self._way(points[left], normals[left], thickness[left], way[left])
+            support[left], length, ends = self._way(points[left], normals[left], thickness[left], way[left])
             if k == 0 and self.lie is Lie.UPRIGHT:
                 limit[left] = length
             elif self.lie is Lie.LEVEL:
                 limit[left] = np.maximum(limit[left], np.where(ends, 0.0, length))
-        return ~held, limit
+        return support, limit
 
-    def _way(self, points: F64, normals: F64, thickness: F64, along: F64) -> tuple[BOOL, F64, BOOL]:
-        """Follow sheets one way: whether each has support within the limit; the limit, mm; whether it ends before.
+    def _way(self, points: F64, normals: F64, thickness: F64, along: F64) -> tuple[F64, F64, BOOL]:
+        """Follow sheets one way: how far the support of each is, mm, inf where none is within the limit; the limit, mm;
+        whether it ends before.
 
         A step is ``STEP`` of the thickness, or of the mean so far where that is more. The thickness of a wedge is k
         times the way s from its edge and the mean k s / 2, so each step makes the way 1 + ``STEP`` k / 2 times longer.
         """
         n = len(points)
-        held, ends, limit = np.zeros(n, np.bool_), np.zeros(n, np.bool_), self.ratio * thickness
+        support, ends, limit = np.full(n, np.inf), np.zeros(n, np.bool_), self.ratio * thickness
         live = np.arange(n)
         middle, square, way = points - 0.5 * thickness[:, None] * normals, normals.copy(), along.copy()
         step = STEP * thickness
@@ -253,11 +260,13 @@ class _Ways:
             at = middle[live] + step[live, None] * way[live]
             wide, mid, turned, inside = _across(self.tree, at, square[live], self.skin)
             thick = inside & (wide > HELD * total[live] / looks[live])
-            held[live[thick]] = self._stand(points[live[thick]], normals[live[thick]], thickness[live[thick]],
-                                            mid[thick], turned[thick], wide[thick], limit[live[thick]])
+            met = live[thick]
+            stand = self._stand(points[met], normals[met], thickness[met], mid[thick], turned[thick], wide[thick],
+                                limit[met])
+            support[met[stand]] = gone[met[stand]] + step[met[stand]]
             if self.lie is Lie.LEVEL:
                 rests = inside & ~thick & self.rests.hold(mid - 0.5 * wide[:, None] * _upwards(turned))
-                held[live[rests]] = True
+                support[live[rests]] = gone[live[rests]] + step[live[rests]]
                 thick |= rests
             ends[live[~inside]] = True
             on = inside & ~thick
@@ -271,7 +280,7 @@ class _Ways:
             along_now = way[rows] - (way[rows] * square[rows]).sum(axis=1)[:, None] * square[rows]
             way[rows] = along_now / np.maximum(np.linalg.norm(along_now, axis=1), 1e-9)[:, None]
             live = rows[gone[rows] < limit[rows]]
-        return held, limit, ends
+        return support, limit, ends
 
     def _stand(self, points: F64, normals: F64, thickness: F64, mid: F64, across: F64, wide: F64, limit: F64) -> BOOL:
         """Whether what sheets (n,) meet at thick places (n,) stands without them."""

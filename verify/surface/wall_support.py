@@ -241,8 +241,7 @@ def _free_ways(walls: ThinWalls, times: Sequence[CutTimes], low: float) -> tuple
     for number in np.unique(walls.wall[judged]).tolist():
         own = np.flatnonzero(walls.wall == number)
         tried = own[judged[own]]
-        # a place that the finished part supports has its support within its own limit
-        held = np.where(walls.free[own], np.inf, walls.limit[own])
+        held = walls.support[own]  # by the finished part
         for rows in np.array_split(tried, -(-len(tried) // BLOCK)):
             way = cdist(middle[rows], middle[own])
             by_stock = np.where(stands[own] >= done[rows][:, None], way, np.inf).min(axis=1)
@@ -283,7 +282,8 @@ def _findings(walls: ThinWalls, lie: Lie, free: F64, over: INT, times: Sequence[
         x, y, z = (round(float(v), 6) for v in walls.points[k])
         lines = source.line[last[mine]]
         span = f", lines {int(lines.min())} to {int(lines.max())}" if lines.min() < lines.max() else ""
-        text = f"T{source.tool[m]} " + TEXTS[lie].format(walls.thickness[k], free[k], setup.free_ratio, span)
+        text = f"T{source.tool[m]} " + TEXTS[lie].format(walls.limit[k] / setup.free_ratio, free[k],
+                                                                setup.free_ratio, span)
         out.append(Finding(FindingKind.SUPPORT, source.names[source.program[m]], int(source.line[m]),
                            zone_ids[zone - 1] if zone else None, f"F{scored.samples.face[row]}", (x, y, z),
                            float(free[k]), float(walls.limit[k]), text, len(mine)))

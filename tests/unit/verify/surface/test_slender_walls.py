@@ -44,6 +44,10 @@ def test_a_wall_is_free_from_its_limit_above_the_foot_on(ratio):
     assert set(np.round(found.points[:, 0], 9)) == {LEFT, RIGHT} and len(np.unique(found.wall)) == 1
     assert np.allclose(np.abs(found.points[:, 0] - found.across[:, 0]), THICK)
     assert z.min() < FOOT + 2.0 * found.spacing  # places that are held say where stock stands
+    assert np.isinf(found.support[found.free]).all()
+    held = ~found.free
+    past = found.support[held] - (z[held] - FOOT)  # against the way down to the foot, to a step
+    assert (np.abs(past) < STEP * THICK + 1e-9).all()
 
 
 def test_a_wall_that_is_no_higher_than_its_limit_is_left_out():

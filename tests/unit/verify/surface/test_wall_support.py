@@ -17,7 +17,8 @@ from tests.thin_wall_case import FOOT, LEFT, RIGHT, TOP, wall_part
 from verify.findings import Source
 from verify.model import Finding, ProofSetup, ScoredSamples, Support
 from verify.moves import Moves
-from verify.surface.wall_support import supported
+from verify.surface.slender_walls import ThinWalls
+from verify.surface.wall_support import CutTimes, _free_ways, supported
 
 FLAT = ToolBody("T1", 1, 6.0, 0.0, 12.0, 5.8, 20.0, 6.0, 40.0)
 SLOT = ToolBody("T2", 2, 12.0, 0.0, 2.0, 3.0, 15.0, 12.0, 40.0)
@@ -158,3 +159,15 @@ def test_stock_on_the_free_end_of_a_wall_does_not_hold_it():
     assert judged(wall_part().mesh, in_turn)[1] == []
     (found,) = judged(wall_part().mesh, island)[1]
     assert found.depth == pytest.approx(TOP - 2.0 - FOOT, abs=0.4)
+
+
+def test_a_thin_edge_is_held_by_what_holds_the_wall_beside_it():
+    """The way down along the edge of a blade finds no support within its own short limit; 0.5 mm aside a strut does."""
+    none = np.zeros((2, 3))
+    points = np.array([[0.0, 0.0, 10.0], [0.5, 0.0, 10.0]])
+    walls = ThinWalls(np.arange(2), points, none, points, none, np.array([1.2, 1.2]), np.array([True, False]),
+                      np.array([6.6, 12.6]), np.array([np.inf, 3.7]), np.zeros(2, np.int64), 0.3)
+    cut = CutTimes(np.array([0, 0]), np.array([5, 5]), np.array([1, 1]))
+    free, judged = _free_ways(walls, [cut, cut], 0.0)
+    assert judged.tolist() == [True, False]
+    assert free[0] == pytest.approx(0.5 + 3.7)
