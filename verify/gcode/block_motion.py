@@ -10,6 +10,7 @@ import numpy as np
 from geometry.mesh import F64
 from verify.gcode.block_words import CYCLES, SHIFTS, TURNS, Block, BlockError, whole
 from verify.gcode.drilling_cycles import Hole, HoleExit, hole_moves
+from verify.gcode.flow.input_increment import is_fine_arc
 from verify.gcode.frame_words import FrameWords
 from verify.gcode.rotary_words import between
 from verify.program.arc_chords import (
@@ -220,6 +221,7 @@ class BlockMotion(FrameWords):
         try:
             if "R" in values:
                 centre = centre_from_radius(start, end, values["R"] * s.scale, s.motion == 2, axes)
+                self._note_fine_arc(start[list(axes[:2])], end[list(axes[:2])], values["R"] * s.scale)
             elif any(c in values for c in letters):
                 offset = np.array([values.get(c, 0.0) * s.scale for c in letters])
                 if s.centre_absolute and not all(c in values for c in letters):
@@ -253,6 +255,17 @@ class BlockMotion(FrameWords):
         for k, p in enumerate(points, 1):
             self._line_to(p, FEED, rate, between(was, turn, k / n), minutes / n)
         return None
+
+    def _note_fine_arc(self, start: F64, end: F64, radius: float) -> None:
+        """Note the line of an arc by its radius whose centre hangs on digits that the control does not count.
+
+        start, end : (2,) float64, mm, in the plane of the arc; radius : mm, negative for the longer arc
+        """
+        if self.fine_line or self.counts or self.control is None or self.control.increment is None:
+            return
+        increment = self.control.increment
+        if is_fine_arc(start, end, radius, increment.step if self.s.scale == 1.0 else increment.inch_step):
+            self.fine_line = self.log.line
 
     def _one_place(self, start: F64, end: F64, centre: F64) -> None:
         """Tell of an arc whose ends a control that counts in 0.001 mm (0.0001 inch) takes for one place.

@@ -73,8 +73,11 @@ class ContourMotion(Origins):
     chord   : mm, by which chords may leave their arcs
     max_feed : mm/min, of the machine, or None
     across  : whether the running block has a word of an axis of the plane
-    elements, idle : as in ``verify.gcode.dialects.base.Machine``
+    elements, idle, counts, fine_line : as in ``verify.gcode.dialects.base.Machine``
     """
+
+    counts = False
+    fine_line = 0
 
     def __init__(self, *arguments: object, **named: object) -> None:
         super().__init__(*arguments, **named)  # type: ignore[arg-type]

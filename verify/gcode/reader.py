@@ -30,7 +30,7 @@ from verify.gcode.block_motion import BlockMotion
 from verify.gcode.block_words import Block, BlockError, parse_block, straight, used_letters
 from verify.gcode.dialects import CONTROLS, DIALECTS, LINUXCNC, translated_blocks
 from verify.gcode.flow.control_flow import Flow, has_flow
-from verify.gcode.flow.input_increment import INCH_STEP, STEP, Way, first_drift
+from verify.gcode.flow.input_increment import Way, first_drift
 from verify.gcode.flow.second_run import KEPT_BY_LINUXCNC, KEPT_MODES, TABLES, Change, first_change, left_modes
 from verify.gcode.flow.system_parameters import served
 from verify.gcode.machine_words import functions_note
@@ -59,16 +59,12 @@ class Reader(BlockMotion):
     leaves_modes : what the next run of the program takes for granted
     full_turns   : whether ATAN and ASIN of Fanuc give 0 to 360 deg; parameter 6004#0 decides
     angle_line   : first line of an angle that would differ then, 0 for none
-    counts       : whether words count in the least input increment of the control
-    fine_line    : first line of a word that is finer, and may add up with others; 0 for none
     """
 
     dialect = LINUXCNC
     leaves_modes: tuple[Assumed, ...] = ()
     full_turns = False
     angle_line = 0
-    counts = False
-    fine_line = 0
     _noted: tuple[object, ...] = (None, None, 0.0, 0.0, 0.0)
 
     def read(self, text: str, report: Report = silent, dialect: str = LINUXCNC) -> Program:
@@ -190,19 +186,18 @@ class Reader(BlockMotion):
                             "360 where the angle is less than 0", line=self.angle_line)
 
     def _count_words(self, begin: Reader, text: str, lines: list[str], table: F64) -> None:
-        """Remark where a control that counts in its least input increment goes elsewhere."""
-        if not self.fine_line:
+        """Remark where a control that counts in its least increment goes elsewhere."""
+        increment = None if self.control is None else self.control.increment
+        if not self.fine_line or increment is None:
             return
         again = begin._copy()
         again.counts = True
-        step = STEP if self.s.scale == 1.0 else INCH_STEP
+        step = increment.step if self.s.scale == 1.0 else increment.inch_step
         first = self._way(table)
         if change := again._change(text, lines, table, lambda: first_drift(
                 first, again._way(again.log.table()), again.log.errors, step, self._reach(table))):
-            self.log.remark("increment", "this word is finer than the least input increment (IS-B: 0.001 mm, 0.0001 "
-                            "inch, 0.001 deg): a control rounds it where it takes a variable, and drops the digits of "
-                            f"a number behind it. So it has {change.what} in line {change.line}: write absolute places "
-                            "(G90), or round the variables before they add up", line=self.fine_line)
+            self.log.remark("increment", f"{increment.why}. So it has {change.what} in line {change.line}: "
+                            f"{increment.remedy}", line=self.fine_line)
 
     def _way(self, table: F64) -> Way:
         """The reading as ``first_drift`` compares it; ``table`` (m, 10) is its log."""

@@ -10,6 +10,7 @@ from geometry.errors import ProgramError
 from verify.assumptions import Assumed
 from verify.gcode.block_words import NUMBER, WORK_OFFSETS, BlockError
 from verify.gcode.cutter_compensation import FANUC_STYLE, Style
+from verify.gcode.flow.input_increment import Increment
 from verify.gcode.frames import Frame
 from verify.kinematics import Kinematics
 from verify.program.move_log import Log
@@ -27,8 +28,8 @@ class Machine(Protocol):
     radii   : mm by T number, radius of the tools of the setup
     teeth   : numbers of teeth by T number, of the tools for which the setup states it
     elements : number of moves of compensated contours so far; idle : blocks since the last one
-    counts  : whether words count in the least input increment in this reading
-    fine_line : first line of a word that is finer, and may add up with others; 0 for none
+    counts  : whether words count in the least increment of the control in this reading
+    fine_line : first line of a word that is finer, and may add up with others or move a centre; 0 for none
     """
 
     s: State
@@ -79,6 +80,7 @@ class DialectReader:
     dropped : word that has dropped the length offset, other than G49; '' for none
     looks_ahead : most blocks without a move in the plane between two moves of a compensated contour through which the
               control finds the second one
+    increment : what the control counts in, None where it keeps all digits
     """
 
     style: Style = FANUC_STYLE
@@ -93,6 +95,7 @@ class DialectReader:
     shrinking_pecks = False
     contour_feed = False
     looks_ahead: float = math.inf
+    increment: Increment | None = None
 
     def __init__(self) -> None:
         self.notes: list[str] = []

@@ -18,12 +18,14 @@ from verify.assumptions import Assumed, AssumedKind
 from verify.gcode.block_words import FURTHER, bare
 from verify.gcode.dialects.base import NUMBER, BlockError, Machine
 from verify.gcode.dialects.fanuc_planes import FanucPlanes
-from verify.gcode.flow.input_increment import counted, is_fine, without_fine_digits
+from verify.gcode.flow.input_increment import INPUT, counted, is_fine, without_fine_digits
 from verify.gcode.flow.macro_flow import MacroFlow, has_macros
 from verify.gcode.machine_words import FANUC_M
 
 _PLAIN = re.compile(r"(?:N[0-9]+ ?)?(?:G0?[01] ?)?(?:[XYZABC][+-]?(?:[0-9]*\.[0-9]*|0) ?)*(?:F[0-9]+\.[0-9]* ?)?\r?")
 _WORD = re.compile(rf"([A-Z])({NUMBER})")
+_ADDS = re.compile(r"G\s*0*9([12])(?![0-9]|\.0*[1-9])", re.IGNORECASE)
+"""G91 and G92."""
 _NAME = re.compile(r"[O:](?:[0-9]+|<[^<>]*>)?(?:<[^<>]*>)?|<[^<>]*>")
 _CORNER = re.compile(r",[RC][-+.0-9]*")
 LENGTH_BY_PLANE = Assumed(AssumedKind.LENGTH_AXIS, "Z in the planes G18 and G19 too", "where parameter 5001#1 is 1, "
@@ -90,6 +92,7 @@ class FanucReader(FanucPlanes):
     repeats = "KL"
     rigid: int | None = 29
     looks_ahead = 1.0
+    increment = INPUT
     home_from, gives_up_length = 0, True
     length_words: tuple[float, ...] = (43, 43.4, 43.5, 49)
 
@@ -132,9 +135,10 @@ class FanucReader(FanucPlanes):
         """Note a line in G91 whose digits a control drops, and a shift (G92) from a place that it does not count."""
         if self.machine.fine_line or self.machine.counts:
             return
-        adds = (self.machine.s.relative or "91" in raw) and without_fine_digits(raw, self._inch, self.vectors) != raw
-        if adds or ("92" in raw and any(is_fine(at, counted("X", at, (), False), "X", False)
-                                        for at in self.machine.here() if at == at)):
+        words = _ADDS.findall(raw) if "91" in raw or "92" in raw else ()
+        adds = (self.machine.s.relative or "1" in words) and without_fine_digits(raw, self._inch, self.vectors) != raw
+        if adds or ("2" in words and any(is_fine(at, counted("X", at, (), False), "X", False)
+                                         for at in self.machine.here() if at == at)):
             self.machine.fine_line = self.machine.log.line
 
     def _without_leader(self, lines: Sequence[str]) -> Sequence[str]:

@@ -1,9 +1,14 @@
-"""The least input increment of Fanuc and Haas, and how far a program goes elsewhere because of it.
+"""The least increment that a control counts in, and how far a program goes elsewhere because of it.
 
-A control of increment system IS-B counts coordinates in 0.001 mm or 0.0001 inch, and angles in 0.001 deg. It rounds a
-word that takes a variable to that increment, and drops the digits of a number behind it. One absolute place is wrong by
-an increment at most. Increments (G91), shifts (G92) and places that a macro reads back (#5041) add the error up. So the
-reader reads such a program once more as a control counts, and compares the ways.
+Fanuc and Haas: a control of increment system IS-B counts coordinates in 0.001 mm or 0.0001 inch, and angles in 0.001
+deg. It rounds a word that takes a variable to that increment, and drops the digits of a number behind it. One absolute
+place is wrong by an increment at most. Increments (G91), shifts (G92) and places that a macro reads back (#5041) add
+the error up. So the reader reads such a program once more as a control counts, and compares the ways.
+
+Siemens: a control rounds a programmed place to its calculation resolution. Machine data 10200 and 10210 set it, as
+delivered to 0.001 mm and 0.001 deg, in inches too. Increments (G91, IC) and places that are read back ($AA_IW) add up.
+
+An arc by its radius needs no sum. Near half a circle an error d of the radius r moves the centre by sqrt(2 r d).
 """
 
 from __future__ import annotations
@@ -25,6 +30,8 @@ STEP, INCH_STEP = 1e-3, 2.54e-3
 """mm, the least input increment in G21 and in G20."""
 TURN_STEP = math.radians(1e-3)
 """rad, the least input increment of an angle."""
+SHORT_CHORD = 1.5
+"""Radii, the chord of an arc from which on its centre hangs on its radius: 97 deg."""
 _FINE = re.compile(r"([ABCIJKQRXYZ])(\s*[+-]?\s*[0-9]*\.[0-9]{3})([0-9]*[1-9])", re.IGNORECASE)
 _G_WORD = re.compile(r"G\s*([0-9]+\.?[0-9]*)", re.IGNORECASE)
 _CHUNK = 256
@@ -32,6 +39,33 @@ MOST_SUSPECTS = 500  # lines that are compared as polylines
 _NOISE = 1e-7  # of an increment: digits that float64 adds
 
 I64 = NDArray[np.int64]
+
+
+class Increment(NamedTuple):
+    """What a control counts in, and what it does with words that are finer.
+
+    step, inch_step : mm, in a program in mm and in inches
+    why, remedy     : of a finding, in words
+    """
+
+    step: float
+    inch_step: float
+    why: str
+    remedy: str
+
+
+INPUT = Increment(
+    STEP, INCH_STEP, "this word is finer than the least input increment (IS-B: 0.001 mm, 0.0001 inch, 0.001 deg): a "
+    "control rounds it where it takes a variable, and drops the digits of a number behind it",
+    "write absolute places (G90), or round the variables before they add up; give arcs of about half a circle by I, J "
+    "and K")
+"""Fanuc and Haas."""
+RESOLUTION = Increment(
+    STEP, STEP, "this word is finer than the calculation resolution (machine data 10200 and 10210, as delivered 0.001 "
+    "mm and 0.001 deg), and a control rounds it",
+    "write absolute places (G90, AC), or round the values before they add up; give arcs of about half a circle by I, "
+    "J and K. A control whose machine data 10200 and 10210 are larger keeps more digits")
+"""Siemens."""
 
 
 class Way(NamedTuple):
@@ -61,6 +95,27 @@ def counted(letter: str, number: float, codes: Collection[float], inch: bool, ve
 def is_fine(number: float, taken: float, letter: str, inch: bool) -> bool:
     """Whether a word takes another number than it has, beyond the noise of float64."""
     return abs(number - taken) * 10 ** (4 if inch and letter not in "ABC" else 3) > _NOISE
+
+
+def is_fine_arc(start: F64, end: F64, radius: float, step: float) -> bool:
+    """Whether digits behind ``step``, mm, decide where the centre of an arc by its radius is.
+
+    start, end : (2,) float64, mm, in the plane of the arc
+    radius     : mm, negative for the longer arc
+
+    Up to ``SHORT_CHORD`` the centre moves by 1.5 errors of the radius and 1.1 of the half chord.
+
+    >>> is_fine_arc(np.zeros(2), np.array([4.0, 0.0]), 2.0004, 1e-3)
+    True
+    >>> is_fine_arc(np.zeros(2), np.array([4.0, 0.0]), 2.0, 1e-3)
+    False
+    >>> is_fine_arc(np.zeros(2), np.array([2.0, 0.0]), 2.0004, 1e-3)
+    False
+    """
+    if radius > 0.0 and math.dist(start, end) < SHORT_CHORD * radius:
+        return False
+    counts = np.array([*start, *end, radius]) / step
+    return bool((np.abs(counts - np.round(counts)) > _NOISE).any())
 
 
 def without_fine_digits(text: str, inch: bool, vectors: bool = False) -> str:
@@ -225,4 +280,5 @@ def _from_polyline(rows: F64, line: F64) -> float:
     return worst
 
 
-__all__ = ["INCH_STEP", "STEP", "Way", "counted", "first_drift", "is_fine", "without_fine_digits"]
+__all__ = ["INCH_STEP", "INPUT", "RESOLUTION", "STEP", "Increment", "Way", "counted", "first_drift", "is_fine",
+           "is_fine_arc", "without_fine_digits"]

@@ -46,6 +46,7 @@ from verify.gcode.dialects.siemens.siemens_words import (
     check_limit,
     factor_of_feeds,
 )
+from verify.gcode.flow.input_increment import RESOLUTION, counted, is_fine
 from verify.gcode.machine_words import SIEMENS_M
 
 _MARKS = re.compile(r"^\s*(?:N[0-9]+\s+)?[^;(\n]*\b(?:TRAORI|TRAFOOF|CYCLE8[0-9]{1,2}\s*\(|SUPA|G710|G700|G641|G642"
@@ -56,6 +57,7 @@ _NAME = re.compile(r"\$?[A-Z_][A-Z_0-9]*")
 _PLACED = re.compile(r"(AC|IC|DC|ACP|ACN)\s*\(")
 _DEF = re.compile(r"DEF\s+(?:(?:NCK|CHAN)\s+)?(?:SYNR\s+|SYNW\s+|SYNRW\s+)?"
                   r"(REAL|INT|BOOL|CHAR|STRING\s*\[\s*[0-9]+\s*\])\s+")
+_FINE = re.compile(r"\.[0-9]{3}0*[1-9]")
 _HARMLESS = re.compile(r"\$(?:AC_TIMER|AC_MARKER|AC_PARAM|A_OUT|A_DB[BWDR]|A_DLB|AC_SYNA)")
 """Values of the control that move nothing: timers, counters and outputs."""
 _FRAMES = frozenset({"TRANS", "ATRANS", "ROT", "AROT", "MIRROR", "AMIRROR", "SCALE", "ASCALE"})
@@ -75,6 +77,7 @@ class SiemensReader(SiemensCalls):
 
     home_from, gives_up_length = 1, True
     looks_ahead = 3.0
+    increment = RESOLUTION
     contour_feed = True  # CFC, as delivered (MD20150)
     style, refused_m = SIEMENS_STYLE, SIEMENS_M
 
@@ -102,6 +105,8 @@ class SiemensReader(SiemensCalls):
         if name in ("$AA_IW", "$P_EP", "$AA_IWP") and index in ("X", "Y", "Z"):
             place = self.here()["XYZ".index(index)]
             if place == place:
+                if is_fine(place, counted("X", place, (), False), "X", False):
+                    self.note_fine()
                 return place / self.unit
             raise BlockError(f"{name}[{index}] is unknown because the program has not stated {index}")
         if name in ("$P_SEARCH", "$P_SEARCHL", "$P_SIM", "$P_ISTEST"):
@@ -124,7 +129,7 @@ class SiemensReader(SiemensCalls):
             The line cannot be read, or could be read in two ways.
         """
         self.moved = False
-        if PLAIN.fullmatch(raw) and self._is_plain():
+        if PLAIN.fullmatch(raw) and self._is_plain() and not self._counts(raw):
             self.note_place()
             self.moved = "X" in raw or "Y" in raw or "Z" in raw
             if (at := raw.find("G")) >= 0:
@@ -146,6 +151,10 @@ class SiemensReader(SiemensCalls):
             return list(self._definition(text))
         out = self._words(text)
         return [f"/{b}" if isinstance(b, str) else b for b in out] if skipped else out
+
+    def _counts(self, raw: str) -> bool:
+        """Whether the numbers of a straight move may be others on a control that counts in its resolution."""
+        return (self.machine.counts or self.relative) and (self.unit != 1.0 or _FINE.search(raw) is not None)
 
     def _is_plain(self) -> bool:
         """Whether a straight move needs nothing but its words now."""
@@ -540,6 +549,7 @@ class SiemensReader(SiemensCalls):
         if any(54 <= n <= 57 or 505 <= n <= 599 for n in codes):
             self.lost = ""
         self.relative = self.relative if 90 not in codes and 91 not in codes else 91 in codes
+        self.count(line)
         self._check_context(line)
         special = self._special(line)
         if special is not None:

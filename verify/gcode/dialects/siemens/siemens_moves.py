@@ -12,6 +12,7 @@ from verify.gcode.dialects.siemens.siemens_corners import SiemensCorners
 from verify.gcode.dialects.siemens.siemens_cycles import DrillingCall, drilling_blocks
 from verify.gcode.dialects.siemens.siemens_words import UNBOUNDED
 from verify.gcode.dialects.stated_places import digits
+from verify.gcode.flow.input_increment import counted, is_fine
 from verify.program.arc_chords import PLANE_AXES
 
 CURVES = frozenset({"CIP", "CT"})
@@ -66,6 +67,34 @@ class SiemensMoves(SiemensCorners):
         self.least_speed, self.top_speed = 0.0, math.inf  # 1/min, of G25 S and G26 S
         self.cycle: DrillingCall | None = None
         self.end = [math.nan] * 3
+
+    def count(self, line: Line) -> None:
+        """Round the words of a block as the control counts, in a reading that does; note increments that are finer."""
+        from_place = self.relative or not {110, 112}.isdisjoint(line.codes)
+        for name, (number, kind) in line.places.items():
+            line.places[name] = self._counted(name, number, kind == "IC" or (from_place and not kind)), kind
+        for name in ("AP", "RP"):
+            if line.kinds.get(name) == "IC":
+                line.values[name] = self._counted(name, line.values[name], True)
+        if "CR" in line.values:
+            line.values["CR"] = self._counted("CR", line.values["CR"], False)
+
+    def _counted(self, name: str, number: float, adds: bool) -> float:
+        """The number that this reading takes for a word; ``adds``: whether it counts from the latest place."""
+        unit = 1.0 if name in ("A", "B", "C", "AP") else self.unit
+        short = counted("X", number * unit, (), False)
+        if not is_fine(number * unit, short, "X", False):
+            return number
+        if self.machine.counts:
+            return short / unit
+        if adds:
+            self.note_fine()
+        return number
+
+    def note_fine(self) -> None:
+        """Note the running line as one whose digits the control does not count."""
+        if not self.machine.counts:
+            self.machine.fine_line = self.machine.fine_line or self.machine.log.line
 
     def feed_of_block(self, line: Line) -> None:
         """FB, the feed of one block: it counts as F, and the F before it counts again in the next block."""
