@@ -259,6 +259,13 @@ class SiemensReader(SiemensCalls):
         """NAME[...]= : an element of an array, a value of the control, or a limit of an axis."""
         if name.startswith("$"):
             return self._system(name, reader, end)
+        if name in ("SPOS", "SPOSA"):
+            reader.at = behind
+            spindle = reader.index()
+            reader.need("=")
+            self._stood(reader)
+            line.out += ["M5"] if spindle == (1,) else []
+            return None
         if name in IDLE_VALUES:
             reader.at = end
             return check_limit(name, reader.text[behind:end], reader.value())

@@ -308,6 +308,15 @@ def test_the_spindle_behind_a_cycle_turns_or_stands_as_the_manual_has_it(lines, 
     assert any("spindle standing" in r.message for r in stood.remarks) != alone
 
 
+@pytest.mark.parametrize(("line", "stands"), [
+    ("SPOS=0", True), ("SPOS[1]=0", True), ("R1=1\nSPOSA[R1]=DC(90)", True), ("SPOS[2]=0", False)])
+def test_a_positioned_spindle_stands(line, stands):
+    """SPOS[n] is the spindle n; the first one is the master."""
+    for again in ("", "M3\n"):
+        p = read(f"F50\n{line}\n{again}G1 X9", "siemens")
+        assert any("spindle standing" in r.message for r in p.remarks) == (stands and not again)
+
+
 @pytest.mark.parametrize(("line", "back"), [
     ("CYCLE86(30,0,2,-4,,0,4)", True), ("CYCLE84(5,0,2,-10,,,4,,1.25,,400)", True), ("CYCLE86(30,0,2,-4,,0,3)", False)])
 def test_a_cycle_that_turns_the_spindle_backwards_is_told_as_m4_is(line, back):
