@@ -20,7 +20,6 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
-from scipy.sparse import csr_array
 
 from geometry.array_checks import finite_points
 from geometry.errors import GeometryError
@@ -148,25 +147,6 @@ def resample(points: ArrayLike, count: int, closed: bool = False) -> F64:
     return np.column_stack([np.interp(at, s, p[:, k]) for k in range(2)])
 
 
-def resample_weights(points: ArrayLike, count: int, closed: bool = False) -> csr_array:
-    """Shares of the points of a polyline in those of ``resample``.
-
-    points : (n, 2) float64, mm, in the plane of the curve
-    count, closed : as in ``resample``
-
-    Returns (count, n) float64, dimensionless, sparse: two shares a row, of the ends of one stretch. Raises
-    GeometryError for a polyline without length.
-    """
-    p, s = _measured(points, closed)
-    at = np.linspace(0.0, s[-1], count, endpoint=not closed)
-    first = np.clip(np.searchsorted(s, at, side="right") - 1, 0, len(s) - 2)
-    share = (at - s[first]) / np.maximum(s[first + 1] - s[first], 1e-300)
-    n = len(p) - closed
-    rows = np.tile(np.arange(count), 2)
-    return csr_array((np.concatenate([1.0 - share, share]), (rows, np.concatenate([first, first + 1]) % n)),
-                     shape=(count, n))
-
-
 def fit(points: ArrayLike, count: int = CONTROL_POINTS, order: int = ORDER, closed: bool = False,
         ends: Ends = Ends.HELD) -> SplineCurve:
     """The B-spline nearest to the points of a polyline, by least squares at parameters in proportion to arc length.
@@ -220,34 +200,29 @@ def _even(samples: int, count: int, closed: bool) -> tuple[F64, F64]:
     return design, np.asarray(np.linalg.pinv(design), dtype=np.float64)
 
 
-def even_errors(weights: csr_array, count: int, closed: bool, steps: int) -> tuple[F64, float]:
+@lru_cache(maxsize=64)
+def even_errors(samples: int, count: int, closed: bool, steps: int) -> F64:
     """Effect of noise on the points of ``fit_even``: a row for every ``u`` of ``steps`` equal steps in 0..1.
 
-    weights : (m, n) float64, dimensionless, shares of n noisy points in the m points of the fit (``resample_weights``)
-    count   : control points
-    closed  : of a periodic curve
-    steps   : equal steps from 0 to 1, both with a row
+    samples, count : points, control points
+    closed         : of a periodic curve
+    steps          : equal steps from 0 to 1, both with a row
 
     Returns
     -------
-    rows : (steps + 1, count) float64, dimensionless. For independent noise of standard deviation 1 on every coordinate
-        of the n points, the length of a row is the standard error of the curve there, along each axis. The length of a
-        weighted sum of rows is the standard error of the same sum of places
-    freedom : dimensionless, the mean of the sum of squared residuals along one axis for that noise
+    (steps + 1, count) float64, dimensionless. For independent noise of standard deviation 1 on every coordinate, the
+    length of a row is the standard error of the curve there, along each axis. The length of a weighted sum of rows is
+    the standard error of the same sum of places.
 
     Notes
     -----
-    The control points are A e for noise e, with A = D+ W, the pseudoinverse of the design D and the weights W. Their
-    covariance is A A' = R' R, so that of the curve is B A A' B' and the rows are B R'. The residuals are
-    (1 - D D+) W e, so their sum of squares has the mean |W|² - |Q' W|² in Frobenius norms, with D = Q S. Points of one
-    stretch share their noise, so R is not that of independent points.
+    The covariance of the control points is (D' D)^-1 with the design D = Q R, so that of the curve is B (R' R)^-1 B'
+    and the rows are B R^-1.
     """
-    design, inverse = _even(weights.shape[0], count, closed)
-    spread = np.asarray((weights.T @ inverse.T).T)
-    _, triangle = np.linalg.qr(spread.T)
+    design, _ = _even(samples, count, closed)
+    _, triangle = np.linalg.qr(design)
     rows = basis(np.linspace(0.0, 1.0, steps + 1), count, ORDER, closed)
-    inside = weights.T @ np.linalg.qr(design)[0]
-    return rows @ triangle.T, float((weights.data**2).sum() - (inside**2).sum())
+    return np.asarray(np.linalg.solve(triangle.T, rows.T).T)
 
 
 def _measured(points: ArrayLike, closed: bool) -> tuple[F64, F64]:

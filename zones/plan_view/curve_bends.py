@@ -24,22 +24,14 @@ from numpy.typing import ArrayLike
 
 from geometry.array_checks import finite_points
 from geometry.mesh import F64
-from geometry.surfaces.bspline import (
-    CONTROL_POINTS,
-    SplineCurve,
-    arc_length,
-    even_errors,
-    fit_even,
-    resample,
-    resample_weights,
-)
+from geometry.surfaces.bspline import CONTROL_POINTS, SplineCurve, arc_length, even_errors, fit_even, resample
 
 # Numbers of control points to try, the paper's ten first; samples of a polyline by its number of points.
 COUNTS = (CONTROL_POINTS, 14, 20, 28, 40, 56, 80)
 SAMPLES = ((400, 512), (200, 256), (100, 128), (0, 64))
 STEPS = 1200
 # A bend turns by at least this angle (rad) and has at least this height over its chord: in sizes of the curve, and in
-# standard errors. Noise alone reaches 4.2 of them on 4000 lines.
+# standard errors of independent noise. For a resampled polyline they are up to 1.4 times larger, so six are above four.
 TURN, HEIGHT, ERRORS = float(np.radians(20.0)), 0.002, 6.0
 # Distances below this share of the size of a curve count as zero in the choice of the number of control points.
 FLOOR = 2e-4
@@ -131,13 +123,12 @@ def measure_bends(points: ArrayLike, closed: bool = False) -> BendMeasures:
         Points of another shape, not finite, or without length.
     """
     p = finite_points(points, 2, "points")
-    spline, left, samples = smooth(p, closed)
-    rows, freedom = even_errors(resample_weights(p, samples, closed), len(spline.control), closed, STEPS)
-    errors = left * float(np.sqrt(0.5 * samples / freedom)) * rows
+    spline, noise, samples = smooth(p, closed)
     u = np.linspace(0.0, 1.0, STEPS + 1)
     p = spline.at(u)
     s, theta = _directions(spline, u)
     turn, size = float(theta[-1] - theta[0]), size_of(p, closed)
+    errors = noise * even_errors(samples, len(spline.control), closed, STEPS)
     if closed:
         return BendMeasures(True, _levels(_ring(s, theta, p, HEIGHT * size, errors)), 0.0, turn, spline)
     legs = _Legs(s, theta, p, HEIGHT * size, errors, 0)
@@ -162,8 +153,8 @@ def smooth(points: F64, closed: bool) -> tuple[SplineCurve, float, int]:
 
     points : (n, 2) float64, mm, in plan of the access frame
     closed : a ring
-    Returns the SplineCurve of order 5, with free ends, the root of its mean squared residual, mm, and the number of
-    fitted points. A ring that does not cross itself turns once, so a spline of a ring with another whole
+    Returns the SplineCurve of order 5, with free ends, the standard deviation of its residuals along each axis, mm, and
+    the number of fitted points. A ring that does not cross itself turns once, so a spline of a ring with another whole
     turn is taken only where every spline has one: noise at a tight end can bend a spline into a loop.
     Raises GeometryError for a polyline without length.
     """
@@ -180,7 +171,7 @@ def smooth(points: F64, closed: bool) -> tuple[SplineCurve, float, int]:
         looped = closed and abs(float(theta[-1] - theta[0]) - once) > np.pi
         cost = looped, float(2 * samples * np.log(left**2 + floor**2) + 2 * count * np.log(2 * samples))
         if best is None or cost < best[0]:
-            best = (cost, curve, left)
+            best = (cost, curve, left * float(np.sqrt(0.5 * samples / (samples - count))))
     assert best is not None
     return *best[1:], samples
 
