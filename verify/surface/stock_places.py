@@ -20,7 +20,7 @@ LEAST_PLACE = 0.05  # mm²: a smaller place is five samples or fewer, which prov
 CONNECTED = 0.5  # mm, or three distances of samples: so near samples are one place
 GAP = 6.0  # mm: smaller places this near are one if stock stands all the way between them
 GAP_STEP = 0.1  # mm
-MOST_GAPS = 2000
+MAX_GAPS = 2000
 SAME_WAY = 0.05  # dimensionless: ways of which the parts along the face differ by less are the same
 ROUND = 0.5  # mm, or 2.5 distances of samples: a height is the lower third so far around
 HIGHEST = 300  # samples of a place whose surroundings are looked at
@@ -109,7 +109,7 @@ def _joined(samples: SurfaceSamples, group: INT, each: float, stands: Callable[[
     gap = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
     pairs = pairs[np.argsort(gap, kind="stable")]
     _, nearest = np.unique(np.sort(of[pairs], axis=1), axis=0, return_index=True)  # the first pair of two places
-    pairs = pairs[np.sort(nearest)][:MOST_GAPS]
+    pairs = pairs[np.sort(nearest)][:MAX_GAPS]
     if not len(pairs):
         return group
     gap = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)

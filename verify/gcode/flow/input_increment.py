@@ -35,7 +35,7 @@ SHORT_CHORD = 1.5
 _FINE = re.compile(r"([ABCIJKQRXYZ])(\s*[+-]?\s*[0-9]*\.[0-9]{3})([0-9]*[1-9])", re.IGNORECASE)
 _G_WORD = re.compile(r"G\s*([0-9]+\.?[0-9]*)", re.IGNORECASE)
 _CHUNK = 256
-MOST_SUSPECTS = 500  # lines that are compared as polylines
+MAX_SUSPECTS = 500  # lines that are compared as polylines
 _NOISE = 1e-7  # of an increment: digits that float64 adds
 
 I64 = NDArray[np.int64]
@@ -216,7 +216,7 @@ def _suspects(ways: tuple[Way, Way], runs: tuple[I64, I64], same: int, bound: fl
         found[run[over]] = True
         if over.any():
             worst = int(run[np.argmax(np.where(over, apart, 0.0))])
-    first = np.flatnonzero(found)[:MOST_SUSPECTS].tolist()
+    first = np.flatnonzero(found)[:MAX_SUSPECTS].tolist()
     return first if worst in (-1, *first) else [*first, worst]
 
 
