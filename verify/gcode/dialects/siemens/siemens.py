@@ -54,7 +54,6 @@ _MARKS = re.compile(r"^\s*(?:N[0-9]+\s+)?[^;(\n]*\b(?:TRAORI|TRAFOOF|CYCLE8[0-9]
                     r"|A?ROT\s+(?:[XYZ]|RPL=)|PROC\s+[A-Z]|R[0-9]+=|GOTO[FB]\s)|^%_N_|^;\$PATH", re.MULTILINE)
 _LETTER = re.compile(r"([A-Z])([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?!_)")
 _NAME = re.compile(r"\$?[A-Z_][A-Z_0-9]*")
-_PLACED = re.compile(r"(AC|IC|DC|ACP|ACN)\s*\(")
 _DEF = re.compile(r"DEF\s+(?:(?:NCK|CHAN)\s+)?(?:SYNR\s+|SYNW\s+|SYNRW\s+)?"
                   r"(REAL|INT|BOOL|CHAR|STRING\s*\[\s*[0-9]+\s*\])\s+")
 _FINE = re.compile(r"\.[0-9]{3}0*[1-9]")
@@ -390,9 +389,7 @@ class SiemensReader(SiemensCalls):
             if name in ("SPOS", "SPOSA"):
                 line.out.append("M5")
             return None
-        kind = ""
-        if m := _PLACED.match(reader.text, reader.at):
-            kind, reader.at = m[1], m.end()
+        kind = reader.placed()
         number = reader.number()
         if kind:
             reader.need(")")
@@ -400,11 +397,9 @@ class SiemensReader(SiemensCalls):
 
     def _stood(self, reader: ValueReader) -> Value:
         """The angle at which the spindle is to stand, with or without DC( ), ACP( ) and the like."""
-        if (m := _PLACED.match(reader.text, reader.at)) is None:
-            return reader.value()
-        reader.at = m.end()
-        angle = reader.value()
-        reader.need(")")
+        placed, angle = reader.placed(), reader.value()
+        if placed:
+            reader.need(")")
         return angle
 
     def _tool(self, value: Value, line: Line) -> None:

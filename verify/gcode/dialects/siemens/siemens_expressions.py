@@ -29,6 +29,7 @@ _LEVELS = {"*": 10, "/": 10, "DIV": 10, "MOD": 10, "+": 9, "-": 9, "B_AND": 8, "
            "XOR": 4,
            "OR": 3, "<<": 2, "==": 1, "<>": 1, "<": 1, ">": 1, "<=": 1, ">=": 1}
 _R = re.compile(r"R([0-9]+)")
+_PLACED = re.compile(r"(AC|IC|DC|ACP|ACN)\s*\(")
 
 
 @dataclass
@@ -191,6 +192,13 @@ class ValueReader:
             found.append(_whole(self.number()))
         self.need("]")
         return tuple(found)
+
+    def placed(self) -> str:
+        """AC, IC, DC, ACP or ACN with its opening bracket, without which it is returned; '' where none follows."""
+        if (m := _PLACED.match(self.text, self.at)) is None:
+            return ""
+        self.at = m.end()
+        return m[1]
 
     def _single(self) -> Value:
         self._depth += 1
