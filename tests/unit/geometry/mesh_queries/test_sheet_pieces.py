@@ -89,3 +89,15 @@ def test_places_share_a_sheet_by_nearness_direction_and_thickness():
     assert count() == 1 and count(gap=0.5) == 2
     assert count(thickness=np.where(x < 10.0, 1.0, 2.1)) == 2 and count(thickness=1.0 + 0.05 * x) == 1
     assert count(normals=np.where(x[:, None] < 10.0, up, [0.0, 1.0, 0.0])) == 2
+
+
+@pytest.mark.parametrize(("places", "off", "stands"), [(20, 0.5, False), (5, 0.5, True), (20, 3.0, True)])
+def test_only_what_is_near_and_more_than_a_fragment_is_sure_to_hang(places, off, stands):
+    """A sheet on a base, and a head that only the sheet joins with it: of few places, or far from where it is met."""
+    count = [30, 40, places]
+    node = np.repeat(np.arange(3), count)
+    points = np.zeros((len(node), 3))
+    points[node == 1, 2] = -10.0
+    points[node == 2, 2] = 10.0
+    known = SheetPieces(points, points, node, 1, np.array([[0, 1], [0, 2]]), np.array([False, True, False]), 1.0)
+    assert known.stand_without(np.array([[0.0, 0.0, 10.0 + off]]), np.zeros(1, np.int64)).tolist() == [stands]
