@@ -11,10 +11,15 @@ Heights are measured from the tip upwards along the axis::
                |  c  |             0 .. flute_length             (cutting part)
                 \\___/             ball: corner_radius = diameter/2, flat: 0, bull: between
                  \\ /              cone: tip_diameter wide at the tip, diameter wide at cone_height
+
+The side of a tapered mill leans outwards by ``taper``, the tangent of its angle to the axis. It touches the corner at
+height r (1 - sin), where the cutting part is R - r (1 - cos) wide in radius, and ends with the flutes. ``diameter`` is
+that of its end: of the ball, or of the flat with the corner radius on both sides.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
@@ -33,7 +38,7 @@ class ToolBody:
 
     id            : as in the setup, for example 'T1'
     number        : T and H word of the program
-    diameter      : of the cutting part
+    diameter      : of the cutting part; of a tapered mill that of its end
     corner_radius : diameter/2 for a ball, 0 for a flat, between for a bull nose
     flute_length  : tip to the end of the cutting part
     neck_diameter, neck_length : the relieved part; neck_length is tip to shank
@@ -42,6 +47,7 @@ class ToolBody:
     named         : 'drill', 'tap', 'chamfer' or 'thread_mill'; '' for a mill, whose kind the corner radius tells
     tip_diameter  : of the flat at the tip of a cone, 0 for a point
     cone_height   : height of the cone over the tip, 0 for an end without a cone
+    taper         : tangent of the angle between the side and the axis, 0 for an upright side
     """
 
     id: str
@@ -57,20 +63,38 @@ class ToolBody:
     named: str = ""
     tip_diameter: float = 0.0
     cone_height: float = 0.0
+    taper: float = 0.0
 
     @property
     def radius(self) -> float:
-        """Radius of the cutting part, mm."""
+        """Radius of the cutting part, mm; of a tapered mill that of its end."""
         return 0.5 * self.diameter
 
     @property
-    def kind(self) -> str:
-        """Its name where it has one, else 'ball', 'flat' or 'bull' by the corner radius."""
+    def end(self) -> str:
+        """Its name where it has one, else the shape of its end by the corner radius: 'ball', 'flat' or 'bull'."""
         if self.named:
             return self.named
         if self.corner_radius <= 0.0:
             return "flat"
         return "ball" if self.corner_radius >= self.radius - 1e-12 else "bull"
+
+    @property
+    def kind(self) -> str:
+        """As ``end``, with 'tapered_' before it where the side leans."""
+        return f"tapered_{self.end}" if self.taper > 0.0 else self.end
+
+    @property
+    def corner_end(self) -> tuple[float, float]:
+        """Where the corner ends and the side begins: distance from the axis and height over the tip, mm."""
+        long = math.hypot(1.0, self.taper)
+        return self.radius - self.corner_radius * (1.0 - 1.0 / long), self.corner_radius * (1.0 - self.taper / long)
+
+    @property
+    def widest_radius(self) -> float:
+        """Largest radius of the cutting part, mm: of a tapered mill at the end of its flutes."""
+        wide, high = self.corner_end
+        return wide + self.taper * max(self.flute_length - high, 0.0)
 
     @property
     def corner_width(self) -> float:
@@ -89,5 +113,5 @@ class ToolBody:
 
     def neck_clearance(self, wanted: float) -> float:
         """Radial clearance at the neck, mm: ``wanted``, or half the relief where that is less."""
-        relief = 0.5 * (self.diameter - self.neck_diameter)
+        relief = self.widest_radius - 0.5 * self.neck_diameter
         return wanted if relief >= wanted else 0.5 * max(relief, 0.0)

@@ -10,14 +10,18 @@ from pydantic import Field, PrivateAttr, field_serializer, model_validator
 
 from schemas.base import Count, Number, WireModel
 
-ToolKind = Literal["ball", "flat", "bull", "tapered_ball", "barrel", "drill", "tap", "chamfer", "thread_mill"]
-BUILT_KINDS = ("ball", "flat", "bull")
+ToolKind = Literal["ball", "flat", "bull", "tapered_ball", "tapered_bull", "tapered_flat", "barrel", "drill", "tap",
+                   "chamfer", "thread_mill"]
+TAPERED_KINDS = ("tapered_ball", "tapered_bull", "tapered_flat")
+BUILT_KINDS = ("ball", "flat", "bull", *TAPERED_KINDS)
 VERIFIED_KINDS = ("drill", "tap", "chamfer", "thread_mill")
 """Kinds that programs to be verified use, and that jobs do not plan."""
 THREADING_KINDS = ("tap", "thread_mill")
 POINT_ANGLES = {"drill": 118.0, "chamfer": 90.0}
 """Default of ``point_angle_deg``, deg."""
 LENGTH_EPSILON = 1e-9
+MAX_TAPER = 45.0
+"""Largest ``taper_angle_deg``, deg; a wider cone is a chamfer mill."""
 CORE_SHARE = 0.3
 """Default of ``core_diameter_mm`` as a share of the diameter."""
 
@@ -52,11 +56,13 @@ class Tool(WireModel):
     number: Annotated[Count | None, Field(
         ge=1, le=99999, description="Tool number in programs, in T and H words. Default: the digits of the id if they "
                                     "are unique, otherwise the position in the list.")] = None
-    kind: Annotated[ToolKind, Field(description="Shape of the cutting end. Kinds drill, tap, chamfer and thread_mill "
-                                                "are for programs to be verified; jobs do not plan them. tapered_ball "
-                                                "and barrel are not available yet.")]
+    kind: Annotated[ToolKind, Field(description="Shape of the cutting part. Kinds drill, tap, chamfer and thread_mill "
+                                                "are for programs to be verified; jobs do not plan them. barrel is "
+                                                "not available yet.")]
     diameter_mm: Annotated[Length, Field(ge=0.01, description="Diameter of the cutting part, mm, from 0.01. Of a tap "
-                                                              "or thread mill the outer diameter of its teeth.")]
+                                                              "or thread mill the outer diameter of its teeth. Of a "
+                                                              "tapered mill the diameter of the end: of its ball, or "
+                                                              "of the flat with the corner radius on both sides.")]
     point_angle_deg: Annotated[Number | None, Field(
         ge=10, le=180, description="Whole angle of the cone at the end, deg. Default: 118 for a drill, 90 for a "
                                    "chamfer mill. null for a tap means no lead. null for all other kinds.")] = None
@@ -71,7 +77,9 @@ class Tool(WireModel):
         ge=0, description="Corner radius, mm. Above 0 for a bull nose, 0 for a flat end mill. For a ball, 0 means half "
                           "the diameter.")] = 0.0
     taper_angle_deg: Annotated[Number, Field(
-        ge=0, lt=90, description="Taper angle, deg. Must be 0, since tapered tools are not available yet.")] = 0.0
+        ge=0, lt=90, description="Angle between the side of a tapered mill and its axis, deg: half the whole angle of "
+                                 "the cone, at most 45. The cone touches ball or corner without an edge and ends with "
+                                 "the flutes. 0 for all other kinds.")] = 0.0
     profile_radius_mm: Annotated[Number | None, Field(
         gt=0, description="Radius of a barrel, mm. Must be null, since barrel tools are not available yet.")] = None
     flutes: Annotated[Count, Field(ge=1, le=50, description="Number of teeth.")] = 2
@@ -89,11 +97,12 @@ class Tool(WireModel):
                                  "null: 3; in a verified program 10 for a tool that cuts to its centre, in a material "
                                  "whose specific_cutting_force_n_mm2 is at most 900.")] = None
     neck_diameter_mm: Annotated[Length | None, Field(
-        description="Diameter of the relieved part, mm. Default: diameter_mm.")] = None
+        description="Diameter of the relieved part, mm. Default: diameter_mm, of a tapered mill its widest "
+                    "diameter.")] = None
     neck_length_mm: Annotated[Length | None, Field(
         description="Tip to shank, mm. Default: flute_length_mm, which means no neck.")] = None
-    shank_diameter_mm: Annotated[Length | None, Field(description="Diameter of the shank, "
-                                                                  "mm. Default: diameter_mm.")] = None
+    shank_diameter_mm: Annotated[Length | None, Field(
+        description="Diameter of the shank, mm. Default: diameter_mm, of a tapered mill its widest diameter.")] = None
     stickout_mm: Annotated[Length | None, Field(
         description="Tip to holder nose, mm. Required with a holder. Default without one: the greater of "
                     "neck_length_mm and 10 x diameter_mm.")] = None
@@ -143,23 +152,36 @@ class Tool(WireModel):
         self._check_cone()
         if self.pitch_mm is not None and self.kind not in THREADING_KINDS:
             raise ValueError(f"tool {self.id}: pitch_mm belongs to kinds tap and thread_mill")
-        if self.taper_angle_deg != 0 or self.profile_radius_mm is not None:
-            raise ValueError(f"tool {self.id}: taper_angle_deg and profile_radius_mm belong to tapered and barrel "
-                             "tools, which are not available yet; leave them at 0 and null")
+        if self.profile_radius_mm is not None:
+            raise ValueError(f"tool {self.id}: profile_radius_mm belongs to barrel tools, which are not available yet; "
+                             "leave it at null")
+        self._check_taper()
         if self.corner_radius_mm > radius + LENGTH_EPSILON:
             raise ValueError(f"tool {self.id}: corner_radius_mm {self.corner_radius_mm:g} is larger than half the "
                              f"diameter, {radius:g}")
         if self.kind in VERIFIED_KINDS and self.corner_radius_mm != 0:
             raise ValueError(f"tool {self.id}: a tool of kind {self.kind} has corner_radius_mm 0")
-        if self.kind == "flat" and self.corner_radius_mm != 0:
-            raise ValueError(f"tool {self.id}: a flat end mill has corner_radius_mm 0; use kind bull")
-        if self.kind == "bull" and self.corner_radius_mm == 0:
-            raise ValueError(f"tool {self.id}: a bull nose needs a corner_radius_mm above 0; use kind flat")
-        if self.kind == "ball":
+        tapered, end = self.kind.rpartition("_")[::2]
+        other = f"{tapered}_" if tapered else ""
+        if end == "flat" and self.corner_radius_mm != 0:
+            raise ValueError(f"tool {self.id}: a flat end mill has corner_radius_mm 0; use kind {other}bull")
+        if end == "bull" and self.corner_radius_mm == 0:
+            raise ValueError(f"tool {self.id}: a bull nose needs a corner_radius_mm above 0; use kind {other}flat")
+        if end == "ball":
             if self.corner_radius_mm not in (0, radius) and abs(self.corner_radius_mm - radius) > LENGTH_EPSILON:
                 raise ValueError(f"tool {self.id}: the corner_radius_mm of a ball is half its diameter, {radius:g}, "
-                                 f"not {self.corner_radius_mm:g}; call it bull")
+                                 f"not {self.corner_radius_mm:g}; call it {other}bull")
             self.corner_radius_mm = radius
+
+    def _check_taper(self) -> None:
+        if self.kind in TAPERED_KINDS:
+            if not 0 < self.taper_angle_deg <= MAX_TAPER:
+                raise ValueError(f"tool {self.id}: taper_angle_deg {self.taper_angle_deg:g} of a tapered mill must be "
+                                 f"above 0 and at most {MAX_TAPER:g}; it is the angle between side and axis. Use kind "
+                                 f"{self.kind.removeprefix('tapered_')} for 0, kind chamfer for more")
+        elif self.taper_angle_deg != 0:
+            raise ValueError(f"tool {self.id}: taper_angle_deg belongs to kinds {', '.join(TAPERED_KINDS)}, and is 0 "
+                             f"for kind {self.kind}")
 
     def _check_cone(self) -> None:
         if self.point_angle_deg is None:
@@ -191,6 +213,18 @@ class Tool(WireModel):
         wide = 0.5 * (self.diameter_mm - (self.tip_diameter_mm or 0.0))
         return wide / math.tan(math.radians(0.5 * self.point_angle_deg))
 
+    @property
+    def corner_height(self) -> float:
+        """Height over the tip at which a round corner ends and the side begins, mm; 0 without one."""
+        return self.corner_radius_mm * (1.0 - math.sin(math.radians(self.taper_angle_deg)))
+
+    @property
+    def widest_mm(self) -> float:
+        """Largest diameter of the cutting part, mm: of a tapered mill at the end of the flutes."""
+        half = math.radians(self.taper_angle_deg)
+        side = max(_given(self.flute_length_mm) - self.corner_height, 0.0) * math.tan(half)
+        return self.diameter_mm + 2.0 * (side - self.corner_radius_mm * (1.0 - math.cos(half)))
+
     def _derive(self) -> None:
         self._flutes_given = self.flute_length_mm is not None
         if self.flute_length_mm is None:
@@ -198,13 +232,13 @@ class Tool(WireModel):
             usual = self.cone_height if self.kind == "chamfer" else max(3 * self.diameter_mm, self.cone_height)
             self.flute_length_mm = min([usual, *bounds])
         if self.neck_length_mm is None:
-            if self.neck_diameter_mm is not None and self.neck_diameter_mm < self.diameter_mm:
+            if self.neck_diameter_mm is not None and self.neck_diameter_mm < self.widest_mm:
                 raise ValueError(f"tool {self.id}: neck_diameter_mm is given without neck_length_mm (tip to shank)")
             self.neck_length_mm = self.flute_length_mm
         if self.neck_diameter_mm is None:
-            self.neck_diameter_mm = self.diameter_mm
+            self.neck_diameter_mm = self.widest_mm
         if self.shank_diameter_mm is None:
-            self.shank_diameter_mm = self.diameter_mm
+            self.shank_diameter_mm = self.widest_mm
         if self.stickout_mm is None:
             if self.holder:
                 raise ValueError(f"tool {self.id}: a tool with a holder needs stickout_mm (tip to holder nose)")
@@ -247,9 +281,10 @@ class Tool(WireModel):
             if a > b + LENGTH_EPSILON:
                 raise ValueError(f"tool {self.id}: {low} {a:g} is longer than {high} {b:g}; from the tip upwards it "
                                  "must hold that flute_length_mm <= neck_length_mm <= stickout_mm <= gauge_length_mm")
-        if _given(self.neck_diameter_mm) > self.diameter_mm + LENGTH_EPSILON:
-            raise ValueError(f"tool {self.id}: neck_diameter_mm {self.neck_diameter_mm:g} is larger than diameter_mm "
-                             f"{self.diameter_mm:g}; a neck is relieved")
+        if _given(self.neck_diameter_mm) > self.widest_mm + LENGTH_EPSILON:
+            widest = "diameter_mm" if self.taper_angle_deg == 0 else "the end of the cone,"
+            raise ValueError(f"tool {self.id}: neck_diameter_mm {self.neck_diameter_mm:g} is larger than {widest} "
+                             f"{self.widest_mm:g}; a neck is relieved")
         if self.core_diameter_mm is not None and self.kind == "tap":
             if self.core_diameter_mm > self.diameter_mm:
                 raise ValueError(f"tool {self.id}: core_diameter_mm {self.core_diameter_mm:g} of a tap is at most its "
@@ -257,9 +292,12 @@ class Tool(WireModel):
         elif self.core_diameter_mm is not None and (self.center_cutting or self.core_diameter_mm >= self.diameter_mm):
             raise ValueError(f"tool {self.id}: core_diameter_mm belongs to a tap, or to a tool with center_cutting "
                              f"false, and is less than diameter_mm {self.diameter_mm:g}")
-        if _given(self.flute_length_mm) < self.corner_radius_mm - LENGTH_EPSILON:
+        if _given(self.flute_length_mm) < self.corner_height - LENGTH_EPSILON:
             raise ValueError(f"tool {self.id}: flute_length_mm {self.flute_length_mm:g} is shorter than the corner "
-                             f"radius {self.corner_radius_mm:g}, so the rounded end would not cut")
+                             f"radius {self.corner_height:g}, so the rounded end would not cut" if
+                             self.taper_angle_deg == 0 else
+                             f"tool {self.id}: flute_length_mm {self.flute_length_mm:g} ends below the cone, which "
+                             f"begins {self.corner_height:g} above the tip")
         if _given(self.flute_length_mm) < self.cone_height - LENGTH_EPSILON:
             raise ValueError(f"tool {self.id}: flute_length_mm {self.flute_length_mm:g} is shorter than the cone at "
                              f"its end, {self.cone_height:g} high; flute_length_mm counts from the tip of the cone")
@@ -302,5 +340,5 @@ def numbered(tools: list[Tool]) -> list[Tool]:
     return [t.model_copy(update={"number": numbers[t.id]}) for t in tools]
 
 
-__all__: list[Any] = ["BUILT_KINDS", "VERIFIED_KINDS", "HolderSegment", "Tool", "ToolKind", "default_numbers",
+__all__: list[Any] = ["BUILT_KINDS", "TAPERED_KINDS", "VERIFIED_KINDS", "HolderSegment", "Tool", "ToolKind", "default_numbers",
                       "numbered"]

@@ -324,7 +324,8 @@ def tool_body(tool: Tool) -> ToolBody:
     named = tool.kind in VERIFIED_KINDS
     return ToolBody(tool.id, int(number or 0), tool.diameter_mm, tool.corner_radius_mm, float(flute or 0),
                     float(neck_d or 0), float(neck_l or 0), float(shank or 0), float(stickout or 0), segments,
-                    tool.kind if named else "", tool.tip_diameter_mm or 0.0, tool.cone_height if named else 0.0)
+                    tool.kind if named else "", tool.tip_diameter_mm or 0.0, tool.cone_height if named else 0.0,
+                    math.tan(math.radians(tool.taper_angle_deg)))
 
 
 def tool_bodies(setup: Setup) -> tuple[ToolBody, ...]:

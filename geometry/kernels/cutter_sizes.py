@@ -13,9 +13,13 @@ class CutterSizes(NamedTuple):
              flat end
     length : float, mm, flute length; the cutting part ends so high above the tip
     cone   : float, mm, height of a straight corner, so that the end is a cone; 0 for a round one, as high as wide
+    round  : float, mm, radius of the arc between the flat end and a straight corner, tangent to both; 0 for an edge
+    taper  : float, tangent of the angle between the axis and a straight corner that such an arc begins; else 0
     """
 
     radius: float
     corner: float
     length: float
     cone: float = 0.0
+    round: float = 0.0
+    taper: float = 0.0
