@@ -14,6 +14,7 @@ lies below h.
 
 Over places close together the triangles that can hold the cutter up are found once, the list ``near``:
     floor    a height that the tip is nowhere below over these places
+    shape    ``Bull``, or any other shape of ``geometry.kernels.revolved`` that can be ``widened``
     slot     a triangle, by its place in the leaf order; -1: none
     lift     tip height that one triangle requires
 The lift of a triangle is concave over places of the axis: h is convex, and the lift is a maximum over the points of the
@@ -39,9 +40,11 @@ from geometry.kernels.revolved import (
     for_shape,
     lift_of,
     node_bound,
+    radius_of,
     triangle_at,
     triangle_tip,
     walk,
+    widened,
 )
 
 BLOCK_TOLERANCE = 1e-9  # mm: a lift below this does not block
@@ -73,7 +76,7 @@ def bull_of(radius, corner_radius):
 
 
 @njit(**KERNEL, inline="always")
-def _profile(rho: float, r: float, d: float) -> float:
+def profile(rho: float, r: float, d: float) -> float:
     """h(rho) for rho <= R."""
     t = rho - d
     if t <= 0.0:
@@ -84,7 +87,7 @@ def _profile(rho: float, r: float, d: float) -> float:
 
 
 @njit(**KERNEL)
-def _bull_edge(lo, hi, q, m, R, r, d):
+def bull_edge(lo, hi, q, m, r, d):
     """Place u in [lo, hi] where m u - h(sqrt(q^2 + u^2)) is largest, with the profile's height there.
 
     m >= 0 is the slope of the edge, q its distance from the axis. The condition h' u / rho = m is solved in
@@ -92,13 +95,13 @@ def _bull_edge(lo, hi, q, m, R, r, d):
     """
     start = max(lo, 0.0)
     if hi <= start:
-        return hi, _profile(math.sqrt(q * q + hi * hi), r, d)
+        return hi, profile(math.sqrt(q * q + hi * hi), r, d)
     rho = math.sqrt(q * q + start * start)
     low = 0.0
     if rho > d:
         low = math.asin(min((rho - d) / r, 1.0))
         if math.sin(low) * start >= m * math.cos(low) * rho:
-            return start, _profile(rho, r, d)
+            return start, profile(rho, r, d)
     elif m == 0.0:
         return start, 0.0
     rho = math.sqrt(q * q + hi * hi)
@@ -106,13 +109,13 @@ def _bull_edge(lo, hi, q, m, R, r, d):
         return hi, 0.0
     high = math.asin(min((rho - d) / r, 1.0))
     if math.sin(high) * hi <= m * math.cos(high) * rho:
-        return hi, _profile(rho, r, d)
+        return hi, profile(rho, r, d)
     theta = arc_angle(low, high, q, m, d, r)
     s = math.sin(theta)
     rho = d + r * s
     u = min(max(math.sqrt(max((rho - q) * (rho + q), 0.0)), start), hi)
     if s < 0.7:
-        return u, _profile(math.sqrt(q * q + u * u), r, d)
+        return u, profile(math.sqrt(q * q + u * u), r, d)
     return u, r - r * math.cos(theta)
 
 
@@ -123,12 +126,17 @@ def _radius(shape):
 
 @for_shape(revolved.height_at, Bull)
 def _height(shape, rho):
-    return _profile(rho, shape.corner, shape.flat)
+    return profile(rho, shape.corner, shape.flat)
 
 
 @for_shape(revolved.touches_widely, Bull)
 def _widely(shape):
     return False
+
+
+@for_shape(revolved.widened, Bull)
+def _widened(shape, off):
+    return Bull(shape.radius + off, shape.corner, shape.flat + off)
 
 
 @for_shape(revolved.facet_contact, Bull)
@@ -183,8 +191,8 @@ def _edge_place(shape, lo, hi, q, half, length, l2, ez):
             return hi, r - math.sqrt(max((half - hi) * (half + hi), 0.0))
         return u, r - half * (length / slant)
     if ez >= 0.0:
-        return _bull_edge(lo, hi, q, ez / length, shape.radius, r, d)
-    u, h = _bull_edge(-hi, -lo, q, -ez / length, shape.radius, r, d)
+        return bull_edge(lo, hi, q, ez / length, r, d)
+    u, h = bull_edge(-hi, -lo, q, -ez / length, r, d)
     return -u, h
 
 
@@ -236,21 +244,21 @@ def _tip_over(shape, tree, x, y):
 
 
 @njit(**KERNEL)
-def drop_tip(tree: TreeArrays, x, y, radius, corner_radius):
+def drop_tip(tree: TreeArrays, shape, x, y):
     """Lowest tip height over (x, y) at which the body does not enter the mesh, mm; -inf where nothing is below."""
-    return walk(tree, bull_of(radius, corner_radius), x, y, NOTHING, False)[0]
+    return walk(tree, shape, x, y, NOTHING, False)[0]
 
 
 @njit(**KERNEL)
-def drop_tip_below(tree: TreeArrays, x, y, radius, corner_radius, z_start):
+def drop_tip_below(tree: TreeArrays, shape, x, y, z_start):
     """The larger of z_start and ``drop_tip``: cheap where z_start is close to the answer."""
-    return walk(tree, bull_of(radius, corner_radius), x, y, z_start, False)[0]
+    return walk(tree, shape, x, y, z_start, False)[0]
 
 
 @njit(**KERNEL)
-def is_blocked(tree: TreeArrays, x, y, z, radius, corner_radius):
+def is_blocked(tree: TreeArrays, shape, x, y, z):
     """Whether some triangle would lift the tip from z by more than 1e-9 mm."""
-    return walk(tree, bull_of(radius, corner_radius), x, y, z + BLOCK_TOLERANCE, True)[1] >= 0
+    return walk(tree, shape, x, y, z + BLOCK_TOLERANCE, True)[1] >= 0
 
 
 @njit(**KERNEL)
@@ -262,74 +270,74 @@ def lift_at(shape, corners, facets, slot, x, y):
 
 
 @njit(**KERNEL)
-def blocked_by(tree: TreeArrays, x, y, z, radius, corner_radius, guess):
+def blocked_by(tree: TreeArrays, shape, x, y, z, guess):
     """A triangle, by its place in leaf order, that makes ``is_blocked`` true; -1 where none does.
 
     guess : a triangle to ask first, -1 for none
     """
-    shape, start = bull_of(radius, corner_radius), z + BLOCK_TOLERANCE
+    start = z + BLOCK_TOLERANCE
     if guess >= 0 and lift_at(shape, tree.corners, tree.facets, guess, x, y) > start:
         return guess
     return walk(tree, shape, x, y, start, True)[1]
 
 
 @njit(**KERNEL)
-def drop_tip_contact(tree: TreeArrays, x, y, radius, corner_radius):
+def drop_tip_contact(tree: TreeArrays, shape, x, y):
     """``drop_tip`` with the triangle of the mesh (-1: none) and the contact point (NaN: none)."""
-    tip, slot, cx, cy, cz = walk(tree, bull_of(radius, corner_radius), x, y, NOTHING, False)
+    tip, slot, cx, cy, cz = walk(tree, shape, x, y, NOTHING, False)
     return tip, (tree.order[slot] if slot >= 0 else -1), cx, cy, cz
 
 
 @njit(**KERNEL)
-def drop_range(tree, xy, radius, corner_radius, lo, hi, out):
+def drop_range(tree, xy, shape, lo, hi, out):
     """``drop_tip`` for the points lo .. hi - 1 of xy (n, 2)."""
     for i in range(lo, hi):
-        out[i] = drop_tip(tree, xy[i, 0], xy[i, 1], radius, corner_radius)
+        out[i] = drop_tip(tree, shape, xy[i, 0], xy[i, 1])
 
 
 @njit(**KERNEL)
-def blocked_range(tree, tips, radius, corner_radius, lo, hi, out):
+def blocked_range(tree, tips, shape, lo, hi, out):
     """``is_blocked`` for the tips lo .. hi - 1 of tips (n, 3)."""
     for i in range(lo, hi):
-        out[i] = is_blocked(tree, tips[i, 0], tips[i, 1], tips[i, 2], radius, corner_radius)
+        out[i] = is_blocked(tree, shape, tips[i, 0], tips[i, 1], tips[i, 2])
 
 
 @njit(**KERNEL)
-def contact_range(tree, xy, radius, corner_radius, lo, hi, out, triangle, contact):
+def contact_range(tree, xy, shape, lo, hi, out, triangle, contact):
     """``drop_tip_contact`` for the points lo .. hi - 1 of xy (n, 2)."""
     for i in range(lo, hi):
-        tip, number, cx, cy, cz = drop_tip_contact(tree, xy[i, 0], xy[i, 1], radius, corner_radius)
+        tip, number, cx, cy, cz = drop_tip_contact(tree, shape, xy[i, 0], xy[i, 1])
         out[i], triangle[i] = tip, number
         contact[i, 0], contact[i, 1], contact[i, 2] = cx, cy, cz
 
 
 @njit(**KERNEL)
-def grid_rows(tree, x0, y0, step, radius, corner_radius, lo, hi, out):
+def grid_rows(tree, x0, y0, step, shape, lo, hi, out):
     """``drop_tip`` over (x0 + column * step, y0 + row * step) for the rows lo .. hi - 1 of out (ny, nx)."""
     for j in range(lo, hi):
         for i in range(out.shape[1]):
-            out[j, i] = drop_tip(tree, x0 + i * step, y0 + j * step, radius, corner_radius)
+            out[j, i] = drop_tip(tree, shape, x0 + i * step, y0 + j * step)
 
 
 @njit(**KERNEL, parallel=True)
-def drop_many_parallel(tree, xy, radius, corner_radius, out):
+def drop_many_parallel(tree, xy, shape, out):
     """``drop_range`` over all points, on the threads numba has; the same bytes on any number of them."""
     for i in prange(xy.shape[0]):
-        out[i] = drop_tip(tree, xy[i, 0], xy[i, 1], radius, corner_radius)
+        out[i] = drop_tip(tree, shape, xy[i, 0], xy[i, 1])
 
 
 @njit(**KERNEL, parallel=True)
-def blocked_many_parallel(tree, tips, radius, corner_radius, out):
+def blocked_many_parallel(tree, tips, shape, out):
     """``blocked_range`` over all tips, on the threads numba has."""
     for i in prange(tips.shape[0]):
-        out[i] = is_blocked(tree, tips[i, 0], tips[i, 1], tips[i, 2], radius, corner_radius)
+        out[i] = is_blocked(tree, shape, tips[i, 0], tips[i, 1], tips[i, 2])
 
 
 @njit(**KERNEL, parallel=True)
-def grid_parallel(tree, x0, y0, step, radius, corner_radius, out):
+def grid_parallel(tree, x0, y0, step, shape, out):
     """``grid_rows`` over all rows, on the threads numba has."""
     for j in prange(out.shape[0]):
-        grid_rows(tree, x0, y0, step, radius, corner_radius, j, j + 1, out)
+        grid_rows(tree, x0, y0, step, shape, j, j + 1, out)
 
 
 # ======================================================================================================================
@@ -340,9 +348,9 @@ def find_near(tree, shape, x, y, off, floor, near):
     """Triangles that lift the tip above ``floor`` somewhere within ``off`` of (x, y), into near; their count, -1 where
     near has no room for them."""
     off = off * (1.0 + 1e-9) + 1e-9
-    wide = Bull(shape.radius + off, shape.corner, shape.flat + off)
+    wide = widened(shape, off)
     floor -= SLACK
-    reach2 = wide.radius * wide.radius
+    reach2 = radius_of(wide) ** 2
     column, child, parent, corners = tree.column, tree.child, tree.parent, tree.corners
     node, count = 0, 0
     trail = np.uint64(0)
@@ -413,11 +421,10 @@ def tip_near(tree, shape, x, y, near, count, guess):
 
 
 @njit(**KERNEL)
-def drop_along(tree, xy, radius, corner_radius, out):
+def drop_along(tree, xy, shape, out):
     """Tips over places xy (n, 2) that follow each other, into out (n,)."""
-    shape = bull_of(radius, corner_radius)
     near = np.empty(MOST, np.int64)
-    widest = WIDE * shape.radius
+    widest = WIDE * radius_of(shape)
     most, slot, i, hi = widest, -1, 0, xy.shape[0]
     while i < hi:
         x, y = xy[i, 0], xy[i, 1]

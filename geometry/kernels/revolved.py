@@ -1,8 +1,8 @@
 """Loops for any convex body of revolution over a mesh; the kind of shape is resolved at compile time.
 
 Notation
-    shape   a named tuple of one kind: ``Bull`` (``geometry.kernels.drop``), ``Turned`` (``geometry.kernels.outline``),
-            or a ``Push`` of one of these (``geometry.kernels.push``)
+    shape   a named tuple of one kind: ``Bull`` (``geometry.kernels.drop``), ``Tapered`` (``geometry.kernels.tapered``),
+            ``Turned`` (``geometry.kernels.outline``), or a ``Push`` of one of these (``geometry.kernels.push``)
     (x, y)  axis of the body in plan; points are taken relative to it
     rho, h  distance from the axis in plan, and height of the body's lower outline there: convex, not falling
     lift    tip height that a point requires: z - h(rho) in a drop. It is concave on a triangle. So where the contact of
@@ -81,6 +81,11 @@ def edge_place(shape, lo, hi, q, half, length, l2, ez):
 
     half^2 = R^2 - q^2; l2 is length^2 as it was before its root was taken.
     """
+    raise NotImplementedError
+
+
+def widened(shape, off):
+    """The shape with a flat bottom wider by ``off`` mm in radius, and all above it as much farther out."""
     raise NotImplementedError
 
 

@@ -1,8 +1,9 @@
 """Lowest height of a body of revolution over a mesh: drop, blocked, contact and grids.
 
 The cutter stands upright (+z), tip down. Its body is a disc-bottomed shape of ``radius`` and
-``corner_radius`` (ball: equal, flat: 0, bull nose: between) under an endless cylinder. A tip height is the
-lowest at which the body does not enter the mesh; -inf where nothing is below. Theory: docs/theory/drop.md.
+``corner_radius`` (ball: equal, flat: 0, bull nose: between) under an endless cylinder. The side of a tapered
+mill (``LeaningSide``) leans outwards first. A tip height is the lowest at which the body does not enter the
+mesh; -inf where nothing is below. Theory: docs/theory/drop.md.
 
 Arrays are split over numba's threads where it has several. Where it has one (``NUMBA_NUM_THREADS=1`` or
 ``numba.set_num_threads(1)``), the threading layer is not touched, so such calls may come from several
@@ -12,7 +13,7 @@ Python threads at once. The bytes are the same either way.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -21,11 +22,39 @@ from numpy.typing import ArrayLike, NDArray
 from geometry.array_checks import finite_points
 from geometry.errors import GeometryError
 from geometry.kernels import drop as kernels
+from geometry.kernels.drop import Bull, bull_of
+from geometry.kernels.tapered import Tapered, tapered_of
 from geometry.mesh import F64, I32
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.curve_order import in_order
 
+Shape = Bull | Tapered
+
 FEW = 4000  # fewer queries do not pay for a second thread
+
+
+class LeaningSide(NamedTuple):
+    """The side of a tapered mill.
+
+    taper  : float, above 0, tangent of its angle to the axis
+    widest : float, mm, largest radius, where it ends
+    """
+
+    taper: float
+    widest: float
+
+
+def drop_shape(radius: float, corner_radius: float, side: LeaningSide | None = None) -> Shape:
+    """The body as compiled loops take it.
+
+    radius        : float, mm, of the cutter, or of the end of a tapered one
+    corner_radius : float, mm
+    side          : LeaningSide of a tapered mill, None for an upright side
+    """
+    if side is None:
+        return bull_of.py_func(float(radius), float(corner_radius))
+    return tapered_of(float(radius), float(corner_radius), float(side.taper), float(side.widest))
+
 
 @dataclass(frozen=True, eq=False)
 class DropContacts:
@@ -41,7 +70,8 @@ class DropContacts:
     point: F64
 
 
-def drop_tips(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: float, out: F64 | None = None) -> F64:
+def drop_tips(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: float, out: F64 | None = None,
+              side: LeaningSide | None = None) -> F64:
     """Lowest tip height over each point: contact with vertices, edges and facets [Yau2004].
 
     tree          : TriangleTree
@@ -49,6 +79,7 @@ def drop_tips(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: f
     radius        : float, mm, >= 0; 0 gives the height of the mesh itself
     corner_radius : float, mm, 0 <= corner_radius <= radius
     out           : (n,) float64, mm, to write into; new when None
+    side          : LeaningSide of a tapered mill, whose end has the radius; None for an upright side
 
     Returns
     -------
@@ -66,19 +97,20 @@ def drop_tips(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: f
     if result.shape != (len(points),) or result.dtype != np.float64:
         raise GeometryError(f"out must be ({len(points)},) float64, got {result.shape} {result.dtype}",
                             code="bad_array", subjects=("out",))
-    r, c = float(radius), float(corner_radius)
+    shape = drop_shape(radius, corner_radius, side)
 
     def call(at: F64, tips: Any) -> None:
         if one_thread(len(at)):
-            kernels.drop_range(tree.arrays, at, r, c, 0, len(at), tips)
+            kernels.drop_range(tree.arrays, at, shape, 0, len(at), tips)
         else:
-            kernels.drop_many_parallel(tree.arrays, at, r, c, tips)
+            kernels.drop_many_parallel(tree.arrays, at, shape, tips)
 
     in_order(call, points, len(tree), result)
     return result
 
 
-def drop_along(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: float) -> F64:
+def drop_along(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: float,
+               side: LeaningSide | None = None) -> F64:
     """``drop_tips`` over places that follow each other as on a path, with less work the closer they are.
 
     xy : (n, 2) float64, mm, places of the axis in the frame of the mesh; other parameters as there
@@ -96,11 +128,12 @@ def drop_along(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: 
     points = finite_points(xy, 2, "xy")
     _check_radii(radius, corner_radius)
     out = np.empty(len(points))
-    kernels.drop_along(tree.arrays, points, float(radius), float(corner_radius), out)
+    kernels.drop_along(tree.arrays, points, drop_shape(radius, corner_radius, side), out)
     return out
 
 
-def drop_contacts(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: float) -> DropContacts:
+def drop_contacts(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: float,
+                  side: LeaningSide | None = None) -> DropContacts:
     """``drop_tips`` with the triangle and the point that hold each tip up; parameters as there.
 
     xy : (n, 2) float64, mm, places of the axis in the frame of the mesh
@@ -117,11 +150,12 @@ def drop_contacts(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radiu
     _check_radii(radius, corner_radius)
     n = len(points)
     z, triangle, contact = np.empty(n), np.empty(n, np.int32), np.empty((n, 3))
-    kernels.contact_range(tree.arrays, points, float(radius), float(corner_radius), 0, n, z, triangle, contact)
+    kernels.contact_range(tree.arrays, points, drop_shape(radius, corner_radius, side), 0, n, z, triangle, contact)
     return DropContacts(z, triangle, contact)
 
 
-def blocked_many(tree: TriangleTree, tips: ArrayLike, radius: float, corner_radius: float) -> NDArray[np.bool_]:
+def blocked_many(tree: TriangleTree, tips: ArrayLike, radius: float, corner_radius: float,
+                 side: LeaningSide | None = None) -> NDArray[np.bool_]:
     """Whether the body enters the mesh with its tip at each point.
 
     tips : (n, 3) float64, mm, frame of the mesh; the other parameters are those of ``drop_tips``
@@ -139,25 +173,26 @@ def blocked_many(tree: TriangleTree, tips: ArrayLike, radius: float, corner_radi
     points = finite_points(tips, 3, "tips")
     _check_radii(radius, corner_radius)
     out = np.empty(len(points), np.bool_)
-    r, c = float(radius), float(corner_radius)
+    shape = drop_shape(radius, corner_radius, side)
 
     def call(at: F64, blocked: Any) -> None:
         if one_thread(len(at)):
-            kernels.blocked_range(tree.arrays, at, r, c, 0, len(at), blocked)
+            kernels.blocked_range(tree.arrays, at, shape, 0, len(at), blocked)
         else:
-            kernels.blocked_many_parallel(tree.arrays, at, r, c, blocked)
+            kernels.blocked_many_parallel(tree.arrays, at, shape, blocked)
 
     in_order(call, points, len(tree), out)
     return out
 
 
 def drop_grid(tree: TriangleTree, x0: float, y0: float, step: float, nx: int, ny: int, radius: float,
-              corner_radius: float) -> F64:
+              corner_radius: float, side: LeaningSide | None = None) -> F64:
     """Lowest tip height over a grid of points.
 
     x0, y0 : float, mm, the first point
     step   : float, mm, > 0, distance of neighbours
     nx, ny : int, number of points along x and y
+    side   : LeaningSide of a tapered mill, None for an upright side
 
     Returns
     -------
@@ -174,7 +209,8 @@ def drop_grid(tree: TriangleTree, x0: float, y0: float, step: float, nx: int, ny
         raise GeometryError(f"a grid needs finite corners, a positive step and counts, got {x0}, {y0}, {step}, "
                             f"{nx}, {ny}", code="bad_grid", subjects=("grid",))
     out = np.empty((int(ny), int(nx)))
-    args: tuple[Any, ...] = (tree.arrays, float(x0), float(y0), float(step), float(radius), float(corner_radius))
+    args: tuple[Any, ...] = (tree.arrays, float(x0), float(y0), float(step),
+                             drop_shape(radius, corner_radius, side))
     if one_thread(nx * ny):
         kernels.grid_rows(*args, 0, len(out), out)  # type: ignore[call-arg]
     else:

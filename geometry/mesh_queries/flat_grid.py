@@ -16,7 +16,7 @@ from scipy import ndimage
 
 from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
-from geometry.mesh_queries.drop import drop_contacts, drop_grid, drop_tips
+from geometry.mesh_queries.drop import LeaningSide, drop_contacts, drop_grid, drop_tips
 
 BLOCK = 16  # points along a side
 LARGE = 1_000_000  # points: a smaller grid is measured point by point
@@ -24,7 +24,7 @@ EVEN = 1e-9  # mm, heights that are the same
 
 
 def drop_over_flats(tree: TriangleTree, x0: float, y0: float, step: float, nx: int, ny: int, radius: float,
-                    corner_radius: float, large: int = LARGE) -> F64:
+                    corner_radius: float, large: int = LARGE, side: LeaningSide | None = None) -> F64:
     """Lowest tip height over a grid of points, with few queries over level areas.
 
     x0, y0 : float, mm, the first point, frame of the mesh
@@ -32,6 +32,7 @@ def drop_over_flats(tree: TriangleTree, x0: float, y0: float, step: float, nx: i
     nx, ny : int, number of points along x and y
     radius, corner_radius : float, mm, of the body, as in ``geometry.mesh_queries.drop.drop_tips``
     large  : int, number of points from which on areas are looked for
+    side   : LeaningSide of a tapered mill, None for an upright side
 
     Returns
     -------
@@ -44,23 +45,23 @@ def drop_over_flats(tree: TriangleTree, x0: float, y0: float, step: float, nx: i
         As ``geometry.mesh_queries.drop.drop_grid``.
     """
     if nx * ny < large:
-        return drop_grid(tree, x0, y0, step, nx, ny, radius, corner_radius)
-    side = BLOCK * step
+        return drop_grid(tree, x0, y0, step, nx, ny, radius, corner_radius, side)
+    across = BLOCK * step
     shape = (-(-ny // BLOCK), -(-nx // BLOCK))
     level, edges = _level_areas(tree.mesh)
-    whole = ~_marked(edges, np.array([x0, y0]) - 0.5 * step, side, shape)
+    whole = ~_marked(edges, np.array([x0, y0]) - 0.5 * step, across, shape)
     row, column = np.nonzero(whole)
-    middle = np.array([x0, y0]) + (np.column_stack([column, row]) + 0.5) * side - 0.5 * step
+    middle = np.array([x0, y0]) + (np.column_stack([column, row]) + 0.5) * across - 0.5 * step
     under = drop_contacts(tree, middle, 0.0, 0.0)
     flat = (under.triangle >= 0) & level[under.triangle]
     row, column, middle, height = row[flat], column[flat], middle[flat], under.z[flat]
-    most = drop_tips(tree, middle, radius + side * np.sqrt(0.5), 0.0)
+    most = drop_tips(tree, middle, max(radius, side.widest if side else 0.0) + across * np.sqrt(0.5), 0.0)
     flat = most <= height + EVEN
     heights = np.full(shape, np.nan)
     heights[row[flat], column[flat]] = most[flat]
     out = np.repeat(np.repeat(heights, BLOCK, axis=0), BLOCK, axis=1)[:ny, :nx].copy()
     j, i = np.nonzero(np.isnan(out))
-    out[j, i] = drop_tips(tree, np.column_stack([x0 + i * step, y0 + j * step]), radius, corner_radius)
+    out[j, i] = drop_tips(tree, np.column_stack([x0 + i * step, y0 + j * step]), radius, corner_radius, side=side)
     return out
 
 
