@@ -340,5 +340,5 @@ def numbered(tools: list[Tool]) -> list[Tool]:
     return [t.model_copy(update={"number": numbers[t.id]}) for t in tools]
 
 
-__all__: list[Any] = ["BUILT_KINDS", "TAPERED_KINDS", "VERIFIED_KINDS", "HolderSegment", "Tool", "ToolKind", "default_numbers",
-                      "numbered"]
+__all__: list[Any] = ["BUILT_KINDS", "TAPERED_KINDS", "VERIFIED_KINDS", "HolderSegment", "Tool", "ToolKind",
+                      "default_numbers", "numbered"]

@@ -13,6 +13,7 @@ Python threads at once. The bytes are the same either way.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numba
@@ -27,6 +28,7 @@ from geometry.kernels.tapered import Tapered, tapered_of
 from geometry.mesh import F64, I32
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.curve_order import in_order
+from geometry.tool_body import ToolBody
 
 Shape = Bull | Tapered
 
@@ -54,6 +56,13 @@ def drop_shape(radius: float, corner_radius: float, side: LeaningSide | None = N
     if side is None:
         return bull_of.py_func(float(radius), float(corner_radius))
     return tapered_of(float(radius), float(corner_radius), float(side.taper), float(side.widest))
+
+
+@lru_cache(maxsize=256)
+def cutter_shape(tool: ToolBody) -> Shape:
+    """The cutting part of a tool as compiled loops take it."""
+    side = LeaningSide(tool.taper, tool.widest_radius) if tool.taper > 0.0 else None
+    return drop_shape(tool.radius, tool.corner_radius, side)
 
 
 @dataclass(frozen=True, eq=False)

@@ -85,6 +85,25 @@ class Outline:
         arc = (OutlineArc(radius, corner_radius, (radius - corner_radius, corner_radius)),) if corner_radius else ()
         return cls((*flat, *arc))
 
+    @classmethod
+    @lru_cache(maxsize=64)
+    def tapered(cls, radius: float, corner_radius: float, taper: float, widest: float) -> Outline:
+        """A tapered mill: an end as of ``bull``, and a side that leans outwards up to a radius ``widest``, mm.
+
+        taper : tangent of the angle between side and axis, above 0
+        """
+        long = math.hypot(1.0, taper)
+        at = radius - corner_radius * (1.0 - 1.0 / long)
+        high = corner_radius * (1.0 - taper / long)
+        pieces: list[OutlineLine | OutlineArc] = []
+        if radius > corner_radius:
+            pieces.append(OutlineLine(radius - corner_radius, 0.0))
+        if corner_radius > 0.0:
+            pieces.append(OutlineArc(at, high, (radius - corner_radius, corner_radius)))
+        if widest > at:
+            pieces.append(OutlineLine(widest, high + (widest - at) / taper))
+        return cls(tuple(pieces))
+
     @property
     def radius(self) -> float:
         """Largest radius, mm."""

@@ -142,8 +142,8 @@ def _room(body: ToolBody, bounds: F64, blank: Blank, rotation: F64) -> float:
     if blank.stands_alone:
         stock = blank.corners(rotation)
         spare = float(np.max([bounds[0, :2] - stock[0, :2], stock[1, :2] - bounds[1, :2]]))
-        around = min(spare + blank.uncertainty + body.radius, MAX_ROOM)
-    return body.radius + max(AIR, around)
+        around = min(spare + blank.uncertainty + body.widest_radius, MAX_ROOM)
+    return body.widest_radius + max(AIR, around)
 
 
 def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True,

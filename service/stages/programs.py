@@ -246,7 +246,7 @@ def _wide_of_doglegs(clamping: Clamping, box: F64, level: float, leans: float, t
 
 def _widest(tool: ToolBody) -> float:
     """mm, largest radius of an assembly."""
-    return max([tool.radius, 0.5 * tool.shank_diameter, *(0.5 * max(h.diameter, h.diameter_top) for h in tool.holder)])
+    return max([tool.widest_radius, 0.5 * tool.shank_diameter, *(0.5 * max(h.diameter, h.diameter_top) for h in tool.holder)])
 
 
 def turning_of(ready: Prepared, view: View) -> RotaryAxes | None:
@@ -294,7 +294,7 @@ def room_to_turn(height: float, radius: float, leans: float, tools: Sequence[Too
     up, aside = np.cos(angles), np.sin(angles)
     deepest = np.zeros_like(angles)
     for tool in tools:
-        rims = [(0.0, tool.radius), (tool.flute_length, tool.radius), (tool.stickout, 0.5 * tool.shank_diameter)]
+        rims = [(0.0, tool.radius), (tool.flute_length, tool.widest_radius), (tool.stickout, 0.5 * tool.shank_diameter)]
         z = tool.stickout
         for part in tool.holder:
             rims += [(z, 0.5 * part.diameter), (z + part.length, 0.5 * part.diameter_top)]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geometry.kernels.drop import drop_tip_below
+from geometry.kernels.drop import bull_of, drop_tip_below
 from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.drop import blocked_many, drop_along, drop_contacts, drop_grid, drop_tips
@@ -77,7 +77,7 @@ def test_blocked_is_drop_above_z(shape, cutter):
         at = np.column_stack([xy, rest + shift])
         np.testing.assert_array_equal(blocked_many(tree, at, radius, corner), tip > at[:, 2] + 1e-9)
     start = float(np.median(rest))
-    below = [drop_tip_below(tree.arrays, x, y, radius, corner, start) for x, y in xy]
+    below = [drop_tip_below(tree.arrays, bull_of(radius, corner), x, y, start) for x, y in xy]
     np.testing.assert_allclose(below, np.maximum(tip, start), rtol=0, atol=1e-12)
 
 

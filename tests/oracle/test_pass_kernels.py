@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from geometry.kernels.drop import bull_of
 from geometry.kernels.outline import Stack
 from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
@@ -69,7 +70,7 @@ def test_dragged_paths_are_those_of_the_twin(radius, corner):
     rng = np.random.default_rng(7)
     tree, frame = bumpy(rng), LatticeFrame(-12.0, -12.0, 0.5)
     noncut = np.where(rng.random((49, 49)) < 0.02, 2.0, -np.inf)
-    compiled = TipLimit(tree.arrays, radius, corner, 0.1, noncut, frame)
+    compiled = TipLimit(tree.arrays, bull_of(radius, corner), 0.1, noncut, frame)
 
     def limit(xy):
         xy = np.ascontiguousarray(xy)

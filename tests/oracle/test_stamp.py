@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from geometry.kernels.drop import bull_of
 from toolpath.kernels.stock import HALF_DIAGONAL, stamp
 from zones.kernels.lattice import LatticeFrame
 
@@ -43,7 +44,7 @@ def test_a_level_move_lowers_what_its_positions_lower(seed):
                                   [1.4, 1.4, 1.0, 0.9, 0.9, 0.9, 0.9]])
         points[4, 0], points[5, 1], points[6] = points[3, 0], points[4, 1], points[5]  # along y, along x, and nowhere
         given = top.copy(), cover.copy()
-        stamp(*given, frame, points, radius, corner)
+        stamp(*given, frame, points, bull_of(radius, corner))
         twin(top, cover, frame, points, radius, corner)
         assert np.array_equal(given[0], top) and np.array_equal(given[1], cover)
     assert (top < 1.0).mean() > 0.2

@@ -20,8 +20,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from geometry.kernels.bvh import TreeArrays
-from geometry.kernels.drop import BLOCK_TOLERANCE, blocked_by
+from geometry.kernels.drop import BLOCK_TOLERANCE, Bull, blocked_by
 from geometry.kernels.push import stop_at
+from geometry.kernels.tapered import Tapered
 from zones.kernels.lattice import LatticeFrame, noncut_at
 
 # For each of the 16 corner patterns (bit 0: (i,j), 1: (i,j+1), 2: (i+1,j+1), 3: (i+1,j) blocked) up to two
@@ -47,8 +48,7 @@ class TipLimits(NamedTuple):
 
     noncut       : (ny, nx) float64, mm, tip limit of shank and holder
     x0, y0, step : float, mm, ``LatticeFrame`` of ``noncut``
-    radius       : float, mm, of the cutting part, grown by the allowance
-    corner       : float, mm, its corner radius, grown by the allowance
+    shape        : the cutting part, grown by the allowance, a shape of ``geometry.kernels.revolved``
     allowance    : float, mm, material that stays on the part
     rows         : (k, 9) float64, mm, outline of the cutting part, as in ``geometry.kernels.outline``
     """
@@ -57,8 +57,7 @@ class TipLimits(NamedTuple):
     x0: float
     y0: float
     step: float
-    radius: float
-    corner: float
+    shape: Bull | Tapered
     allowance: float
     rows: NDArray[np.float64]
 
@@ -151,7 +150,7 @@ def _blocker(tree, limits, x, y, z, guess):
     """
     if noncut_at(limits.noncut, LatticeFrame(limits.x0, limits.y0, limits.step), x, y) > z:
         return NOT_CUTTING
-    return blocked_by(tree, x, y, z - limits.allowance, limits.radius, limits.corner, guess)
+    return blocked_by(tree, limits.shape, x, y, z - limits.allowance, guess)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)

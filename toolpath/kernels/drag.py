@@ -20,8 +20,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from geometry.kernels.bvh import TreeArrays
-from geometry.kernels.drop import MOST, WIDE, bull_of, find_near, lift_at, tip_near
+from geometry.kernels.drop import MOST, WIDE, Bull, find_near, lift_at, tip_near
 from geometry.kernels.options import KERNEL
+from geometry.kernels.revolved import radius_of
+from geometry.kernels.tapered import Tapered
 from zones.kernels.lattice import LatticeFrame, noncut_at
 
 DEEP = 40  # times that a piece is cut in four; far more than its length allows
@@ -30,14 +32,14 @@ DEEP = 40  # times that a piece is cut in four; far more than its length allows
 class TipLimit(NamedTuple):
     """The limit as plain arrays.
 
-    tree      : TreeArrays of the obstacles; radius, corner : mm, of the cutting part, grown by the allowance
+    tree      : TreeArrays of the obstacles
+    shape     : the cutting part, grown by the allowance, a shape of ``geometry.kernels.revolved``
     allowance : mm
     noncut    : (ny, nx) float64, mm, tip limit of shank and holder; frame : LatticeFrame of its nodes
     """
 
     tree: TreeArrays
-    radius: float
-    corner: float
+    shape: Bull | Tapered
     allowance: float
     noncut: NDArray[np.float64]
     frame: LatticeFrame
@@ -69,7 +71,7 @@ def _ahead(limit, shape, way, corners, s, tip, held, at, k, near):
     where that is not known from what holds the tip at s."""
     x, y = place_on(way, corners, s)
     x_lo, x_hi, y_lo, y_hi, floor, end = x, x, y, y, tip, s
-    most = WIDE * shape.radius
+    most = WIDE * radius_of(shape)
     for j in range(k, at.shape[0]):
         x, y = place_on(way, corners, at[j])
         lift = lift_at(shape, limit.tree.corners, limit.tree.facets, held, x, y)
@@ -114,7 +116,7 @@ def dragged(limit, way, corners, at, tolerance, smallest, steepest):
     tolerance : mm, the path keeps to its chords; smallest : mm, no shorter piece is cut
     steepest  : mm of rise for each mm of way; a piece that rises more is cut too
     """
-    shape = bull_of(limit.radius, limit.corner)
+    shape = limit.shape
     near, known, upto = np.empty(MOST, np.int64), -1, -np.inf  # the list holds from the last place to ``upto``
     count, room = 1, max(2 * at.shape[0], 16)
     places, heights = np.empty(room), np.empty(room)

@@ -13,6 +13,11 @@ import math
 import numpy as np
 from numba import njit, prange
 
+from geometry.kernels.drop import Bull
+from geometry.kernels.revolved import for_shape, radius_of
+from geometry.kernels.tapered import Tapered
+from toolpath.kernels.stock import bottom_at
+
 SECTORS = 36
 """Of the half circle: an angle is known to a 36th of it."""
 
@@ -22,6 +27,40 @@ BINS = 512
 FIRST = np.searchsorted(EDGES[1:-1], 2.0 * np.arange(BINS) / BINS - 1.0, side="right")
 """Sector of the least sine of each bin; bins share the sines from -1 to 1 evenly."""
 ALL = (1 << SECTORS) - 1
+
+
+def side_begins(shape):
+    """Height over the tip at which the corner ends, mm."""
+    raise NotImplementedError
+
+
+def width_at(shape, height):
+    """Radius of the cutting part at a height over its tip, mm."""
+    raise NotImplementedError
+
+
+@for_shape(side_begins, Bull)
+def _bull_side(shape):
+    return shape.corner
+
+
+@for_shape(side_begins, Tapered)
+def _tapered_side(shape):
+    return shape.high
+
+
+@for_shape(width_at, Bull)
+def _bull_width(shape, height):
+    if height < shape.corner:
+        return shape.flat + math.sqrt(max(height * (2.0 * shape.corner - height), 0.0))
+    return shape.radius
+
+
+@for_shape(width_at, Tapered)
+def _tapered_width(shape, height):
+    if height < shape.high:
+        return shape.flat + math.sqrt(max(height * (2.0 * shape.corner - height), 0.0))
+    return min(shape.join + (height - shape.high) / shape.grade, shape.radius)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
@@ -38,9 +77,10 @@ def _sector(sine):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _sectors(k, top, x0, y0, step, tips, ways, radius, corner, skin, bits):
+def _sectors(k, top, x0, y0, step, tips, ways, shape, skin, bits):
     """The sectors of tip k in stock, as bits, into ``bits`` (n,) int64; parameters as in ``sectors``."""
     ny, nx = top.shape
+    radius, corner_end = radius_of(shape), side_begins(shape)
     x, y, z = tips[k]
     i0, i1 = max(int(math.ceil((y - radius - y0) / step)), 0), min(int((y + radius - y0) / step), ny - 1)
     j0, j1 = max(int(math.ceil((x - radius - x0) / step)), 0), min(int((x + radius - x0) / step), nx - 1)
@@ -65,40 +105,34 @@ def _sectors(k, top, x0, y0, step, tips, ways, radius, corner, skin, bits):
             if ways[k, 0] * wx + ways[k, 1] * wy < -step:
                 continue
             rho = math.sqrt(wx * wx + wy * wy)
-            bottom = 0.0
-            if rho > radius - corner:
-                run = min(rho - radius + corner, corner)
-                bottom = corner - math.sqrt(max(corner * corner - run * run, 0.0))
-            if rho > radius or over - bottom <= skin:
+            if rho > radius or over - bottom_at(shape, rho) <= skin:
                 continue
-            edge = radius
-            if over < corner:
-                edge = radius - corner + math.sqrt(max(over * (2.0 * corner - over), 0.0))
+            edge = width_at(shape, over)
             side = ways[k, 0] * wy - ways[k, 1] * wx
             low, high = _sector((side - 0.5 * step) / edge), _sector((side + 0.5 * step) / edge)
-            if over >= corner and side + step > edge:
+            if over >= corner_end and side + step > edge:
                 high = SECTORS - 1
-            if over >= corner and side - step < -edge:
+            if over >= corner_end and side - step < -edge:
                 low = 0
             bits[k] |= (np.int64(2) << high) - (np.int64(1) << low)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True, parallel=True)
-def sectors_parallel(top, x0, y0, step, tips, ways, radius, corner, skin, bits):
+def sectors_parallel(top, x0, y0, step, tips, ways, shape, skin, bits):
     """``sectors`` on the threads numba has."""
     for k in prange(len(tips)):
-        _sectors(k, top, x0, y0, step, tips, ways, radius, corner, skin, bits)
+        _sectors(k, top, x0, y0, step, tips, ways, shape, skin, bits)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def sectors(top, x0, y0, step, tips, ways, radius, corner, skin, bits):
+def sectors(top, x0, y0, step, tips, ways, shape, skin, bits):
     """Sectors in stock, as bits, at tips (n, 3), mm, on their ways (n, 2), unit, into ``bits`` (n,) int64, zeros.
 
     top  : (ny, nx) mm, at nodes ``step`` mm apart from (x0, y0) on
     skin : mm of stock over the cutter that is not counted
     """
     for k in range(len(tips)):
-        _sectors(k, top, x0, y0, step, tips, ways, radius, corner, skin, bits)
+        _sectors(k, top, x0, y0, step, tips, ways, shape, skin, bits)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)

@@ -3,7 +3,8 @@
 For a tip at c the cutter (corner r, radius R, endless upwards) is as far from a point p as
     sqrt(u^2 + w^2) - r,   u = max(rho - (R - r), 0),  w = max(c_z + r - p_z, 0),
 rho the distance of p from the axis in plan. The least over all tips of the passes is what remains at p to within
-the cosine of the angle between the sample normal and the direction of contact (under 1 % at a cusp). On a level
+the cosine of the angle between the sample normal and the direction of contact (under 1 % at a cusp). The side of a
+tapered mill leans: above the end of its corner the distance to that line counts. On a level
 plane, where a sharp-cornered end passes beside p or over it, the height above p is taken instead,
 and a wall below such an end counts as untouched. Along a
 straight move the least lies at the nearest point in plan, at the nearest point in space to the corner's centre,
@@ -51,35 +52,61 @@ class SampleCells(NamedTuple):
     high: NDArray[np.float64]
 
 
+class MillEnd(NamedTuple):
+    """The end of a mill, frame of the tool.
+
+    flat, corner : float, mm, radius of the flat bottom and corner radius
+    sine, cosine : float, of the angle between the side and the axis; 0 and 1 for an upright side
+    """
+
+    flat: float
+    corner: float
+    sine: float
+    cosine: float
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _end_of(cutter: CutterSizes):
+    flat = cutter.radius - cutter.corner
+    if cutter.taper > 0.0:
+        cosine = 1.0 / np.sqrt(1.0 + cutter.taper * cutter.taper)
+        return MillEnd(flat, cutter.round, cutter.taper * cosine, cosine)
+    return MillEnd(flat, cutter.corner, 0.0, 1.0)
+
+
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True, inline="always")
-def _gap(px, py, pz, cx, cy, cz, radius, corner, level):
+def _gap(px, py, pz, cx, cy, cz, end: MillEnd, level):
+    corner, out = end.corner, np.sqrt((px - cx) ** 2 + (py - cy) ** 2) - end.flat
     if level == LEVEL_PLANE:
-        u = np.sqrt((px - cx) ** 2 + (py - cy) ** 2) - (radius - corner)
-        if u > corner:
+        if out > corner:
             return FAR
-        return cz - pz + (corner - np.sqrt(corner * corner - u * u) if u > 0.0 else 0.0)
-    u = max(np.sqrt((px - cx) ** 2 + (py - cy) ** 2) - (radius - corner), 0.0)
-    w = max(cz + corner - pz, 0.0)
+        return cz - pz + (corner - np.sqrt(corner * corner - out * out) if out > 0.0 else 0.0)
+    w = cz + corner - pz
+    if end.sine > 0.0:
+        x, y = out - corner * end.cosine, -w + corner * end.sine
+        if x * end.sine + y * end.cosine > 0.0:
+            return x * end.cosine - y * end.sine
+    u, w = max(out, 0.0), max(w, 0.0)
     if level == UPRIGHT and corner == 0.0 and w > BELOW:
         return FAR
     return np.sqrt(u * u + w * w) - corner
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _segment_gap(p, a, b, radius, corner, level):
+def _segment_gap(p, a, b, end: MillEnd, level):
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    best = min(_gap(p[0], p[1], p[2], a[0], a[1], a[2], radius, corner, level),
-               _gap(p[0], p[1], p[2], b[0], b[1], b[2], radius, corner, level))
+    best = min(_gap(p[0], p[1], p[2], a[0], a[1], a[2], end, level),
+               _gap(p[0], p[1], p[2], b[0], b[1], b[2], end, level))
     d2 = dx * dx + dy * dy
     if d2 > 0.0:
         s = ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / d2
         if 0.0 < s < 1.0:
-            best = min(best, _gap(p[0], p[1], p[2], a[0] + s * dx, a[1] + s * dy, a[2] + s * dz, radius, corner, level))
+            best = min(best, _gap(p[0], p[1], p[2], a[0] + s * dx, a[1] + s * dy, a[2] + s * dz, end, level))
     d3 = d2 + dz * dz
     if d3 > 0.0 and dz != 0.0:
-        s = ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy + (p[2] - a[2] - corner) * dz) / d3
+        s = ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy + (p[2] - a[2] - end.corner) * dz) / d3
         if 0.0 < s < 1.0:
-            best = min(best, _gap(p[0], p[1], p[2], a[0] + s * dx, a[1] + s * dy, a[2] + s * dz, radius, corner, level))
+            best = min(best, _gap(p[0], p[1], p[2], a[0] + s * dx, a[1] + s * dy, a[2] + s * dz, end, level))
     return best
 
 
@@ -96,7 +123,7 @@ class PlaceSquares(NamedTuple):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _farthest_corner(p, squares: PlaceSquares, s, a, b, radius, corner, level, z_hi, enough):
+def _farthest_corner(p, squares: PlaceSquares, s, a, b, end: MillEnd, level, z_hi, enough):
     """Distance of the farthest corner of square s round p from a move; any value above ``enough`` where it is more."""
     half, worst = squares.half[s], -FAR
     corner_of = np.empty(3)
@@ -108,7 +135,7 @@ def _farthest_corner(p, squares: PlaceSquares, s, a, b, radius, corner, level, z
             corner_of[0], corner_of[1], corner_of[2] = p[0] + e * squares.x[s], p[1] + e * squares.y[s], p[2] + f
         if corner_of[2] > z_hi:
             return FAR
-        worst = max(worst, _segment_gap(corner_of, a, b, radius, corner, level))
+        worst = max(worst, _segment_gap(corner_of, a, b, end, level))
         if worst > enough:
             return worst
     return worst
@@ -139,7 +166,8 @@ def _lower_rows(points, level, squares: PlaceSquares, cells: SampleCells, path, 
                 first, end, residual):
     """``lower`` for the samples in the rows of cells from ``first`` to before ``end``."""
     cell_start, cell_items, gx, gy, cell, ncx = cells.start, cells.items, cells.x0, cells.y0, cells.size, cells.ncx
-    radius, corner, flute, _cone = cutter
+    radius, flute, end_shape = cutter.radius, cutter.length, _end_of(cutter)
+    corner = end_shape.corner
     r, line = radius + margin, 1
     for k in range(len(path) - 1):
         if k + 1 == starts[line]:
@@ -176,8 +204,8 @@ def _lower_rows(points, level, squares: PlaceSquares, cells: SampleCells, path, 
                     near = radius if kind == LEVEL_PLANE else radius + left
                     if ex * ex + ey * ey > near * near:
                         continue
-                    d = _segment_gap(points[q], a, b, radius, corner, kind)
+                    d = _segment_gap(points[q], a, b, end_shape, kind)
                     if d < left and squares.half[q] > 0.0:
-                        d = max(d, _farthest_corner(points[q], squares, q, a, b, radius, corner, kind, z_hi, left))
+                        d = max(d, _farthest_corner(points[q], squares, q, a, b, end_shape, kind, z_hi, left))
                     if d < left:
                         residual[s] = d

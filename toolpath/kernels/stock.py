@@ -1,7 +1,8 @@
 """The planner's stock: the top of the material over a plan lattice, lowered by every pass.
 
 Notation: S (ny, nx) top z at nodes, or the most in the cell round each; a cutter with its tip at c reaches down
-to c_z + h(rho) at distance rho, h(rho) = 0 for rho <= R - r, else r - sqrt(r^2 - (rho - R + r)^2).
+to c_z + h(rho) at distance rho, h(rho) = 0 for rho <= d, else r - sqrt(r^2 - (rho - d)^2), d = R - r; the side of a
+tapered mill goes on as a line. ``shape`` is a ``Bull`` or a ``Tapered``.
 This is for deciding (is there something to cut, may the tool come down here); the proof has a model of its own.
 """
 
@@ -10,22 +11,40 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
+from geometry.kernels.drop import Bull
+from geometry.kernels.revolved import for_shape, radius_of
+from geometry.kernels.tapered import Tapered
 from zones.kernels.lattice import LatticeFrame
 
 HALF_DIAGONAL = 0.7072  # of a cell, rounded up
 LEAST_RISE = 0.02  # of a tool axis: one that lies lower takes nothing off a height over the plan
 
 
-@njit(cache=True, nogil=True, no_cfunc_wrapper=True, inline="always")
-def _bottom(rho, radius, corner):
-    u = rho - (radius - corner)
+def bottom_at(shape, rho):
+    """h(rho) for rho <= R, mm; ``shape`` is a ``Bull`` or a ``Tapered``."""
+    raise NotImplementedError
+
+
+@for_shape(bottom_at, Bull)
+def _bottom_of_bull(shape, rho):
+    corner, u = shape.corner, rho - shape.flat
     if u <= 0.0:
         return 0.0
     return corner - np.sqrt(max(corner * corner - u * u, 0.0))
 
 
+@for_shape(bottom_at, Tapered)
+def _bottom_of_tapered(shape, rho):
+    corner, u = shape.corner, rho - shape.flat
+    if u <= 0.0:
+        return 0.0
+    if rho > shape.join:
+        return shape.high + (rho - shape.join) * shape.grade
+    return corner - np.sqrt(max(corner * corner - u * u, 0.0))
+
+
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def stamp(top, cover, frame: LatticeFrame, points, radius, corner):
+def stamp(top, cover, frame: LatticeFrame, points, shape):
     """Lower ``top`` and ``cover`` along a polyline of tips (n, 3).
 
     A cell of ``cover`` is lowered only by positions that clear the whole disc of its half diagonal, to what the
@@ -36,18 +55,19 @@ def stamp(top, cover, frame: LatticeFrame, points, radius, corner):
         length = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2)
         pieces = max(1, int(np.ceil(length / (0.7 * frame.step))))
         if a[2] == b[2]:
-            _stamp_level(top, cover, frame, a, b, pieces, radius, corner)
+            _stamp_level(top, cover, frame, a, b, pieces, shape)
         else:
             for s in range(pieces + 1):
                 t = s / pieces
                 _stamp_place(top, cover, frame, a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]),
-                             a[2] + t * (b[2] - a[2]), radius, corner)
+                             a[2] + t * (b[2] - a[2]), shape)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _stamp_place(top, cover, frame: LatticeFrame, x, y, z, radius, corner):
+def _stamp_place(top, cover, frame: LatticeFrame, x, y, z, shape):
     """``stamp`` for one position."""
     x0, y0, step = frame
+    radius = radius_of(shape)
     ny, nx = top.shape
     half = HALF_DIAGONAL * step
     n_r = int(np.ceil(radius / step))
@@ -59,15 +79,16 @@ def _stamp_place(top, cover, frame: LatticeFrame, x, y, z, radius, corner):
             rho = np.sqrt((x0 + j * step - x) ** 2 + (y0 + i * step - y) ** 2)
             if rho > radius:
                 continue
-            top[i, j] = min(top[i, j], z + _bottom(rho, radius, corner))
+            top[i, j] = min(top[i, j], z + bottom_at(shape, rho))
             if rho + half <= radius:
-                cover[i, j] = min(cover[i, j], z + _bottom(rho + half, radius, corner))
+                cover[i, j] = min(cover[i, j], z + bottom_at(shape, rho + half))
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _stamp_level(top, cover, frame: LatticeFrame, a, b, pieces, radius, corner):
+def _stamp_level(top, cover, frame: LatticeFrame, a, b, pieces, shape):
     """``stamp`` for a level move from a to b: each node is lowered by the nearest of its ``pieces`` + 1 positions."""
     x0, y0, step = frame
+    radius = radius_of(shape)
     ny, nx = top.shape
     half, z = HALF_DIAGONAL * step, a[2]
     dx, dy = b[0] - a[0], b[1] - a[1]
@@ -97,9 +118,9 @@ def _stamp_level(top, cover, frame: LatticeFrame, a, b, pieces, radius, corner):
             rho = np.sqrt(near)
             if rho > radius:
                 continue
-            top[i, j] = min(top[i, j], z + _bottom(rho, radius, corner))
+            top[i, j] = min(top[i, j], z + bottom_at(shape, rho))
             if rho + half <= radius:
-                cover[i, j] = min(cover[i, j], z + _bottom(rho + half, radius, corner))
+                cover[i, j] = min(cover[i, j], z + bottom_at(shape, rho + half))
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
@@ -119,9 +140,10 @@ def mark_standing(top, part, z, rows, cols, out):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _overlap(heights, pooled, side, frame: LatticeFrame, tip, radius, corner, margin, half, least):
+def _overlap(heights, pooled, side, frame: LatticeFrame, tip, shape, margin, half, least):
     """``overlaps`` at one tip."""
     x0, y0, step = frame
+    radius = radius_of(shape)
     ny, nx = heights.shape
     rows, cols = pooled.shape
     inner = max(radius + margin, 0.35 * radius)
@@ -146,20 +168,20 @@ def _overlap(heights, pooled, side, frame: LatticeFrame, tip, radius, corner, ma
                             continue
                         rho = np.sqrt((x0 + j * step - x) ** 2 + dy * dy)
                         if rho <= inner:
-                            worst = max(worst, h - z - _bottom(min(rho - half, radius), radius, corner))
+                            worst = max(worst, h - z - bottom_at(shape, min(rho - half, radius)))
                 pooled[row, col] = highest
     return worst
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True, parallel=True)
-def overlaps_parallel(heights, pooled, side, frame: LatticeFrame, tips, radius, corner, margin, half, least, out):
+def overlaps_parallel(heights, pooled, side, frame: LatticeFrame, tips, shape, margin, half, least, out):
     """``overlaps`` on the threads numba has. Those that lower a square lower it to the same height."""
     for k in prange(len(tips)):
-        out[k] = _overlap(heights, pooled, side, frame, tips[k], radius, corner, margin, half, least)
+        out[k] = _overlap(heights, pooled, side, frame, tips[k], shape, margin, half, least)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def overlaps(heights, pooled, side, frame: LatticeFrame, tips, radius, corner, margin, half, least, out):
+def overlaps(heights, pooled, side, frame: LatticeFrame, tips, shape, margin, half, least, out):
     """How far the stock stands above the cutter's bottom at tips (n, 3), mm: greatest over the disc; <= 0 is air.
 
     heights : (ny, nx) float64, of the stock at the nodes, or the most in the cells round them
@@ -170,7 +192,7 @@ def overlaps(heights, pooled, side, frame: LatticeFrame, tips, radius, corner, m
     least   : mm; what is less comes out as this, and squares that hold no more are not looked at
     """
     for k in range(len(tips)):
-        out[k] = _overlap(heights, pooled, side, frame, tips[k], radius, corner, margin, half, least)
+        out[k] = _overlap(heights, pooled, side, frame, tips[k], shape, margin, half, least)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)

@@ -343,8 +343,10 @@ def from_walls(field: TipField, z: float, distance: float) -> NDArray[np.bool_] 
 
 def _limits(field: TipField) -> TipLimits:
     """What keeps the tip of a field's tool up, beside the obstacles, for kernels."""
-    rows = Outline.bull(field.grown_radius, field.grown_corner).stack.rows
-    return TipLimits(field.noncut, *field.coarse.frame, field.grown_radius, field.grown_corner, field.allowance, rows)
+    side = field.grown_side
+    outline = Outline.bull(field.grown_radius, field.grown_corner) if side is None else \
+        Outline.tapered(field.grown_radius, field.grown_corner, side.taper, side.widest)
+    return TipLimits(field.noncut, *field.coarse.frame, field.shape, field.allowance, outline.stack.rows)
 
 
 def _flat(points: F64) -> NDArray[np.complex128]:

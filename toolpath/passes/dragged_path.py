@@ -55,8 +55,7 @@ def follow(limit: Limit | TipLimit, way: F64, step: float, tolerance: float) -> 
 
 def limit_of(field: TipField) -> TipLimit:
     """The tip limit of a field, as ``TipField.tips``, for compiled loops."""
-    return TipLimit(field.tree.arrays, field.grown_radius, field.grown_corner, field.allowance, field.noncut,
-                    field.coarse.frame)
+    return TipLimit(field.tree.arrays, field.shape, field.allowance, field.noncut, field.coarse.frame)
 
 
 def _cut(limit: Limit, way: F64, corners: F64, at: F64, tolerance: float) -> tuple[F64, F64]:

@@ -145,6 +145,7 @@ class ZoneLayout:
         settings, steep, tool = self.settings, self.zone.form is AreaForm.STEEP, self.field.tool
         requested = not steep and settings.pattern is not Pattern.AUTO
         suited = isoparametric.suits(tool) and self.zone.form is not AreaForm.LEVEL and not requested
+        suited = suited and not (steep and tool.taper > 0.0)  # along walls they count on an upright flank
         faces = [face for face in self.faces if not face.flat]
         if not (suited and faces and self.given):
             return None, ()

@@ -70,7 +70,7 @@ class SeparatePlaces:
         found = below[window] if place is None else below[window] & place.mask[window]
         if ndimage.label(found, BESIDE)[1] < 2:  # one at most, and growing them joins more
             return []
-        wide = max([field.tool.radius, *(field.disc_radius(disc, 1.0) for disc in field.discs
+        wide = max([field.tool.widest_radius, *(field.disc_radius(disc, 1.0) for disc in field.discs
                                          if self._lowest + disc.height < self._highest)])
         grow = int(np.ceil(0.5 * wide / lat.step))
         joined, count = ndimage.label(dilated(np.pad(found, grow), float(grow)), BESIDE)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.mesh_queries.drop import one_thread
+from geometry.mesh_queries.drop import cutter_shape, one_thread
 from geometry.tool_body import ToolBody
 from toolpath.counterexamples import NONE, Counterexamples
 from toolpath.kernels.engaged import joined, sectors, sectors_parallel
@@ -43,7 +43,7 @@ def angles(stock: StockMap, points: F64, tool: ToolBody) -> F64:
     met = np.zeros(len(points), np.int64)
     mark = sectors if one_thread(int(len(points) * (tool.radius / lat.step) ** 2)) else sectors_parallel
     tips = np.ascontiguousarray(points)
-    mark(stock.top, lat.x0, lat.y0, lat.step, tips, np.ascontiguousarray(ways), tool.radius, tool.corner_radius,
+    mark(stock.top, lat.x0, lat.y0, lat.step, tips, np.ascontiguousarray(ways), cutter_shape(tool),
          SKIN_SHARE * tool.radius, met)
     joined(met, tips, WINDOW * tool.radius, out)
     return out

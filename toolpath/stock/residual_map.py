@@ -158,6 +158,10 @@ def _poses(tips: F64, axes: F64) -> tuple[F64, F64]:
 
 
 def _sizes(tool: ToolBody) -> CutterSizes:
+    if tool.taper > 0.0:
+        wide = tool.widest_radius
+        return CutterSizes(wide, wide - tool.radius + tool.corner_radius, tool.flute_length, tool.flute_length,
+                           tool.corner_radius, tool.taper)
     return CutterSizes(tool.radius, tool.corner_radius, tool.flute_length)
 
 

@@ -18,7 +18,7 @@ from scipy import ndimage
 
 from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
-from geometry.mesh_queries.drop import one_thread
+from geometry.mesh_queries.drop import cutter_shape, one_thread
 from geometry.mesh_queries.flat_grid import drop_over_flats
 from geometry.tool_body import ToolBody
 from toolpath.kernels.shell import Ceilings, PoseArrays, highest_of_four, stands_in
@@ -235,7 +235,7 @@ class StockMap:
         points : (n, 3) float64, mm, access frame
         """
         lat, self._ceilings = self.lattice, None
-        stamp(self.top, self.cover, lat.frame, np.ascontiguousarray(points), tool.radius, tool.corner_radius)
+        stamp(self.top, self.cover, lat.frame, np.ascontiguousarray(points), cutter_shape(tool))
 
     @contextmanager
     def undone(self, box: F64) -> Iterator[None]:
@@ -311,7 +311,7 @@ class StockMap:
         out = np.empty(len(tips))
         lat = self.lattice
         call = overlaps if one_thread(len(tips)) else overlaps_parallel
-        call(self.top, self._pooled, POOLED, lat.frame, np.ascontiguousarray(tips), tool.radius, tool.corner_radius,
+        call(self.top, self._pooled, POOLED, lat.frame, np.ascontiguousarray(tips), cutter_shape(tool),
              rim * lat.step, 0.0, lower_bound, out)
         return out
 
@@ -327,8 +327,8 @@ class StockMap:
         reach = tool.radius - 0.5 * tool.corner_radius
         out, lat = np.empty(len(tips)), self.lattice
         half = HALF_DIAGONAL * lat.step
-        overlaps(self.cover, self._covered, POOLED, lat.frame, np.ascontiguousarray(tips), tool.radius,
-                 tool.corner_radius, reach + half - tool.radius, half, lower_bound, out)
+        overlaps(self.cover, self._covered, POOLED, lat.frame, np.ascontiguousarray(tips),
+                 cutter_shape(tool), reach + half - tool.widest_radius, half, lower_bound, out)
         return out
 
     def above(self, z: float, lattice: Lattice) -> NDArray[np.bool_]:
@@ -354,8 +354,8 @@ class StockMap:
         tips : (n, 3) float64, mm, access frame
         """
         out, lat = np.empty(len(tips)), self.lattice
-        standing(self.cover, self.part, lat.frame, np.ascontiguousarray(tips), tool.radius, HALF_DIAGONAL * lat.step,
-                 out)
+        standing(self.cover, self.part, lat.frame, np.ascontiguousarray(tips), tool.widest_radius,
+                 HALF_DIAGONAL * lat.step, out)
         return out
 
     def meets_bodies(self, tips: F64, bodies: Sequence[Disc]) -> NDArray[np.bool_]:

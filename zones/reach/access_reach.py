@@ -42,7 +42,7 @@ def able(tool: ToolBody, normals: F64, scallop: float) -> NDArray[np.bool_]:
 
 def preference(tool: ToolBody, form: AreaForm) -> tuple[float, float, float]:
     """Sort key of the tools for a form, best first: flat ends on level planes, then stout and short ones."""
-    kind = {"flat": 0.0, "bull": 1.0, "ball": 2.0}[tool.kind] if form is AreaForm.LEVEL else 0.0
+    kind = {"flat": 0.0, "bull": 1.0, "ball": 2.0}[tool.end] if form is AreaForm.LEVEL else 0.0
     return (kind, -tool.diameter, tool.stickout)
 
 

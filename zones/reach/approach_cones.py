@@ -27,6 +27,7 @@ GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 CHUNK_PAIRS = 400_000  # pairs of sample and direction in one batch
 CANDIDATES = 4000  # axes to try for a cone before the best is refined
 ROUNDING = 1e-9  # rad
+SIDE_SLICES = 24  # of the leaning side of a tapered mill
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +71,10 @@ def assembly(tool: ToolBody, clear: Clearances, allowance: float) -> F64:
     Bodies above one that is as wide are left out.
     """
     rows = [(tool.radius + allowance, max(tool.corner_radius + allowance, 0.0), -allowance)]
+    if tool.taper > 0.0:  # the leaning side as slices that enclose it
+        (wide, high), rise = tool.corner_end, tool.flute_length - tool.corner_end[1]
+        rows += [(wide + tool.taper * rise * (k + 1) / SIDE_SLICES + allowance, 0.0,
+                  high + rise * k / SIDE_SLICES - allowance) for k in range(SIDE_SLICES)]
     for d in sorted(discs_of(tool, clear), key=lambda d: (d.height, -d.radius)):
         if d.radius + allowance > rows[-1][0]:
             rows.append((d.radius + allowance, 0.0, d.height - allowance))

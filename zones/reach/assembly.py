@@ -35,7 +35,7 @@ def discs_of(tool: ToolBody, clear: Clearances) -> tuple[Disc, ...]:
     Frusta are cut into slices, each as wide as its widest end. Bodies no wider than the cutter are left out.
     """
     out: list[Disc] = []
-    if tool.shank_diameter > tool.diameter + 1e-9:
+    if tool.shank_diameter > 2.0 * tool.widest_radius + 1e-9:
         out.append(Disc("shank", tool.shank_diameter / 2 + clear.shank, tool.neck_length))
     z = tool.stickout
     for seg in tool.holder:
@@ -45,4 +45,4 @@ def discs_of(tool: ToolBody, clear: Clearances) -> tuple[Disc, ...]:
             b = seg.diameter + (seg.diameter_top - seg.diameter) * (k + 1) / n
             out.append(Disc("holder", max(a, b) / 2 + clear.holder, z + seg.length * k / n))
         z += seg.length
-    return tuple(d for d in out if d.radius > tool.radius + 1e-9)
+    return tuple(d for d in out if d.radius > tool.widest_radius + 1e-9)

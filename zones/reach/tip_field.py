@@ -24,7 +24,7 @@ from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
-from geometry.mesh_queries.drop import blocked_many, drop_along, drop_tips
+from geometry.mesh_queries.drop import LeaningSide, Shape, blocked_many, drop_along, drop_shape, drop_tips
 from geometry.mesh_queries.flat_grid import drop_over_flats
 from geometry.tool_body import ToolBody
 from zones.kernels.lattice import noncut_blocked, noncut_lookup
@@ -151,6 +151,21 @@ class TipField:
         return self.tool.corner_radius + self.allowance
 
     @property
+    def grown_side(self) -> LeaningSide | None:
+        """Side of a tapered cutting part with the allowance; None for an upright one."""
+        return self._side(0.0)
+
+    @property
+    def shape(self) -> Shape:
+        """The cutting part with the allowance, as compiled loops take it."""
+        return drop_shape(self.grown_radius, self.grown_corner, self.grown_side)
+
+    def _side(self, wider: float) -> LeaningSide | None:
+        """``grown_side`` of a cutting part whose radius is ``wider`` mm larger than it is."""
+        tool = self.tool
+        return LeaningSide(tool.taper, tool.widest_radius + self.allowance + wider) if tool.taper > 0.0 else None
+
+    @property
     def cut_height(self) -> F64:
         """(ny, nx) float64, mm: tip limit of the cutting part alone at the lattice nodes."""
         if self._cut is None:
@@ -161,7 +176,7 @@ class TipField:
         """(ny, nx) float64, mm: ``cut_height`` computed anew, not kept: other threads may use the field meanwhile."""
         lat = self.lattice
         return drop_over_flats(self.tree, lat.x0, lat.y0, lat.step, lat.nx, lat.ny, self.grown_radius,
-                               self.grown_corner) + self.allowance
+                               self.grown_corner, side=self.grown_side) + self.allowance
 
     def know(self, heights: F64) -> None:
         """Take over what ``cut_heights`` has computed.
@@ -266,7 +281,7 @@ class TipField:
         xy : (n, 2) float64, mm, in plan
         """
         xy = np.ascontiguousarray(xy, dtype=np.float64)
-        out = drop_tips(self.tree, xy, self.grown_radius, self.grown_corner) + self.allowance
+        out = drop_tips(self.tree, xy, self.grown_radius, self.grown_corner, side=self.grown_side) + self.allowance
         return np.asarray(np.maximum(out, noncut_lookup(self.noncut, self.coarse.frame, xy)))
 
     def tips_along(self, xy: F64) -> F64:
@@ -277,7 +292,7 @@ class TipField:
         Returns (n,) float64, mm.
         """
         xy = np.ascontiguousarray(xy, dtype=np.float64)
-        out = drop_along(self.tree, xy, self.grown_radius, self.grown_corner) + self.allowance
+        out = drop_along(self.tree, xy, self.grown_radius, self.grown_corner, self.grown_side) + self.allowance
         return np.asarray(np.maximum(out, noncut_lookup(self.noncut, self.coarse.frame, xy)))
 
     def blocked_by_cutter(self, tips: F64, wider: float = 0.0) -> NDArray[np.bool_]:
@@ -288,7 +303,7 @@ class TipField:
         """
         lowered = np.array(tips, dtype=np.float64)
         lowered[:, 2] -= self.allowance
-        return blocked_many(self.tree, lowered, self.grown_radius + wider, self.grown_corner)
+        return blocked_many(self.tree, lowered, self.grown_radius + wider, self.grown_corner, self._side(wider))
 
     def blocked_by_body(self, tips: F64) -> NDArray[np.bool_]:
         """(n,) bool: shank or holder come nearer than their clearance at tips.

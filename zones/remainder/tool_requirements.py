@@ -114,9 +114,9 @@ class ToolRequirement:
         """
         body = self.body(cutter)
         rows = np.flatnonzero(able(body, samples.normals, self.cusp))
-        bare = replace(body, shank_diameter=body.diameter, holder=())
-        field = TipField(self.view.obstacles, bare, self.clear, self.view.part.bounds, body.radius, lattice_step(body),
-                         self.allowance, self.cusp)
+        bare = replace(body, shank_diameter=2.0 * body.widest_radius, holder=())
+        field = TipField(self.view.obstacles, bare, self.clear, self.view.part.bounds, body.widest_radius,
+                         lattice_step(body), self.allowance, self.cusp)
         _, fits, tips = touchable(field, samples.points[rows], samples.normals[rows], self.lift)
         return rows[fits], tips[fits]
 

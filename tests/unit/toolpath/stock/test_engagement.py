@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from geometry.kernels.drop import bull_of
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, tool
 from toolpath.counterexamples import Counterexamples
@@ -68,8 +69,9 @@ def test_the_kernel_says_what_the_obvious_twin_says(corner):
     ways = np.column_stack([np.cos(turn), np.sin(turn)])
     given = (top, 0.05, -0.03, 0.1, tips, ways, 1.0, corner, 0.05)
     met, again, got = np.zeros(12, np.int64), np.zeros(12, np.int64), np.empty(12)
-    sectors(*given, met)
-    sectors_parallel(*given, again)
+    compiled = (*given[:6], bull_of(1.0, corner), 0.05)
+    sectors(*compiled, met)
+    sectors_parallel(*compiled, again)
     joined(met, tips, 0.9, got)
     assert np.allclose(got, twin(*given, 0.9)) and 0.0 < got.min() < got.max()
     assert np.array_equal(met, again)
