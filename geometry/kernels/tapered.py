@@ -64,14 +64,17 @@ def tapered_of(radius, corner_radius, taper, widest):
     long = math.sqrt(1.0 + taper * taper)
     join, high = d + r / long, r * (1.0 - taper / long)
     wide = max(widest, join)
-    return Tapered(wide, r, d, join, high, 1.0 / taper, _bend(r, d, join, high, wide, high + (wide - join) / taper))
+    return Tapered(wide, r, d, join, high, 1.0 / taper, _bend(r, d, join, high, wide, high + (wide - join) / taper, 1.0 / taper))
 
 
 @njit(**KERNEL)
-def _bend(r, d, join, high, wide, top):
-    """2 (h(R) - h) / (R^2 - rho^2) where it is largest on [0, join]: where the line through R touches the corner."""
-    if wide <= join:
-        return math.inf
+def _bend(r, d, join, high, wide, top, grade):
+    """2 (h(R) - h) / (R^2 - rho^2) where it is largest on [0, join]: where the line through R touches the corner.
+
+    That is no more than the slope of the corner at the join, which counts where there is next to no side.
+    """
+    if wide <= join * (1.0 + 1e-9):
+        return grade / join
     w = wide * wide
     if r <= 0.0:
         return 2.0 * top / (w - d * d)
@@ -116,7 +119,7 @@ def _widened(shape, off):
     flat, join, wide = shape.flat + off, shape.join + off, shape.radius + off
     top = shape.high + (wide - join) * shape.grade
     return Tapered(wide, shape.corner, flat, join, shape.high, shape.grade,
-                   _bend(shape.corner, flat, join, shape.high, wide, top))
+                   _bend(shape.corner, flat, join, shape.high, wide, top, shape.grade))
 
 
 @for_shape(revolved.facet_contact, Tapered)

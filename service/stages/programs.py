@@ -246,7 +246,8 @@ def _wide_of_doglegs(clamping: Clamping, box: F64, level: float, leans: float, t
 
 def _widest(tool: ToolBody) -> float:
     """mm, largest radius of an assembly."""
-    return max([tool.widest_radius, 0.5 * tool.shank_diameter, *(0.5 * max(h.diameter, h.diameter_top) for h in tool.holder)])
+    holder = (0.5 * max(h.diameter, h.diameter_top) for h in tool.holder)
+    return max([tool.widest_radius, 0.5 * tool.shank_diameter, *holder])
 
 
 def turning_of(ready: Prepared, view: View) -> RotaryAxes | None:

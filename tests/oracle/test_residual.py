@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numba
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
+from geometry.tool_body import ToolBody
 from tests.hand_parts import ball, tool
 from tests.plan_checks import dense
 from toolpath.stock.residual_map import UNTOUCHED, ResidualMap
 
 SPACING = 0.004
+TAPERED = ToolBody("T1", 1, 1.0, 0.5, 6.0, 0.5, 6.0, 0.5, 6.0, taper=0.1)
 
 
 def slow(points, path, body):
@@ -51,6 +56,51 @@ def test_the_measure_is_that_of_dense_tips(body, seed):
         return  # on an inclined move the measure of a bull nose is an upper bound only
     np.testing.assert_allclose(made.residual[close & seen], true[close & seen], atol=2e-4)
     assert (made.residual[~out] <= 2e-4).all()
+
+
+@pytest.mark.parametrize("body", [TAPERED, replace(TAPERED, corner_radius=0.4, diameter=2.0),
+                                  replace(TAPERED, corner_radius=0.0)], ids=lambda b: b.kind)
+@pytest.mark.parametrize("level", [True, False])
+def test_the_measure_of_a_tapered_mill_is_that_of_dense_tips(body, level):
+    rng = np.random.default_rng(3)
+    path = np.cumsum(rng.normal(size=(7, 3)) * [1.5, 1.5, 0.0 if level else 0.4], axis=0)
+    near = dense(path, 0.05)
+    n = 1000
+    c, a = near[rng.integers(0, len(near), n)], rng.random(n) * 2 * np.pi
+    high = rng.random(n) * body.flute_length
+    outline = np.array([width(body, h) for h in high]) + np.abs(rng.normal(size=n) * 0.01)
+    points = c + np.column_stack([outline * np.cos(a), outline * np.sin(a), high])
+    # the normal only tells level places and walls apart
+    made = ResidualMap(points, np.tile([0.6, 0.0, 0.8], (n, 1)))
+    made.cut(path, body)
+    true = np.full(n, np.inf)
+    for tip in dense(path, 5.0 * SPACING):
+        rho, h = np.hypot(points[:, 0] - tip[0], points[:, 1] - tip[1]), points[:, 2] - tip[2]
+        true = np.minimum(true, off_mill(body, rho, h))
+    out, seen = true > 1e-4, made.residual < UNTOUCHED
+    assert (out & seen).sum() > 30
+    assert (made.residual[seen & out] >= true[seen & out] - 1e-3).all()
+    if level:
+        np.testing.assert_allclose(made.residual[seen & out], true[seen & out], atol=1e-3)
+
+
+def width(body, h):
+    """Radius of a tapered mill at height h."""
+    wide, high = body.corner_end
+    if h >= high:
+        return wide + body.taper * (h - high)
+    r = body.corner_radius
+    return body.radius - r + np.sqrt(max(r * r - (r - h) ** 2, 0.0))
+
+
+def off_mill(body, rho, h):
+    """Distance from places outside to the outline of a tapered mill that goes on above, as to 4000 of its points."""
+    at = np.linspace(0.0, 3.0 * body.flute_length, 4000)
+    outline = np.column_stack([[width(body, x) for x in at], at])
+    flat = np.column_stack([np.linspace(0.0, outline[0, 0], 50), np.zeros(50)])
+    near = cKDTree(np.vstack([flat, outline])).query(np.column_stack([rho, h]))[0]
+    inside = (h >= 0.0) & (rho < np.interp(h, at, outline[:, 0]))
+    return np.where(inside, -near, near)
 
 
 def test_several_passes_only_lower():

@@ -163,7 +163,8 @@ class Finish:
             return self._rounds(step_id, every)
         self.settled = True
         other, refused = self.layout.along_borders
-        leans = self.settings.turning is not None and self.field.tool.taper == 0.0 and bool(self.faces) and len(every) > 0 and bool(every.all())
+        leans = self.settings.turning is not None and self.field.tool.taper == 0.0
+        leans = leans and bool(self.faces) and len(every) > 0 and bool(every.all())
         if other is None and not leans:
             self.strategy = replace(self.strategy, rejected=(*self.strategy.rejected, *refused))
             return self._rounds(step_id, every)

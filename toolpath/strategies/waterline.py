@@ -27,9 +27,9 @@ def level_step(tool: ToolBody, normals: F64, cusp: float, step_down: float) -> f
     Notes
     -----
     On a wall inclined by n_z a corner r leaves s^2/(8 r) between lines s apart along the wall, s = dz/sin. The flank
-    above the corner leaves no more than dz n_z; where it leans by an angle, so much less that the wall's own lean counts
-    from it. The greater dz of the two holds for each sample. The 5 % quantile over the area is taken; the measurement
-    finds the rest. Second order in the cusp.
+    above the corner leaves no more than dz n_z; n_z counts from the side of the tool where that leans. The greater dz
+    of the two holds for each sample. The 5 % quantile over the area is taken; the measurement finds the rest. Second
+    order in the cusp.
     """
     nz = np.abs(normals[:, 2])
     by_corner = math.sqrt(8.0 * cusp * tool.corner_radius) * np.sqrt(np.maximum(1.0 - nz * nz, 0.0))

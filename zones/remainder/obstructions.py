@@ -44,6 +44,6 @@ def over_the_part(fields: Mapping[str, TipField], bare: TriangleTree, bounds: F6
     bounds : (2, 3) float64, mm, of the part, access frame
     """
     standing = DiscHeights(bare)
-    return {t: TipField(bare, f.tool, clear, bounds, f.tool.widest_radius + AIR, lattice_step(f.tool), f.allowance, f.cusp,
-                        standing)
+    return {t: TipField(bare, f.tool, clear, bounds, f.tool.widest_radius + AIR, lattice_step(f.tool), f.allowance,
+                        f.cusp, standing)
             for t, f in fields.items()}
