@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import SetupError
+from geometry.kernels.cutter_sizes import CutterSizes
 from geometry.mesh import F64, I32
 from geometry.tool_body import ToolBody
 from verify.kernels.tables import MoveArrays
@@ -73,7 +74,7 @@ class Moves:
 def cutter_table(tools: Sequence[ToolBody]) -> F64:
     """Sizes of the cutting parts of k tools, as rows of ``geometry.kernels.cutter_sizes.CutterSizes``.
 
-    Returns (k, 4) float64, mm, in the tool frame.
+    Returns (k, 6) float64, mm, in the tool frame; the last column, a tangent, is dimensionless.
 
     Flutes that end at the corner to the rounding of its height reach to it.
 
@@ -82,12 +83,25 @@ def cutter_table(tools: Sequence[ToolBody]) -> F64:
     SetupError
         Code flute_too_short: the flutes end inside the corner of the cutting part.
     """
-    corner = [2.0 * t.corner_radius if t.kind == "bull" else max(t.corner_radius, t.cone_height) for t in tools]
+    corner = [2.0 * t.corner_radius if t.end == "bull" else max(t.corner_end[1], t.cone_height) for t in tools]
     for tool, corner_height in zip(tools, corner, strict=True):
         if tool.flute_length < corner_height - FLUTE_ROUNDING:
             raise SetupError(
                 f"{tool.id}: the flute length {tool.flute_length} mm ends inside the corner of the cutting part",
                 code="flute_too_short", subjects=(tool.id,), measured=tool.flute_length, limit=corner_height,
                 remedy="give the flute length measured from the tip")
-    return np.array([[t.radius, t.corner_width, max(t.flute_length, high), t.cone_height]
-                     for t, high in zip(tools, corner, strict=True)]).reshape(-1, 4)
+    return np.array([cutter_sizes(t, max(t.flute_length, high)) for t, high in zip(tools, corner, strict=True)],
+                    dtype=np.float64).reshape(-1, 6)
+
+
+def cutter_sizes(tool: ToolBody, length: float | None = None) -> CutterSizes:
+    """Sizes of the cutting part of a tool, mm, in the tool frame.
+
+    length : mm, its height over the tip; None: the flute length
+    """
+    high = tool.flute_length if length is None else length
+    if tool.taper <= 0.0:
+        return CutterSizes(tool.radius, tool.corner_width, high, tool.cone_height)
+    wide, low = tool.corner_end
+    radius, flat = wide + tool.taper * (high - low), tool.radius - tool.corner_width
+    return CutterSizes(radius, radius - flat, high, high, tool.corner_width, tool.taper)

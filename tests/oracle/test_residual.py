@@ -95,7 +95,7 @@ def width(body, h):
 
 def off_mill(body, rho, h):
     """Distance from places outside to the outline of a tapered mill that goes on above, as to 4000 of its points."""
-    at = np.linspace(0.0, 3.0 * body.flute_length, 4000)
+    at = 3.0 * body.flute_length * np.linspace(0.0, 1.0, 6000)**2
     outline = np.column_stack([[width(body, x) for x in at], at])
     flat = np.column_stack([np.linspace(0.0, outline[0, 0], 50), np.zeros(50)])
     near = cKDTree(np.vstack([flat, outline])).query(np.column_stack([rho, h]))[0]

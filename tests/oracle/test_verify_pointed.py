@@ -9,9 +9,7 @@ import pytest
 from geometry.kernels.cutter_sizes import CutterSizes
 from geometry.tool_body import ToolBody
 from tests.hand_parts import box_mesh
-from verify.kernels.engaged import bottom as end_height
-from verify.kernels.engaged import edge_radius
-from verify.kernels.heights import entered, lowest
+from verify.kernels.heights import bottom, edge_radius, entered, lowest
 from verify.kernels.profile import carried, standing
 from verify.kernels.rays import gap, new_left
 from verify.kernels.stock import PLUNGE
@@ -69,7 +67,7 @@ def test_rays_meet_the_union_of_standing_tools(part):
         assert lo <= t[held].min() + 1e-9 and hi >= t[held].max() - 1e-9
         for at in (lo, 0.5 * (lo + hi), hi):
             p = q + at * n
-            assert carried(*p, *d, part[0] - part[1], part[1], part[2], part[3]) <= 2e-5, (q, d, n, at)
+            assert carried(*p, *d, CutterSizes(*part)) <= 2e-5, (q, d, n, at)
     assert met > 15
 
 
@@ -93,10 +91,10 @@ def test_rays_along_the_side_of_the_cone_and_along_the_move(part):
 
 @pytest.mark.parametrize("part", PARTS)
 def test_distances_are_those_of_the_outline(part):
-    radius, corner, length, cone = part
+    length, cutter = part[2], CutterSizes(*part)
     rng, line = np.random.default_rng(1), outline(part)
     for rho, h in rng.uniform([0.0, -2.0], [4.0, length + 1.0], (400, 2)):
-        got = standing(rho, h, radius - corner, corner, length, cone)
+        got = standing(rho, h, cutter)
         far = np.hypot(line[:, 0] - rho, line[:, 1] - h).min()
         if inside(rho, h, part):
             # a cutting part ends at its length: that is no wall of the inside unless it is the nearest
@@ -109,24 +107,21 @@ def test_distances_are_those_of_the_outline(part):
 
 @pytest.mark.parametrize("part", PARTS)
 def test_carried_is_the_least_of_standing(part):
-    radius, corner, length, cone = part
-    s = np.linspace(0.0, 1.0, 401)
+    cutter, s = CutterSizes(*part), np.linspace(0.0, 1.0, 401)
     for q, d, _ in random_cases(3, 50):
-        want = min(standing(np.hypot(q[0] - k * d[0], q[1] - k * d[1]), q[2] - k * d[2], radius - corner, corner,
-                            length, cone) for k in s)
-        got = carried(*q, *d, radius - corner, corner, length, cone)
+        want = min(standing(np.hypot(q[0] - k * d[0], q[1] - k * d[1]), q[2] - k * d[2], cutter) for k in s)
+        got = carried(*q, *d, cutter)
         assert want - 1e-2 <= got <= want + 2e-5
-        assert gap(*q, *d, d[0] ** 2 + d[1] ** 2, CutterSizes(*part)) <= got + 2e-5
+        assert gap(*q, *d, d[0] ** 2 + d[1] ** 2, cutter) <= got + 2e-5
 
 
 @pytest.mark.parametrize("grow", [0.0, 0.7])
 @pytest.mark.parametrize("part", PARTS)
 def test_lowest_is_the_least_of_many_standing_tools(part, grow):
-    radius, corner, _, cone = part
-    s, met = np.linspace(0.0, 1.0, 40_001), 0
+    radius, s, met = part[0], np.linspace(0.0, 1.0, 40_001), 0
     for q, d, _ in random_cases(2, 60):
         x, y = q[:2]
-        got, touch = lowest(x, y, 0.0, 0.0, 0.3, *d, radius, corner, grow, cone)
+        got, touch = lowest(x, y, 0.0, 0.0, 0.3, *d, CutterSizes(*part), grow)
         rho = np.hypot(x - s * d[0], y - s * d[1])
         want = (0.3 + s * d[2] + height(rho, part, grow)).min()
         if np.isinf(want):
@@ -148,21 +143,20 @@ def test_what_is_left_on_a_normal_is_where_the_tool_begins(part):
 
 @pytest.mark.parametrize("part", PARTS)
 def test_how_deep_a_line_is_entered(part):
-    radius, corner, _, cone = part
-    s = np.linspace(0.0, 1.0, 20_001)
+    radius, s = part[0], np.linspace(0.0, 1.0, 20_001)
     for q, d, _ in random_cases(4, 60):
         rho = np.hypot(q[0] - s * d[0], q[1] - s * d[1])
         deep = np.minimum(radius - rho, q[2] - s * d[2] - height(np.minimum(rho, radius), part))
         want = float(deep[rho <= radius].max(initial=-1.0))
-        got = entered(q[0], q[1], q[2], *d, radius, corner, cone)
+        got = entered(q[0], q[1], q[2], *d, CutterSizes(*part))
         assert got < 0.0 if want < -1e-3 else got == pytest.approx(want, abs=1e-3)
 
 
 def test_the_edge_is_as_wide_as_the_cone_there():
-    radius, corner, _, cone = PARTS[1]
+    cutter = CutterSizes(*PARTS[1])
     for over, wide in ((0.0, 0.6), (0.7, 1.3), (1.4, 2.0), (3.0, 2.0)):
-        assert edge_radius(over, radius, corner, cone) == pytest.approx(wide)
-    assert [end_height(r, radius, corner, cone) for r in (0.3, 0.6, 1.3, 2.0)] == pytest.approx([0.0, 0.0, 0.7, 1.4])
+        assert edge_radius(over, cutter) == pytest.approx(wide)
+    assert [bottom(r, cutter) for r in (0.3, 0.6, 1.3, 2.0)] == pytest.approx([0.0, 0.0, 0.7, 1.4])
 
 
 DRILL = ToolBody("T1", 1, 3.0, 0.0, 12.0, 3.0, 12.0, 3.0, 30.0, (), "drill", 0.0, 0.9)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from geometry.kernels.cutter_sizes import CutterSizes
 from geometry.kernels.nearest import triangle2
 from geometry.mesh import TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
@@ -32,7 +33,7 @@ def test_lowest_is_the_least_of_many_standing_tools(radius, corner, grow):
     for case in range(60):
         d = rng.normal(size=3) * np.array([[1, 1, 1], [1, 1, 0], [0, 0, 1]][case % 3])
         a, (x, y) = rng.normal(size=3), rng.uniform(-2, 2, 2)
-        got, touch = lowest(x, y, *a, *d, radius, corner, grow)
+        got, touch = lowest(x, y, *a, *d, CutterSizes(radius, corner, 9.0), grow)
         rho = np.hypot(x - a[0] - s * d[0], y - a[1] - s * d[1])
         want = (a[2] + s * d[2] + profile(rho, radius, corner, grow)).min()
         if np.isinf(want):

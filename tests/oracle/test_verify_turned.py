@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
+from geometry.kernels.cutter_sizes import CutterSizes
 from tests.machined_cases import mill
 from tests.oracle.turning_twin import least_left, random_moves, random_rays, seen, signed
 from verify.kernels.pose import MAX_ANGLE, PIECE, fill_piece, near_segment2, pieces, turned, view
@@ -113,7 +114,7 @@ def test_a_standing_cutting_part_is_as_far_as_its_profile(kind):
                            np.stack([np.full(4001, tool.radius), up], 1),
                            np.stack([np.linspace(0, tool.radius, 2001), np.full(2001, length)], 1)])
     for rho, h in rng.uniform([0, -3], [5, length + 3], (400, 2)):
-        got = standing(rho, h, flat, corner, length)
+        got = standing(rho, h, CutterSizes(flat + corner, corner, length))
         want = np.linalg.norm(line - [rho, h], axis=1).min()
         assert got == pytest.approx(float(signed(np.array(rho), np.array(h), tool)), abs=1e-12)
         if h > length:
@@ -132,7 +133,7 @@ def test_carried_is_the_least_over_the_way(kind):
         q = rng.uniform([-6, -6, -4], [6, 6, length + 4])
         w = q - s * d
         want = signed(np.hypot(w[:, 0], w[:, 1]), w[:, 2], tool).min()
-        got = carried(*q, *d, flat, corner, length)
+        got = carried(*q, *d, CutterSizes(flat + corner, corner, length))
         apart = float(np.linalg.norm(d)) / 20_000  # between two places of the twin
         assert want - apart - 1e-12 <= got <= want + FINE
 

@@ -155,7 +155,7 @@ def _lower_part(points, cells, part, cutter, margin, least, stack):
     """
     cell_start, cell_items, gx, gy, cell = cells.start, cells.items, cells.x0, cells.y0, cells.size
     ncx, ncy = cells.ncx, cells.ncy
-    radius, corner, flute, _cone = cutter
+    radius, corner, flute = cutter.radius, cutter.corner, cutter.length
     theta = part[12]
     cosine, sine = np.cos(0.5 * theta), np.sin(0.5 * theta)
     length = np.sqrt(part[3] ** 2 + part[4] ** 2 + part[5] ** 2)

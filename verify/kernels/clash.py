@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from geometry.kernels.cutter_sizes import CutterSizes
+from geometry.kernels.cutter_sizes import sizes_of
 from geometry.kernels.options import KERNEL
 from verify.kernels.frustum import Frustum, at_least, clear_of, contact, no_deeper
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
@@ -75,8 +75,7 @@ def _meet_point(p, x, y, z, cutter, bodies, b, grow, slack, known):
         body, clearance = bodies[b], bodies[b, 4] + grow
         return contact(qx, qy, qz, dx, dy, dz, Frustum(body[0], body[1], body[2] + grow, body[3] + grow), clearance,
                        slack, known, False)
-    a, r, length, cone = cutter.radius - cutter.corner, cutter.corner, cutter.length, cutter.cone
-    bare = -carried(qx, qy, qz, dx, dy, dz, a, r, length, cone)
+    bare = -carried(qx, qy, qz, dx, dy, dz, cutter)
     if bare > slack:
         return grow + bare
     return grow - beside(qx, qy, qz, dx, dy, dz, cutter, 0.0, grow, slack) if known < grow else 0.0
@@ -87,8 +86,7 @@ def clear_point(p, x, y, z, cutter, bodies, b):
     """Distance of a point to body b of a tool on piece p, mm; b < 0 is the cutting part; 0 inside."""
     qx, qy, qz, dx, dy, dz = view(p, x, y, z)
     if b < 0:
-        return max(carried(qx, qy, qz, dx, dy, dz, cutter.radius - cutter.corner, cutter.corner, cutter.length,
-                           cutter.cone), 0.0)
+        return max(carried(qx, qy, qz, dx, dy, dz, cutter), 0.0)
     return clear_of(qx, qy, qz, dx, dy, dz, bare_body(bodies, b), False)
 
 
@@ -194,7 +192,7 @@ def clash_chunk(chunk, cloud: PointArrays, moves: MoveArrays, axes: AxisArrays, 
         far = reach[k] + rad + bow + max(limits.rapid, rooms[m])
         if near_segment2(x, y, z, starts[m], ends[m]) > far * far:
             continue
-        cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3])
+        cutter = sizes_of(cutters, k)
         grow = 0.0 if feed or free[m] else limits.rapid
         length2 = (ends[m, 0] - starts[m, 0]) ** 2 + (ends[m, 1] - starts[m, 1]) ** 2 + (ends[m, 2] - starts[m, 2]) ** 2
         n = pieces(angle[m], math.sqrt(length2), reach[k], bow)

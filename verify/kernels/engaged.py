@@ -19,7 +19,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from geometry.kernels.cutter_sizes import CutterSizes, side_height
 from geometry.kernels.options import KERNEL
+from verify.kernels.heights import edge_radius
 
 SECTORS = 64
 """All round."""
@@ -47,42 +49,23 @@ class EngagedArrays(NamedTuple):
 
 
 @njit(**KERNEL)
-def edge_radius(over, radius, corner, cone=0.0):
-    """Radius of the profile ``over`` mm above the tip, over >= 0."""
-    if over >= (cone if cone > 0.0 else corner):
-        return radius
-    if cone > 0.0:
-        return radius - corner + over * corner / cone
-    return radius - corner + math.sqrt(max(over * (2.0 * corner - over), 0.0))
-
-
-@njit(**KERNEL)
-def bottom(aside, radius, corner, cone=0.0):
-    """Height of the profile over the tip ``aside`` mm from the axis, aside <= radius."""
-    run = aside - radius + corner
-    if cone > 0.0:
-        return max(run, 0.0) * cone / corner
-    return corner - math.sqrt(max(corner * corner - run * run, 0.0)) if run > 0.0 else 0.0
-
-
-@njit(**KERNEL)
 def _sector(angle):
     return int(math.floor(angle / (2.0 * math.pi) * SECTORS)) % SECTORS
 
 
 @njit(**KERNEL)
-def sector_bits(wx, wy, dx, dy, plan, over, radius, corner, wide, twist, cone=0.0):
+def sector_bits(wx, wy, dx, dy, plan, over, cutter: CutterSizes, wide, twist):
     """Bits of the sectors in which a strip ``wide`` mm across meets the edge.
 
     (wx, wy) : of its middle off the tip; (dx, dy), plan : the way and its length; twist : rad, of this X and Y in the
     frame of the sectors; over : mm of stock over the tip there
     """
-    b, edge = (dx * wy - dy * wx) / plan, edge_radius(over, radius, corner, cone)
+    b, edge = (dx * wy - dy * wx) / plan, edge_radius(over, cutter)
     if edge <= 0.0 or abs(b) > edge:
         return np.int64(0)
     ahead = math.atan2(dy, dx) + twist
     low, high = math.asin(max((b - 0.5 * wide) / edge, -1.0)), math.asin(min((b + 0.5 * wide) / edge, 1.0))
-    if over >= (cone if cone > 0.0 else corner):  # no place beyond says where stock ends short of the side
+    if over >= side_height(cutter):  # no place beyond says where stock ends short of the side
         high = 0.5 * math.pi if b + wide > edge else high
         low = -0.5 * math.pi if b - wide < -edge else low
     bits, k, last = np.int64(0), _sector(ahead + low), _sector(ahead + high)

@@ -22,11 +22,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from geometry.kernels.cutter_sizes import CutterSizes
+from geometry.kernels.cutter_sizes import end_radius as end_of
+from geometry.kernels.cutter_sizes import side_height, sizes_of
 from geometry.kernels.options import KERNEL
 from verify.kernels.clash import SEARCHED, TOUCHING, bare_body, is_lift, keeps_off, nearest_known
-from verify.kernels.engaged import LEAST_DEPTH, EngagedArrays, bottom, edge_radius, sector_bits
+from verify.kernels.engaged import LEAST_DEPTH, EngagedArrays, sector_bits
 from verify.kernels.frustum import Frustum, clear_of, contact_of_ball, no_deeper
+from verify.kernels.heights import bottom, edge_radius
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, view
 from verify.kernels.profile import beside, carried
 from verify.kernels.rays import gap, plan_distance
@@ -141,8 +143,8 @@ def _cut_brick(stock, tile, brick, p, cutter, steep, end_radius, twist, engaged,
     """
     field, origin, h, band = stock
     i0, j0, k0 = tile[0] + 4 * brick[0], tile[2] + 4 * brick[1], tile[4] + 4 * brick[2]
-    radius, r, length, cone = cutter
-    a, corner = radius - r, (cone if cone > 0.0 else r)
+    radius, length, least = cutter.radius, cutter.length, LEAST_DEPTH * end_of(cutter)
+    corner, ball = side_height(cutter), cutter.cone == 0.0 and radius - cutter.corner <= 1e-12
     top = -1e30
     straight = p[30] == 0.0
     mx, my, mz = p[27], p[28], p[29]
@@ -169,11 +171,10 @@ def _cut_brick(stock, tile, brick, p, cutter, steep, end_radius, twist, engaged,
                             continue
                     qx, qy, qz, dx, dy, dz = view(p, origin[0] + i * h, origin[1] + j * h, origin[2] + k * h)
                     # the search that all but a ball ask for pays only where the node may be lowered
-                    if (a > 1e-12 or cone > 0.0) and gap(qx, qy, qz, dx, dy, dz, dx * dx + dy * dy,
-                                                         CutterSizes(a + r, r, length, cone)) >= v:
+                    if not ball and gap(qx, qy, qz, dx, dy, dz, dx * dx + dy * dy, cutter) >= v:
                         top = max(top, v)
                         continue
-                    d = max(carried(qx, qy, qz, dx, dy, dz, a, r, length, cone), -band)
+                    d = max(carried(qx, qy, qz, dx, dy, dz, cutter), -band)
                     if steep and -ON_NODE < d <= h - ON_NODE and v > 0.0 and qz - dz <= corner:
                         off = math.sqrt((qx - dx) ** 2 + (qy - dy) ** 2)
                         totals[4] += h * h * min(max(0.5 + (end_radius - off) / h, 0.0), 1.0)
@@ -190,14 +191,14 @@ def _cut_brick(stock, tile, brick, p, cutter, steep, end_radius, twist, engaged,
                             plan = math.sqrt(dx * dx + dy * dy)
                             if d <= 0.0 and plan > 0.0:
                                 aside = min(abs(dx * qy - dy * qx) / plan, radius)
-                                if qz - 0.5 * dz - bottom(aside, radius, r, cone) > LEAST_DEPTH * radius:
+                                if qz - 0.5 * dz - bottom(aside, cutter) > least:
                                     # where the edge comes to the place
                                     ahead = (qx * dx + qy * dy) / plan
-                                    edge = edge_radius(max(qz - 0.5 * dz, 0.0), radius, r, cone)
+                                    edge = edge_radius(max(qz - 0.5 * dz, 0.0), cutter)
                                     ahead -= math.sqrt(max(edge * edge - aside * aside, 0.0))
                                     k_part = min(max(int(ahead / plan * len(engaged)), 0), len(engaged) - 1)
-                                    engaged[k_part] |= sector_bits(qx, qy, dx, dy, plan, qz - 0.5 * dz, radius, r, h,
-                                                                   twist, cone)
+                                    engaged[k_part] |= sector_bits(qx, qy, dx, dy, plan, qz - 0.5 * dz, cutter, h,
+                                                                   twist)
                         totals[0] += gone
                         if steep:
                             off = plan_distance(qx, qy, dx, dy, dx * dx + dy * dy)
@@ -318,8 +319,7 @@ def _meet_brick(stock, tile, brick, p, bodies, b, cutter, grow, room, slack, bes
                 x, y, z = origin[0] + i * h, origin[1] + j * h, origin[2] + k * h
                 qx, qy, qz, dx, dy, dz = view(p, x, y, z)
                 if b < 0:
-                    gap = carried(qx, qy, qz, dx, dy, dz, cutter.radius - cutter.corner, cutter.corner, cutter.length,
-                                  cutter.cone) - v
+                    gap = carried(qx, qy, qz, dx, dy, dz, cutter) - v
                     depth = grow - gap if gap < -slack else 0.0
                     if depth == 0.0 and known_depth(best, code, grow) < grow:
                         depth = grow - beside(qx, qy, qz, dx, dy, dz, cutter, v, grow, slack)
@@ -375,7 +375,7 @@ def _beside(seen, z0, z1, wide):
 def _look(stock, bricks, p, tools, k, seen, feed, free, grow, room, limits, best):
     """Find the stock of a tile that neck, shank and holder of tool k take in on piece p."""
     cutters, bodies = tools.cutters, tools.bodies
-    cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3])
+    cutter = sizes_of(cutters, k)
     for b in range(tools.first[k], tools.first[k + 1]):
         extra = 0.0 if feed else -bodies[b, 4] if free else grow - min(grow, bodies[b, 4])
         if _beside(seen, bodies[b, 0] - room, bodies[b, 1] + room, max(bodies[b, 2], bodies[b, 3]) + max(extra, room)):
@@ -434,7 +434,7 @@ def field_tile(stock: FieldArrays, tile, moves: MoveArrays, axes: AxisArrays, tw
         far = reach[k] + rad + band + bow + max(limits.rapid, rooms[m])
         if near_segment2(cx, cy, cz, starts[m], ends[m]) > far * far:
             continue
-        cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3])
+        cutter = sizes_of(cutters, k)
         grow = 0.0 if feed or free[m] else limits.rapid
         length2 = (ends[m, 0] - starts[m, 0]) ** 2 + (ends[m, 1] - starts[m, 1]) ** 2 + (ends[m, 2] - starts[m, 2]) ** 2
         n = pieces(angle[m], math.sqrt(length2), reach[k], bow)

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
-from geometry.kernels.cutter_sizes import CutterSizes
+from geometry.kernels.cutter_sizes import sizes_of
 from verify.kernels.frustum import Frustum, overlap
 from verify.kernels.heights import _cells, lowest
 from verify.kernels.tables import F64, MoveArrays
@@ -22,7 +22,7 @@ GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _lower_lines(height, origin, step, a, d, cutter):
     """Lower the lines that the flutes reach on a move."""
-    radius, corner, length, cone = cutter
+    radius, length = cutter.radius, cutter.length
     a0, a1 = _cells(min(a[0], a[0] + d[0]) - radius, max(a[0], a[0] + d[0]) + radius, origin[0], step, 0,
                     height.shape[0])
     b0, b1 = _cells(min(a[1], a[1] + d[1]) - radius, max(a[1], a[1] + d[1]) + radius, origin[1], step, 0,
@@ -32,7 +32,7 @@ def _lower_lines(height, origin, step, a, d, cutter):
         for j in range(b0, b1 + 1):
             if height[i, j] > floor:
                 low, s = lowest(origin[0] + (i + 0.5) * step, origin[1] + (j + 0.5) * step, a[0], a[1], a[2], d[0],
-                                d[1], d[2], radius, corner, 0.0, cone)
+                                d[1], d[2], cutter, 0.0)
                 if low < height[i, j] <= a[2] + s * d[2] + length + 1e-9:
                     height[i, j] = low
 
@@ -77,7 +77,7 @@ def free_widths(height: F64, origin: F64, step, moves: MoveArrays, cutters: F64,
 
     height    : (nx, ny) float64, mm, setup frame, lines as ``LineArrays``
     origin    : (2,) float64, mm, setup frame; step : mm between lines
-    cutters   : (k, 4) float64, mm, tool frame; stickouts : (k,) float64, mm, nan for a tool that is not asked for
+    cutters   : (k, 6) float64, mm, tool frame; stickouts : (k,) float64, mm, nan for a tool that is not asked for
     boxes     : (f, 2, 3) float64, mm, setup frame, fixtures
     least     : (k,) float64, mm, in: the largest radius asked for; out: the free radius
     where     : (k,) int64, index, out: the move that makes it the least; unchanged where none does
@@ -93,8 +93,7 @@ def free_widths(height: F64, origin: F64, step, moves: MoveArrays, cutters: F64,
         d = (ends[m, 0] - a[0], ends[m, 1] - a[1], ends[m, 2] - a[2])
         low = min(a[2], ends[m, 2])
         if feeds[m] and low < top:
-            _lower_lines(height, origin, step, a, d, CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2],
-                                                                 cutters[k, 3]))
+            _lower_lines(height, origin, step, a, d, sizes_of(cutters, k))
         under = low + stickouts[k]
         if math.isnan(under):
             continue

@@ -1,9 +1,10 @@
 """Signed distance of points to a cutting part, standing or carried along a straight line.
 
 The profile over distance rho from the axis and height h from the tip is a rectangle grown by the corner radius r: flat
-end a = R - r, side R, cut off at the flute length L. With ``cone`` above 0 the corner is straight: from (a, 0) to
-(a + r, cone). Distances are exact but over the flutes, where the larger of the two ways is taken (a lower bound). A
-standing cutting part is convex, so along a line the distance is convex in s.
+end a = R - r, side R, cut off at the flute length L. With ``cone`` above 0 the corner is straight, from (a, 0) to
+(R, cone), and a tapered mill has an arc of radius r before it: that is a cone from (a, r) grown by r. Distances are
+exact but over the flutes, where the larger of the two ways is taken (a lower bound). A standing cutting part is convex,
+so along a line the distance is convex in s.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import math
 
 from numba import njit
 
-from geometry.kernels.cutter_sizes import CutterSizes
+from geometry.kernels.cutter_sizes import CutterSizes, slope_of, widened
 from geometry.kernels.options import KERNEL
 
 GOLDEN = 0.3819660112501051
@@ -20,32 +21,39 @@ FINE = 1e-5
 
 
 @njit(**KERNEL)
-def _pointed(rho, h, a, r, cone):
-    """Signed distance, mm, to a flat end, a cone and the endless cylinder over it; negative inside."""
-    side = math.sqrt(r * r + cone * cone)
-    x = rho - a
-    aside, along = (x * cone - h * r) / side, (x * r + h * cone) / side
-    if aside <= 0.0 and x <= r and h >= 0.0:
-        return max(max(aside, x - r), -h)
-    past = max(max(-along, along - side), 0.0)
-    out2 = min(aside * aside + past * past, max(x, 0.0) ** 2 + h * h)
-    return math.sqrt(min(out2, (x - r) ** 2 + min(h - cone, 0.0) ** 2))
+def leaning(rho, h, cutter: CutterSizes):
+    """Signed distance, mm, to flat end, round corner and cone of a cutting part, and the endless cylinder over it.
+
+    With x and y from the end of the flat at height r: under the cone and beside the flat the nearest place is on the
+    arc; over the rim of the cone it is the rim or the cylinder. Inside, the distance is that to the nearest tangent.
+    """
+    m, r = slope_of(cutter), cutter.round
+    x, y = rho - cutter.radius + cutter.corner, h - r
+    if x > 0.0 and m * x + y < 0.0:
+        out = math.sqrt(x * x + y * y) - r
+    else:
+        out = max((x - m * y) / math.sqrt(1.0 + m * m), -y) - r
+    past, low = rho - cutter.radius, h - cutter.cone
+    if past > 0.0 and low < 0.0 and m * past + low > 0.0:
+        return math.sqrt(past * past + low * low)
+    return max(out, past)
 
 
 @njit(**KERNEL)
-def standing(rho, h, a, r, length, cone=0.0):
+def standing(rho, h, cutter: CutterSizes):
     """Signed distance, mm, of a point at distance rho from the axis and height h; negative inside."""
-    if cone > 0.0:
-        return max(_pointed(rho, h, a, r, cone), h - length)
-    x, y = rho - a, r - h
+    if cutter.cone > 0.0:
+        return max(leaning(rho, h, cutter), h - cutter.length)
+    r = cutter.corner
+    x, y = rho - cutter.radius + r, r - h
     out = math.sqrt(max(x, 0.0) ** 2 + max(y, 0.0) ** 2) if x > 0.0 or y > 0.0 else max(x, y)
-    return max(out - r, h - length)
+    return max(out - r, h - cutter.length)
 
 
 @njit(**KERNEL)
-def _at(s, qx, qy, qz, dx, dy, dz, a, r, length, cone):
+def _at(s, qx, qy, qz, dx, dy, dz, cutter):
     wx, wy = qx - s * dx, qy - s * dy
-    return standing(math.sqrt(wx * wx + wy * wy), qz - s * dz, a, r, length, cone)
+    return standing(math.sqrt(wx * wx + wy * wy), qz - s * dz, cutter)
 
 
 @njit(**KERNEL)
@@ -54,13 +62,12 @@ def beside(qx, qy, qz, dx, dy, dz, cutter: CutterSizes, v, grow, slack):
 
     ``grow`` where even that takes in no more of it than ``slack``, which what lies under the tip may be.
     """
-    a, r, length, cone = cutter.radius - cutter.corner, cutter.corner, cutter.length, cutter.cone
-    if v - carried(qx, qy, qz, dx, dy, dz, a + grow, r, length, cone) <= slack:
+    if v - carried(qx, qy, qz, dx, dy, dz, widened(cutter, grow)) <= slack:
         return grow
     free, hits = 0.0, grow
     for _ in range(20):
         wider = 0.5 * (free + hits)
-        if v - carried(qx, qy, qz, dx, dy, dz, a + wider, r, length, cone) > slack:
+        if v - carried(qx, qy, qz, dx, dy, dz, widened(cutter, wider)) > slack:
             hits = wider
         else:
             free = wider
@@ -68,47 +75,82 @@ def beside(qx, qy, qz, dx, dy, dz, cutter: CutterSizes, v, grow, slack):
 
 
 @njit(**KERNEL)
-def carried(qx, qy, qz, dx, dy, dz, a, r, length, cone=0.0):
+def _beside_cone(qx, qy, qz, dx, dy, dz, plan2, cutter):
+    """Least distance to the cone alone where that is the least of all, else inf.
+
+    With u the way in plan past the nearest place, rho = sqrt(miss² + u²): rho - m h is least where u / rho is
+    -m dz / plan. Where the place met there is nearer to the cone than to its ends, a convex distance has its least
+    value there.
+    """
+    m, plan = slope_of(cutter), math.sqrt(plan2)
+    s = (qx * dx + qy * dy) / plan2
+    miss2 = max(qx * qx + qy * qy - s * s * plan2, 0.0)
+    g = m * dz / plan
+    if abs(g) >= 1.0:
+        s = 0.0 if g > 0.0 else 1.0
+    else:
+        s = min(max(s - g * math.sqrt(miss2 / (1.0 - g * g)) / plan, 0.0), 1.0)
+    h = qz - s * dz
+    rho = math.sqrt((qx - s * dx) ** 2 + (qy - s * dy) ** 2)
+    x, y = rho - cutter.radius + cutter.corner, h - cutter.round
+    past, low = rho - cutter.radius, h - cutter.cone
+    if m * x + y <= 0.0 or m * past + low >= 0.0:
+        return math.inf
+    out = (x - m * y) / math.sqrt(1.0 + m * m)
+    return out - cutter.round if out > max(-y, past + cutter.round) and out - cutter.round > h - cutter.length \
+        else math.inf
+
+
+@njit(**KERNEL)
+def carried(qx, qy, qz, dx, dy, dz, cutter: CutterSizes):
     """Least signed distance over 0 <= s <= 1 of a point q to a cutting part carried by s D; within 1e-5 mm."""
     plan2 = dx * dx + dy * dy
+    r, length, cone = cutter.corner, cutter.length, cutter.cone
+    a = cutter.radius - r
     s = 0.0
     if plan2 > 0.0:
         s = min(max((qx * dx + qy * dy) / plan2, 0.0), 1.0)
     if abs(dz) <= 1e-12:
-        return _at(s, qx, qy, qz, dx, dy, dz, a, r, length, cone)
+        return _at(s, qx, qy, qz, dx, dy, dz, cutter)
     h = qz - s * dz
     if cone > 0.0:
         # as below: where the way to the side is the greatest of all, no place of the move is nearer
         rho = math.sqrt((qx - s * dx) ** 2 + (qy - s * dy) ** 2)
-        if plan2 > 0.0 and cone <= h and standing(rho, h, a, r, length, cone) <= rho - a - r:
-            return rho - a - r
+        if plan2 > 0.0 and cone <= h and standing(rho, h, cutter) <= rho - cutter.radius:
+            return rho - cutter.radius
+        if cutter.taper > 0.0 and plan2 > 0.0:
+            d = _beside_cone(qx, qy, qz, dx, dy, dz, plan2, cutter)
+            if d < math.inf:
+                return d
     elif plan2 > 0.0 and r <= h <= length:
         rho = math.sqrt((qx - s * dx) ** 2 + (qy - s * dy) ** 2)
         # beside the cylinder, and nearer to its side than to its ends: only rho counts there
         if rho - a >= r - h and rho - a - r >= h - length:
             return rho - a - r
-    if a <= 1e-12 and cone == 0.0:
+    if a <= 1e-12 and (cone == 0.0 or cutter.round > 0.0):
+        r = r if cone == 0.0 else cutter.round
         z = qz - r
         s = min(max((qx * dx + qy * dy + z * dz) / (plan2 + dz * dz), 0.0), 1.0)
-        if z - s * dz <= 0.0:
-            wx, wy, wz = qx - s * dx, qy - s * dy, z - s * dz
+        wx, wy, wz = qx - s * dx, qy - s * dy, z - s * dz
+        # the nearest place is on the ball: under its equator, or where a cone begins
+        if wz + cutter.taper * math.sqrt(wx * wx + wy * wy) <= 0.0:
             return math.sqrt(wx * wx + wy * wy + wz * wz) - r
     if plan2 == 0.0 and cone == 0.0 and r <= 0.5 * length:
         # straight along the axis: no height is better than the middle of the flutes
         s = min(max((qz - 0.5 * length) / dz, 0.0), 1.0)
-        return _at(s, qx, qy, qz, dx, dy, dz, a, r, length, cone)
+        return _at(s, qx, qy, qz, dx, dy, dz, cutter)
     lo, hi = 0.0, 1.0
     wide = math.sqrt(plan2 + dz * dz)
     u, v = GOLDEN, 1.0 - GOLDEN
-    fu = _at(u, qx, qy, qz, dx, dy, dz, a, r, length, cone)
-    fv = _at(v, qx, qy, qz, dx, dy, dz, a, r, length, cone)
+    fu = _at(u, qx, qy, qz, dx, dy, dz, cutter)
+    fv = _at(v, qx, qy, qz, dx, dy, dz, cutter)
     while (hi - lo) * wide > FINE:
         if fu > fv:
             lo, u, fu = u, v, fv
             v = hi - GOLDEN * (hi - lo)
-            fv = _at(v, qx, qy, qz, dx, dy, dz, a, r, length, cone)
+            fv = _at(v, qx, qy, qz, dx, dy, dz, cutter)
         else:
             hi, v, fv = v, u, fu
             u = lo + GOLDEN * (hi - lo)
-            fu = _at(u, qx, qy, qz, dx, dy, dz, a, r, length, cone)
+            fu = _at(u, qx, qy, qz, dx, dy, dz, cutter)
     return min(fu, fv)

@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from geometry.kernels.cutter_sizes import CutterSizes
+from geometry.kernels.cutter_sizes import CutterSizes, sizes_of
+from verify.kernels.profile import leaning
 from verify.kernels.sweep import capsule_start, cutter_interval
 from verify.kernels.tables import F64, I32, I64, MoveArrays
 
@@ -65,16 +66,14 @@ def plan_distance(wx, wy, dx, dy, length2):
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def gap(x, y, z, dx, dy, dz, plan2, cutter: CutterSizes):
-    """A lower bound of the distance from a point, seen from the tip, to the swept cutting part (negative inside).
-
-    A cone counts as the cylinder round it.
-    """
-    radius, corner, length, cone = cutter
-    if cone > 0.0:
-        corner = 0.0
+    """A lower bound of the distance from a point, seen from the tip, to the swept cutting part (negative inside)."""
+    radius, corner, length = cutter.radius, cutter.corner, cutter.length
     plan = plan_distance(x, y, dx, dy, plan2)
     side = plan - radius
     low = min(0.0, dz)
+    if cutter.cone > 0.0:
+        # the distance to a standing one grows with that in plan and falls with the height: both at once
+        return max(leaning(plan, z - low, cutter), z - max(0.0, dz) - length)
     if z >= low + corner:
         return max(side, z - max(0.0, dz) - length)
     if dz == 0.0 or corner < radius - 1e-12:
@@ -111,8 +110,8 @@ def new_left(qx, qy, qz, nx, ny, nz, dx, dy, dz, plan2, cutter: CutterSizes, lef
 
     q, n, D as in ``sweep``; plan2 = dx² + dy².
     """
-    radius, corner, length, cone = cutter
-    ball = cone == 0.0 and corner >= radius - 1e-12
+    radius, corner, length = cutter.radius, cutter.corner, cutter.length
+    ball = cutter.cone == 0.0 and corner >= radius - 1e-12
     if ball and qz < min(0.0, dz) + corner:
         # under every equator a ball is as far as its sphere: squares decide most pairs
         wx, wy, wz = qx, qy, qz - corner
@@ -145,7 +144,7 @@ def cut_tile(tile, cells: CellArrays, samples: SampleArrays, left, moves: MoveAr
 
     samples : sorted by cell
     left    : (cells,) float64, mm, largest residual of each cell, changed in place
-    cutters : (k, 4) float64, mm, rows of ``CutterSizes``
+    cutters : (k, 6) float64, mm, rows of ``CutterSizes``
     once    : whether the first cut of a sample is the last: its residual is then ``CUT_ONCE``
     """
     cx0, cx1, cy0, cy1 = tile
@@ -170,7 +169,7 @@ def cut_tile(tile, cells: CellArrays, samples: SampleArrays, left, moves: MoveAr
             continue
         ax, ay, az = starts[m, 0], starts[m, 1], starts[m, 2]
         dx, dy, dz = ends[m, 0] - ax, ends[m, 1] - ay, ends[m, 2] - az
-        cutter = CutterSizes(cutters[tool[m], 0], cutters[tool[m], 1], cutters[tool[m], 2], cutters[tool[m], 3])
+        cutter = sizes_of(cutters, tool[m])
         radius = cutter.radius
         reach = radius + pad
         x0 = max(cx0, math.floor((min(ax, ax + dx) - reach - origin[0]) / size))

@@ -15,10 +15,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from geometry.kernels.cutter_sizes import CutterSizes
+from geometry.kernels.cutter_sizes import corner_end, sizes_of
+from geometry.kernels.cutter_sizes import end_radius as end_of
 from verify.kernels.engaged import LEAST_DEPTH, WINDOW, EngagedArrays, sector_bits
 from verify.kernels.frustum import Frustum, clear_of, contact
-from verify.kernels.heights import INF, _cells, bottom, entered, lowest, lowest_within
+from verify.kernels.heights import INF, _cells, bottom, edge_radius, entered, lowest, lowest_within
 from verify.kernels.profile import carried
 from verify.kernels.tables import F64, I64, Bool, ContactLimits, MoveArrays, RapidArrays, ToolArrays
 
@@ -202,13 +203,14 @@ def _lower(lines, box, a, d, cutter, end, descents, m, history, engaged, totals,
     since, dug, come, begun, whole, _stub = history
     taken, count, cell = totals.taken, len(engaged), step * step * UNITS
     i0, i1, j0, j1 = box
-    radius, corner, length, cone = cutter
+    radius, corner, length, own = cutter.radius, cutter.corner, cutter.length, end_of(cutter)
     cut, under = False, False
     a0, a1 = _cells(min(a[0], a[0] + d[0]) - radius, max(a[0], a[0] + d[0]) + radius, origin[0], step, i0, i1)
     b0, b1 = _cells(min(a[1], a[1] + d[1]) - radius, max(a[1], a[1] + d[1]) + radius, origin[1], step, j0, j1)
     floor = min(a[2], a[2] + d[2])
     flat, plan2 = radius - corner, d[0] * d[0] + d[1] * d[1]
-    inner = radius - min(RIM, RIM_SHARE * radius)
+    rim = min(RIM, RIM_SHARE * radius)
+    inner, side = radius - rim, (corner_end(cutter)[0] if cutter.taper > 0.0 else radius)
     along = 1.0 / plan2 if plan2 > 0.0 else 0.0
     plan = math.sqrt(plan2)
     for i in range(a0, a1 + 1):
@@ -223,16 +225,15 @@ def _lower(lines, box, a, d, cutter, end, descents, m, history, engaged, totals,
             s = min(max((wx * d[0] + wy * d[1]) * along, 0.0), 1.0)
             wx, wy = wx - s * d[0], wy - s * d[1]
             reach = radius
-            if cone > 0.0:
-                reach = flat + corner * min(over / cone, 1.0)
+            if cutter.cone > 0.0:
+                reach = edge_radius(over, cutter)
             elif over < corner:
                 reach = flat + math.sqrt(over * (2.0 * corner - over))
             near = wx * wx + wy * wy
             if near > reach * reach + EDGE * radius * radius:
                 continue
             # a line on the very edge is lowered whatever rounding says, or the next pass would find it standing
-            low, s = lowest_within(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius * (1.0 + 0.5 * EDGE), flat, corner,
-                                   cone)
+            low, s = lowest_within(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius * (1.0 + 0.5 * EDGE), cutter)
             gone = height[i, j] - low
             if gone <= 1e-9:
                 continue
@@ -244,22 +245,22 @@ def _lower(lines, box, a, d, cutter, end, descents, m, history, engaged, totals,
                 cut = True
                 k = min(int(s * count), count - 1)
                 taken[k, 0] += max(round((low + gone - max(low, bottom)) * cell), 1)
-                if near < inner * inner:
+                # what a leaning side takes off is its slope times that in width
+                if near < inner * inner and (near < side * side or gone * cutter.taper > rim):
                     taken[k, 1] = max(taken[k, 1], round((low + gone - max(a[2] + s * d[2], bottom)) * UNITS))
             if plan > 0.0:
                 # a round end lowers a line bit by bit: what counts is all it takes off the line on its way over it
                 way = gone_on + s * plan
-                if way - begun[i - i0, j - j0] > WINDOW * radius:
+                if way - begun[i - i0, j - j0] > WINDOW * own:
                     begun[i - i0, j - j0], come[i - i0, j - j0] = way, low + gone
                 tip = a[2] + s * d[2]
-                if min(come[i - i0, j - j0] - low, low + gone - tip) > LEAST_DEPTH * radius:
+                if min(come[i - i0, j - j0] - low, low + gone - tip) > LEAST_DEPTH * own:
                     engaged[min(int(s * len(engaged)), len(engaged) - 1)] |= sector_bits(
-                        x - a[0], y - a[1], d[0], d[1], plan, come[i - i0, j - j0] - tip, radius, corner, step, 0.0,
-                        cone)
+                        x - a[0], y - a[1], d[0], d[1], plan, come[i - i0, j - j0] - tip, cutter, step, 0.0)
             if not steep:
                 continue
             # what the flank took before the end came over the line was not dug
-            under_end, _ = lowest_within(x, y, a[0], a[1], a[2], d[0], d[1], d[2], end.radius, flat, corner, cone)
+            under_end, _ = lowest_within(x, y, a[0], a[1], a[2], d[0], d[1], d[2], end.radius, cutter)
             over = low + gone - max(under_end, bottom)
             gone = min(gone, over)
             if gone > 0.0:
@@ -323,13 +324,12 @@ def _over_stub(x, y, row, a, d, cutter, core, slope, stock_bottom):
 
     The ring round the core lowers the line in front of the core and behind it. What stands under the core is pressed.
     """
-    radius, corner, _length, cone = cutter
-    flat = radius - corner
+    radius = cutter.radius
     wx, wy = x - a[0], y - a[1]
     plan2 = d[0] * d[0] + d[1] * d[1]
     if plan2 < 1e-18:
         rho = math.sqrt(wx * wx + wy * wy)
-        low = min(a[2], a[2] + d[2]) + bottom(rho, flat, corner, cone)
+        low = min(a[2], a[2] + d[2]) + bottom(rho, cutter)
         if rho < core:
             return _press(row, max(low, stock_bottom), 0.0, 1.0, a, d, slope)
         if rho <= radius:
@@ -338,28 +338,28 @@ def _over_stub(x, y, row, a, d, cutter, core, slope, stock_bottom):
     s0 = (wx * d[0] + wy * d[1]) / plan2
     miss2 = max(wx * wx + wy * wy - s0 * s0 * plan2, 0.0)
     if miss2 >= core * core:
-        _lower_stub(row, lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, 0.0, cone)[0])
+        _lower_stub(row, lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], cutter, 0.0)[0])
         return 0.0, 0.0
     plan = math.sqrt(plan2)
     wide, narrow = math.sqrt(radius * radius - miss2) / plan, math.sqrt(core * core - miss2) / plan
     s1, s2, s3, s4 = max(s0 - wide, 0.0), s0 - narrow, s0 + narrow, min(s0 + wide, 1.0)
     if s1 > 1.0 or s4 < 0.0:
         return 0.0, 0.0
-    rim = bottom(core, flat, corner, cone)
+    rim = bottom(core, cutter)
     pressed, sheer = 0.0, 0.0
     if s2 > s1:
         far = math.sqrt(miss2 + (s1 - s0) * (s1 - s0) * plan2)
         near = min(s2, 1.0)
-        there = rim if s2 <= 1.0 else bottom(math.sqrt(miss2 + (1.0 - s0) * (1.0 - s0) * plan2), flat, corner, cone)
-        _lower_stub(row, min(a[2] + s1 * d[2] + bottom(far, flat, corner, cone), a[2] + near * d[2] + there))
+        there = rim if s2 <= 1.0 else bottom(math.sqrt(miss2 + (1.0 - s0) * (1.0 - s0) * plan2), cutter)
+        _lower_stub(row, min(a[2] + s1 * d[2] + bottom(far, cutter), a[2] + near * d[2] + there))
     if s2 < 1.0 and s3 > 0.0:
-        low = lowest_within(x, y, a[0], a[1], a[2], d[0], d[1], d[2], core, flat, corner, cone)[0]
+        low = lowest_within(x, y, a[0], a[1], a[2], d[0], d[1], d[2], core, cutter)[0]
         pressed, sheer = _press(row, max(low, stock_bottom), max(s2, 0.0), min(s3, 1.0), a, d, slope)
     if s3 < s4:
         far = math.sqrt(miss2 + (s4 - s0) * (s4 - s0) * plan2)
         near = max(s3, 0.0)
-        there = rim if s3 >= 0.0 else bottom(math.sqrt(miss2 + s0 * s0 * plan2), flat, corner, cone)
-        _lower_stub(row, min(a[2] + s4 * d[2] + bottom(far, flat, corner, cone), a[2] + near * d[2] + there))
+        there = rim if s3 >= 0.0 else bottom(math.sqrt(miss2 + s0 * s0 * plan2), cutter)
+        _lower_stub(row, min(a[2] + s4 * d[2] + bottom(far, cutter), a[2] + near * d[2] + there))
     return pressed, sheer
 
 
@@ -425,7 +425,7 @@ def _rapid_cutter(lines, box, a, d, cutter, grow, room, best):
     Returns whether they stand over the flutes.
     """
     height, origin, step, _bottom = lines
-    radius, corner, length, cone = cutter
+    radius, length = cutter.radius, cutter.length
     under, above = False, max(a[2], a[2] + d[2]) + length + ARM
     wide = radius + max(grow, room)
     i0, i1, j0, j1 = box
@@ -441,22 +441,22 @@ def _rapid_cutter(lines, box, a, d, cutter, grow, room, best):
             y = origin[1] + (j + 0.5) * step
             if room > 0.0 and known_depth(best, CUTTER, room) < room:
                 # no line under the flutes is nearer than its top; beside the flutes the way aside counts
-                gap = carried(x - a[0], y - a[1], top - a[2], d[0], d[1], d[2], radius - corner, corner, length, cone)
+                gap = carried(x - a[0], y - a[1], top - a[2], d[0], d[1], d[2], cutter)
                 if gap < room - ROUNDING:
                     _worse(best, CUTTER, room - max(gap, 0.0), room, x, y, top)
             if top <= floor:
                 continue
-            low, _ = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, grow, cone)
+            low, _ = lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], cutter, grow)
             if top <= low + 1e-3:
                 continue
-            bare = entered(x - a[0], y - a[1], top - a[2], d[0], d[1], d[2], radius, corner, cone)
+            bare = entered(x - a[0], y - a[1], top - a[2], d[0], d[1], d[2], cutter)
             depth = grow + bare
             if bare <= 1e-3:
                 # how wide the tool must be to touch: the gap to what stands here
                 free, hits = 0.0, grow
                 for _ in range(20):
                     wider = 0.5 * (free + hits)
-                    if top > lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius, corner, wider, cone)[0] + 1e-3:
+                    if top > lowest(x, y, a[0], a[1], a[2], d[0], d[1], d[2], cutter, wider)[0] + 1e-3:
                         hits = wider
                     else:
                         free = wider
@@ -507,7 +507,7 @@ def stock_tile(box, lines: LineArrays, moves: MoveArrays, rapids: RapidArrays, d
         if min(a[0], ends[m, 0]) - wide > x1 or max(a[0], ends[m, 0]) + wide < x0 \
                 or min(a[1], ends[m, 1]) - wide > y1 or max(a[1], ends[m, 1]) + wide < y0:
             continue
-        cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3])
+        cutter = sizes_of(cutters, k)
         if feeds[m]:
             went, below = _lower(lines, box, a, d, cutter, CutEnd(ends_radius[k], skins[k]), descents, m, history,
                                  sectors[parts[m]:parts[m + 1]],

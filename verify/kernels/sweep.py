@@ -13,6 +13,9 @@ move and of the height are lines, and the interval is the extent in t of their i
 reached at an extreme of the ellipse or on one of the four lines, all of them quadratics.
 A cone is the same with a radius that grows along the axis: its quadric is of any kind, but between the heights of its
 ends the region stays convex, and each place tried lies in it.
+A tapered mill is its corner and a cone from where the corner ends. The whole ball of a corner tangent to the cone lies
+in the endless cone over it, so it is cut off at the flute length only; flutes of a bull nose are as long as a torus is
+high.
 A torus corner is a disc of radius a grown by r: the distance to the swept disc is convex in t, so
 Newton's step from outside never passes the root.
 """
@@ -25,11 +28,12 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from geometry.kernels.cutter_sizes import CutterSizes
+from geometry.kernels.cutter_sizes import CutterSizes, corner_end
 
 INF = np.inf
 FLAT_RAY = 1e-9
 ROOT_ERROR = 1e-9
+LEAST_CONE = 1e-9  # mm, height of a cone that counts
 
 
 class Ray(NamedTuple):
@@ -341,7 +345,20 @@ def torus_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, r):
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def cutter_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter: CutterSizes):
     """Interval of t inside the sweep of a whole cutting part; (inf, -inf) where the ray misses it."""
-    radius, corner, length, cone = cutter
+    radius, corner, length, cone, r, taper = cutter
+    if taper > 0.0:
+        lo, hi = INF, -INF
+        if r > 0.0:
+            flat = radius - corner
+            if flat <= 1e-12:
+                lo, hi = sphere_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, r, r, length)
+            else:
+                lo, hi = torus_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, flat + r, r)
+        wide, high = corner_end(cutter)
+        if length - high > LEAST_CONE:
+            u, v = cone_interval(qx, qy, qz - high, nx, ny, nz, dx, dy, dz, wide, radius, length - high)
+            lo, hi = min(lo, u), max(hi, v)
+        return lo, hi
     lo, hi = cylinder_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, cone if cone > 0.0 else corner, length)
     if cone > 0.0:
         u, v = cone_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius - corner, radius, cone)

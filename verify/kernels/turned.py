@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-from geometry.kernels.cutter_sizes import CutterSizes
+from geometry.kernels.cutter_sizes import sizes_of
 from geometry.kernels.options import KERNEL
 from verify.kernels.pose import PIECE, fill_piece, near_segment2, pieces, turned, view
 from verify.kernels.rays import CUT_ONCE, SAME, TOUCH, SampleArrays, gap, new_left
@@ -78,7 +78,7 @@ def cut_chunk(chunk, balls, samples: SampleArrays, moves: MoveArrays, axes: Axis
 
     balls   : four (k, 4) float64, mm, balls of 8, 64, 512, 4096 samples
     samples : in the order of the tree
-    cutters : (k, 4) float64, mm, rows of ``CutterSizes``
+    cutters : (k, 6) float64, mm, rows of ``CutterSizes``
     reach   : (k,) float64, mm, how far the cutting part reaches from the tip
     once    : as in ``rays.cut_tile``
     """
@@ -101,7 +101,7 @@ def cut_chunk(chunk, balls, samples: SampleArrays, moves: MoveArrays, axes: Axis
         far = reach[k] + rad + left3 + bow
         if near_segment2(x, y, z, starts[m], ends[m]) > far * far:
             continue
-        cutter = CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3])
+        cutter = sizes_of(cutters, k)
         length2 = (ends[m, 0] - starts[m, 0]) ** 2 + (ends[m, 1] - starts[m, 1]) ** 2 + (ends[m, 2] - starts[m, 2]) ** 2
         count = pieces(angle[m], math.sqrt(length2), reach[k], bow)
         # a turning ray runs off its chord by half the angle of the piece for every mm of what is left

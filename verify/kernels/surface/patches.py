@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from geometry.kernels.cutter_sizes import CutterSizes
+from geometry.kernels.cutter_sizes import CutterSizes, sizes_of, slope_of
 from verify.kernels.rays import TOUCH, CellArrays, gap, new_left, plan_distance
 from verify.kernels.tables import F64, MoveArrays
 
@@ -61,9 +61,9 @@ def deepest_point(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter: CutterSizes):
         if nz < -LEVEL:
             out, height = cutter.radius, z + cutter.length
         elif nz > LEVEL and cutter.cone > 0.0:
-            # the lower or the upper end of the cone
-            out, height = cutter.radius - cutter.corner, z
-            if cutter.corner * aside > cutter.cone * nz:
+            # the arc or the edge under the cone, or the upper end of the cone
+            out, height = cutter.radius - cutter.corner + cutter.round * aside, z + cutter.round * (1.0 - nz)
+            if slope_of(cutter) * aside > nz:
                 out, height = cutter.radius, z + cutter.cone
         elif nz > LEVEL:
             out, height = cutter.radius - cutter.corner * (1.0 - aside), z + cutter.corner * (1.0 - nz)
@@ -82,7 +82,7 @@ def deepest_point(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter: CutterSizes):
 def judge_tile(tile, cells: CellArrays, places: PlaceArrays, moves: MoveArrays, cutters):
     """Work all feed moves through the places of the cell columns x0..x1-1, y0..y1-1 of a tile (x0, x1, y0, y1).
 
-    cutters : (k, 4) float64, mm: radius, corner, flute length and height of the cone, as ``CutterSizes``
+    cutters : (k, 6) float64, mm, rows of ``CutterSizes``
     """
     cx0, cx1, cy0, cy1 = tile
     origin, size, shape, first = cells
@@ -99,7 +99,7 @@ def judge_tile(tile, cells: CellArrays, places: PlaceArrays, moves: MoveArrays, 
             continue
         ax, ay, az = starts[m, 0], starts[m, 1], starts[m, 2]
         dx, dy, dz = ends[m, 0] - ax, ends[m, 1] - ay, ends[m, 2] - az
-        cutter = CutterSizes(cutters[tool[m], 0], cutters[tool[m], 1], cutters[tool[m], 2], cutters[tool[m], 3])
+        cutter = sizes_of(cutters, tool[m])
         radius, length = cutter.radius, cutter.length
         reach = radius + pad
         x0 = max(cx0, math.floor((min(ax, ax + dx) - reach - origin[0]) / size))

@@ -22,6 +22,7 @@ import numpy as np
 from numba import njit
 
 from geometry.kernels.bvh import TreeArrays
+from geometry.kernels.cutter_sizes import sizes_of
 from geometry.kernels.nearest import nearest_row
 from geometry.kernels.options import KERNEL
 from geometry.kernels.ray import first_hit
@@ -74,8 +75,7 @@ def fill_pieces(chosen, count, moves: MoveArrays, axes: AxisArrays, cutters, rea
         for part in range(n):
             fill_piece(out[at], moves.start[m], moves.end[m], axes.axis[m], axes.about[m], axes.angle[m], part, n)
             qx, qy, qz, dx, dy, dz = view(out[at], x, y, z)
-            r = cutters[k, 1]
-            if carried(qx, qy, qz, dx, dy, dz, cutters[k, 0] - r, r, cutters[k, 2], cutters[k, 3]) <= far + axes.bow:
+            if carried(qx, qy, qz, dx, dy, dz, sizes_of(cutters, k)) <= far + axes.bow:
                 tool[at] = k
                 at += 1
     return out[:at], tool[:at]
@@ -85,8 +85,7 @@ def fill_pieces(chosen, count, moves: MoveArrays, axes: AxisArrays, cutters, rea
 def _carried(x, y, z, row, k, cutters):
     """Signed distance of a point to one sweep."""
     qx, qy, qz, dx, dy, dz = view(row, x, y, z)
-    r = cutters[k, 1]
-    return carried(qx, qy, qz, dx, dy, dz, cutters[k, 0] - r, r, cutters[k, 2], cutters[k, 3])
+    return carried(qx, qy, qz, dx, dy, dz, sizes_of(cutters, k))
 
 
 @njit(**KERNEL)

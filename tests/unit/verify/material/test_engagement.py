@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from geometry.kernels.cutter_sizes import CutterSizes
 from tests.pocket_case import OTHER, SETUP, TOOL, block, program, scored, text
 from verify.kernels.engaged import SECTORS, sector_bits
 from verify.material.engagement import RESOLUTION, engaged_angles, engagements, in_parts
@@ -57,7 +58,8 @@ def test_what_a_finishing_pass_skims_is_no_engagement():
 def test_sectors_are_counted_all_round_from_x():
     def bits(b, over=5.0, corner=0.0, wide=1e-9, way=(1.0, 0.0), twist=0.0):
         dx, dy = way
-        return int(sector_bits(-b * dy, b * dx, dx, dy, 1.0, over, 2.0, corner, wide, twist)) & 2**64 - 1
+        cutter = CutterSizes(2.0, corner, 9.0)
+        return int(sector_bits(-b * dy, b * dx, dx, dy, 1.0, over, cutter, wide, twist)) & 2**64 - 1
 
     assert [bits(b) for b in (1.9999, 1e-6, -1e-6, -1.9999, 2.001)] == [1 << 15, 1, 1 << 63, 1 << 48, 0]
     assert bits(1e-6, way=(0.0, 1.0)) == bits(1e-6, twist=0.5 * math.pi) == 1 << 16
