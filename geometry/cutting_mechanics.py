@@ -6,6 +6,7 @@ Notation
     kc, mc  : specific cutting force of a chip of 1 mm by 1 mm, N/mm2, and its exponent
     a, ae   : depth and width of cut, mm
     b       : length of the edge in the cut, mm
+    d, k    : diameter of a bar, mm, and how it grows with z
     fz, h   : feed per tooth and thickness of the chip, mm
     phi     : engaged angle, rad
 
@@ -39,11 +40,18 @@ def compliance(tool: ToolBody, modulus: float = CARBIDE) -> float:
     The force acts at the tip, square to the axis. The tool is a stepped bar: flutes as a bar of ``CORE`` of the
     diameter, neck, shank. The moment at the height z is F z, so tip / F = sum (z1^3 - z0^3) / (3 E I) over the
     cylinders from z0 to z1. Shear and the holder's compliance are left out.
+
+    Flutes of a tapered mill are a cylinder up to the side and then a cone, d = e + k z. As (z / d)' = e / d^2, the
+    integral of z^2 / d^4 over the cone is ((z1 / d1)^3 - (z0 / d0)^3) / (3 e).
     """
     total, low = 0.0, 0.0
-    for top, wide in _bars(tool):
+    for top, narrow, wide in _bars(tool):
         if top > low:
-            total += (top**3 - low**3) / (3.0 * modulus * math.pi * wide**4 / 64.0)
+            if narrow == wide:
+                total += (top**3 - low**3) / (3.0 * modulus * math.pi * wide**4 / 64.0)
+            else:
+                at_tip = narrow - (wide - narrow) / (top - low) * low
+                total += ((top / wide)**3 - (low / narrow)**3) / (3.0 * modulus * math.pi * at_tip / 64.0)
             low = top
     return total
 
@@ -77,24 +85,37 @@ def bending_stress(tool: ToolBody, force: float, depth: float) -> tuple[float, f
 
     The moment at the height z is F (z - a / 2), and the stress of a round bar 32 M / (pi d^3). It is greatest at the
     upper end of flutes, neck or shank; that of the largest share of the strength counts. Flutes count as a bar of
-    ``CORE`` of the diameter.
+    ``CORE`` of the diameter. On a cone d = e + k z the share grows with (z - a / 2) / d^2.75 and may be greatest where
+    d = 2.75 k (z - a / 2).
 
     >>> rod = ToolBody("T1", 1, 8.0, 0.0, 20.0, 8.0, 20.0, 8.0, 35.0)
     >>> [round(x) for x in bending_stress(rod, 1000.0, 10.0)]
     [597, 3206]
     """
-    worst, low = (0.0, STRENGTH), 0.0
-    for top, wide in _bars(tool):
+    worst, low, power = (0.0, STRENGTH), 0.0, 3.0 - SIZE_EXPONENT
+    for top, narrow, wide in _bars(tool):
         if top > low:
-            here = 32.0 * force * max(top - 0.5 * depth, 0.0) / (math.pi * wide**3), strength(wide)
-            worst, low = max(worst, here, key=lambda pair: pair[0] / pair[1]), top
+            places, slope = [(top, wide)], (wide - narrow) / (top - low)
+            if slope > 0.0:
+                z = (narrow - slope * low + power * slope * 0.5 * depth) / ((power - 1.0) * slope)
+                places += [(z, narrow + slope * (z - low))] if low < z < top else []
+            for z, d in places:
+                here = 32.0 * force * max(z - 0.5 * depth, 0.0) / (math.pi * d**3), strength(d)
+                worst = max(worst, here, key=lambda pair: pair[0] / pair[1])
+            low = top
     return worst
 
 
-def _bars(tool: ToolBody) -> tuple[tuple[float, float], ...]:
-    """Upper end and diameter of the bars that a tool consists of, from the tip on, mm."""
-    return ((tool.flute_length, CORE * tool.diameter), (tool.neck_length, tool.neck_diameter),
-            (tool.stickout, tool.shank_diameter))
+def _bars(tool: ToolBody) -> tuple[tuple[float, float, float], ...]:
+    """Upper end and diameters at the lower and the upper end of the bars that a tool consists of, from the tip on,
+    mm."""
+    above = ((tool.neck_length, tool.neck_diameter, tool.neck_diameter),
+             (tool.stickout, tool.shank_diameter, tool.shank_diameter))
+    if tool.taper <= 0.0:
+        return ((tool.flute_length, CORE * tool.diameter, CORE * tool.diameter), *above)
+    wide, high = tool.corner_end
+    low, top = 2.0 * CORE * wide, 2.0 * CORE * tool.widest_radius
+    return ((high, low, low), (tool.flute_length, low, top), *above)
 
 
 def effective_diameter(diameter: float, corner_radius: float, depth: float) -> float:
@@ -108,6 +129,34 @@ def effective_diameter(diameter: float, corner_radius: float, depth: float) -> f
     return diameter - 2.0 * corner_radius + 2.0 * math.sqrt(depth * (2.0 * corner_radius - depth))
 
 
+def diameter_in_cut(tool: ToolBody, depth: float) -> float:
+    """Diameter of a tool at the height ``depth`` above its tip, mm, as ``effective_diameter``; a tapered mill widens
+    up to the end of its flutes.
+
+    >>> cone = ToolBody("T1", 1, 2.0, 1.0, 11.0, 4.0, 11.0, 4.0, 40.0, taper=0.75)
+    >>> [round(diameter_in_cut(cone, a), 9) for a in (0.2, 0.4, 4.4, 20.0)]
+    [1.2, 1.6, 7.6, 17.5]
+    """
+    wide, high = tool.corner_end
+    if tool.taper <= 0.0 or depth < high:
+        return effective_diameter(tool.diameter, tool.corner_radius, depth)
+    return 2.0 * (wide + tool.taper * (min(depth, tool.flute_length) - high))
+
+
+def diameters_in_cut(tool: ToolBody, depth: F64) -> F64:
+    """Diameter of a tool at n heights above its tip, as ``diameter_in_cut``.
+
+    depth : (n,) float64, mm
+
+    Returns (n,) float64, mm.
+    """
+    r, (wide, high) = tool.corner_radius, tool.corner_end
+    low = np.minimum(depth, high)
+    in_corner = tool.diameter - 2.0 * r + 2.0 * np.sqrt(low * (2.0 * r - low))
+    return np.where(depth >= high, 2.0 * wide + 2.0 * tool.taper * (np.minimum(depth, tool.flute_length) - high)
+                    if tool.taper > 0.0 else tool.diameter, in_corner)
+
+
 def engaged_angle(tool: ToolBody, depth: float, width: float) -> float:
     """Engaged angle of a side cut at the effective diameter D, rad: cos(phi) = 1 - 2 ae / D; pi in a slot
     [Altintas2012].
@@ -117,7 +166,7 @@ def engaged_angle(tool: ToolBody, depth: float, width: float) -> float:
     >>> round(math.degrees(engaged_angle(ToolBody("T1", 1, 10.0, 0.0, 20.0, 10.0, 20.0, 10.0, 40.0), 5.0, 2.5)), 9)
     60.0
     """
-    wide = effective_diameter(tool.diameter, tool.corner_radius, depth)
+    wide = diameter_in_cut(tool, depth)
     return math.acos(max(-1.0, 1.0 - 2.0 * width / wide)) if wide > 0.0 else math.pi
 
 
@@ -130,13 +179,13 @@ def cutting_force(kc: float, mc: float, per_tooth: float, depth: float, width: f
 
     F = max(1, z phi / (2 pi)) b h^(1 - mc) kc, where h = fz sin(kappa) (1 - cos(phi)) / phi is the mean thickness of
     the chip over the engaged angle, b the length of the edge up to the depth with its round corner as a chord, and
-    sin(kappa) = a / b.
+    sin(kappa) = a / b. The side of a tapered mill is as long as it leans.
     """
     if depth <= 0.0 or width <= 0.0:
         return 0.0
     r = tool.corner_radius
-    low = min(depth, r)
-    edge = math.hypot(low, math.sqrt(low * (2.0 * r - low))) + depth - low
+    low = min(depth, tool.corner_end[1])
+    edge = math.hypot(low, math.sqrt(low * (2.0 * r - low))) + (depth - low) * math.hypot(1.0, tool.taper)
     phi = engaged_angle(tool, depth, width)
     chip = per_tooth * depth / edge * (1.0 - math.cos(phi)) / phi
     return float(max(1.0, flutes * phi / (2.0 * math.pi)) * edge * chip ** (1.0 - mc) * kc)
@@ -187,12 +236,12 @@ def drill_loads(kc: float, mc: float, a_turn: float, drill: ToolBody, flutes: in
 def _chips(per_tooth: F64, depth: F64, width: F64, tool: ToolBody) -> tuple[F64, F64, F64]:
     """Length of the edge in the cut, mm, engaged angle, rad, and mean thickness of the chip, mm, of n cuts."""
     r = tool.corner_radius
-    low = np.minimum(depth, r)
-    edge = np.hypot(low, np.sqrt(low * (2.0 * r - low))) + depth - low
-    wide = np.where(depth >= r, tool.diameter, tool.diameter - 2.0 * r + 2.0 * np.sqrt(low * (2.0 * r - low)))
-    phi = np.arccos(np.clip(1.0 - 2.0 * width / wide, -1.0, 1.0))
+    low = np.minimum(depth, tool.corner_end[1])
+    edge = np.hypot(low, np.sqrt(low * (2.0 * r - low))) + (depth - low) * math.hypot(1.0, tool.taper)
+    phi = np.arccos(np.clip(1.0 - 2.0 * width / diameters_in_cut(tool, depth), -1.0, 1.0))
     return edge, phi, per_tooth * depth / edge * (1.0 - np.cos(phi)) / phi
 
 
 __all__ = ["CARBIDE", "CHIP_SHARE", "CORE", "bending_stress", "buckling", "compliance", "cutting_force",
-           "cutting_forces", "cutting_powers", "drill_loads", "effective_diameter", "engaged_angle", "strength"]
+           "cutting_forces", "cutting_powers", "diameter_in_cut", "diameters_in_cut", "drill_loads",
+           "effective_diameter", "engaged_angle", "strength"]

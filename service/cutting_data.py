@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from itertools import pairwise
 
-from geometry.cutting_mechanics import CHIP_SHARE, compliance, effective_diameter
+from geometry.cutting_mechanics import CHIP_SHARE, compliance, diameter_in_cut, effective_diameter
 from geometry.machine_rates import RATES, Rates
 from geometry.tool_body import ToolBody
 from schemas.machine import Machine
@@ -216,7 +216,7 @@ def layer_depth(setup: Setup, tool: Tool, body: ToolBody, engaged: float) -> flo
     depth = STEP_DOWN[tool.kind] * tool.diameter_mm
     data = cutting_data(setup.material, tool, setup.machine, depth)
     model = bending(setup, tool, body, data, THINNEST * depth)
-    width = 0.5 * effective_diameter(body.diameter, body.corner_radius, depth) * (1.0 - math.cos(engaged))
+    width = 0.5 * diameter_in_cut(body, depth) * (1.0 - math.cos(engaged))
     return depth if model is None else model.bearable(data.feed, depth, width)
 
 

@@ -10,7 +10,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.cutting_mechanics import effective_diameter
+from geometry.cutting_mechanics import diameter_in_cut
 from geometry.machine_rates import RATES, Rates
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
@@ -88,7 +88,7 @@ class CutData:
         if self.bending is None or self.bend is None or self.bend.share >= 1.0:
             return self.feed
         full = self.feed / self.bend.share
-        width = 0.5 * effective_diameter(tool.diameter, tool.corner_radius, depth) * (1.0 - math.cos(angle))
+        width = 0.5 * diameter_in_cut(tool, depth) * (1.0 - math.cos(angle))
         least = self.feed if depth <= self.step_down * (1.0 + 1e-9) else MIN_FEED
         return max(least, self.bending.under(full, depth, width).share * full)
 

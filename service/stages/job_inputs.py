@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from geometry.cutting_mechanics import effective_diameter
+from geometry.cutting_mechanics import diameter_in_cut
 from geometry.machine_rates import Rates
 from geometry.mesh import F64
 from geometry.part import OtherSolid
@@ -221,7 +221,7 @@ def _cut_table(setup: Setup, bodies: Sequence[ToolBody]) -> dict[str, CutData]:
                          bending=bending(setup, tool, body, fine, None))
         layers = CutData(rough.spindle_rpm, rough.feed, rough.plunge_feed, link, depth, engaged, finish,
                          bending(setup, tool, body, rough, depth))
-        slot = effective_diameter(body.diameter, body.corner_radius, depth)
+        slot = diameter_in_cut(body, depth)
         out[tool.id] = layers.under(depth, 0.5 * slot * (1.0 - math.cos(engaged)))
     return out
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from geometry.cutting_mechanics import effective_diameter
+from geometry.cutting_mechanics import diameter_in_cut
 from geometry.mesh import F64
 from toolpath.feeds.feed_scheduling import Pace
 from toolpath.five_axis.oriented_motion import THICK
@@ -294,8 +294,7 @@ class ToolLayers:
     def _thinner(self) -> CutData:
         """The cut of the stock between layers: a slot at most, a part of a layer deep."""
         depth = depth_layers.EVEN * self.cut.step_down
-        return self.cut.under(depth, 0.5 * effective_diameter(self.field.tool.diameter, self.field.tool.corner_radius,
-                                                              depth))
+        return self.cut.under(depth, 0.5 * diameter_in_cut(self.field.tool, depth))
 
     def _linker(self) -> Linker:
         cut, tool = self.cut, self.field.tool

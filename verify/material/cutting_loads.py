@@ -20,8 +20,8 @@ from geometry.cutting_mechanics import (
     compliance,
     cutting_forces,
     cutting_powers,
+    diameters_in_cut,
     drill_loads,
-    effective_diameter,
 )
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
@@ -246,9 +246,7 @@ class _Judge:
     def speeds(self, depth: F64) -> Judged:
         """Cutting speed at the largest diameter in the cut; depth : (m,) mm."""
         rows = self.rows[self.cuts.speed[self.rows] > 0.0]
-        wide = np.array([effective_diameter(self.tool.diameter, self.tool.corner_radius, a)
-                         for a in np.minimum(depth[rows], self.tool.corner_radius + 1.0).tolist()])
-        speed = math.pi * wide * self.cuts.speed[rows] / 1000.0
+        speed = math.pi * diameters_in_cut(self.tool, depth[rows]) * self.cuts.speed[rows] / 1000.0
         bound, wanted = SPEED_TIMES * self.said.speed, RECOMMENDED_TIMES * self.said.speed
         kind, advised = "cutter", f"recommended are {self.said.speed:g} m/min"
         if self.tool.named == "tap":
@@ -331,8 +329,7 @@ class _Judge:
                             "", advice)
         _, bent = self._over(last, bend, math.inf, said.bend, "deflection", text, "", f"limit {said.bend:.3f} mm",
                              advice)
-        turning = force * 0.5e-3 * np.array([effective_diameter(tool.diameter, tool.corner_radius, a)
-                                             for a in depth.tolist()])
+        turning = force * 0.5e-3 * diameters_in_cut(tool, depth)
         power = cutting_powers(said.kc, said.mc, per_tooth[turns], depth, sure, cuts.middle[last] * aside[turns], tool)
         heavy, weak = self._machine(last, turning, power, np.zeros(len(last)), cut)
         over = findings or far
@@ -395,7 +392,8 @@ class _Judge:
         long = np.maximum(np.add.reduceat(length[own], at), SPACINGS * cuts.spacing)
         end = own[_fastest(cuts.run.ways.volume[own], cuts.middle[cuts.of[own]], at)]
         cut = (volume > 0.0) & (depth > ROUNDING)
-        section = np.minimum(volume[cut] / long[cut], tool.diameter * depth[cut])
+        wide = np.maximum(diameters_in_cut(tool, depth[cut]), tool.diameter)
+        section = np.minimum(volume[cut] / long[cut], wide * depth[cut])
         return cuts.of[end[cut]], (length[end] / whole[end])[cut], depth[cut], section
 
     def stated(self) -> Iterator[ProgramCaution]:
