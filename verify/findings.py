@@ -123,7 +123,7 @@ def contact_findings(events: F64, moves: Moves, source: Source, skins: F64, tool
 def _runs_beside(code: int, tool: ToolBody) -> bool:
     """Whether a contact with stock or part is that of a neck or shank as wide as the cutting part."""
     wide = {NECK: tool.neck_diameter, SHANK: tool.shank_diameter}.get(code)
-    return wide is not None and abs(tool.diameter - wide) <= SAME_WIDTH
+    return wide is not None and abs(2.0 * tool.widest_radius - wide) <= SAME_WIDTH
 
 
 def _nearest(start: F64, end: F64, place: F64) -> F64:

@@ -138,7 +138,8 @@ def _lengths(p: Program, tools: Sequence[ToolBody], setup: ProofSetup) -> F64:
     for tool in tools:
         rows = Bodies.of([tool], setup).rows
         high = max([tool.flute_length, setup.gauge_length.get(tool.number, 0.0), *rows[:, 1].tolist()])
-        out[p.tool == tool.number] = np.hypot(high, max([tool.radius, *rows[:, 2].tolist(), *rows[:, 3].tolist()]))
+        wide = max([tool.widest_radius, *rows[:, 2].tolist(), *rows[:, 3].tolist()])
+        out[p.tool == tool.number] = np.hypot(high, wide)
     return out
 
 

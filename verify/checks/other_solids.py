@@ -40,7 +40,7 @@ def _enters(other: OtherSolid, moves: Moves, tools: Sequence[ToolBody], setup: P
         mine = np.flatnonzero(moves.tool == k)
         if moves.axes is None:
             own = bodies.rows[bodies.first[k]:bodies.first[k + 1]]
-            discs = [(0.0, tool.flute_length, tool.radius),
+            discs = [(0.0, tool.flute_length, tool.widest_radius),
                      *((z0, z1, max(r0, r1) - gap) for z0, z1, r0, r1, gap, _ in own.tolist())]
         else:
             discs = [(-reach[k], reach[k], reach[k])]

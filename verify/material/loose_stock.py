@@ -206,7 +206,7 @@ def _cut_off(piece: LoosePiece, moves: Moves, cut: NDArray[np.bool_], tools: Seq
     if not len(piece.border):
         return -1
     low, high = np.minimum(moves.start, moves.end), np.maximum(moves.start, moves.end)
-    radius = np.array([t.radius for t in tools])[moves.tool] + BESIDE
+    radius = np.array([t.widest_radius for t in tools])[moves.tool] + BESIDE
     room = radius[:, None]
     near = cut & (low[:, 2] <= piece.foot + SKIN) \
         & (low[:, :2] - room <= piece.border.max(axis=0)).all(axis=1) \

@@ -148,7 +148,7 @@ def unseen_cores(tools: Sequence[ToolBody], setup: ProofSetup, spacing: float, u
 
 def dogleg_limits(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup) -> tuple[F64, float]:
     """(m,) float64 tool radii, and the height above which a rapid of an upright tool meets nothing, mm."""
-    radius = np.array([t.radius for t in tools])[moves.tool] if len(moves) else np.zeros(0)
+    radius = np.array([t.widest_radius for t in tools])[moves.tool] if len(moves) else np.zeros(0)
     return radius, top_of_all(mesh.bounds, setup) + setup.clearance_rapid
 
 

@@ -222,7 +222,7 @@ def run_field(field: DistanceField, moves: Moves, tools: Sequence[ToolBody], set
     over = np.where(partly, stands, over)[:, None]
     plunges = _plunges(moves, axes, taken[:, [1, 2]] / VOLUME_UNITS / over, end,
                        descents(moves, tools, setup, ways.in_cut(first))[1],
-                       setup.plunge_skin * 2.0 * cutters[:, 0], round_off(tools))
+                       setup.plunge_skin * np.array([t.diameter for t in tools]), round_off(tools))
     return StockPass(np.concatenate([events, plunges]), lost, taken[:, 0] > 0, engaged, ways)
 
 

@@ -172,7 +172,7 @@ def _run(field: StockLines, moves: Moves, tools: Sequence[ToolBody], setup: Proo
     bodies = Bodies.of(tools, setup) if chosen is None else Bodies.none(tools)
     sizes = bodies.arrays(cutters, end_radii(tools, setup.tap_holes))
     allowed = DescentArrays(*descents(moves, tools, setup, ways), ways_before(moves),
-                            setup.plunge_skin * 2.0 * cutters[:, 0], hollow_ends(tools, setup))
+                            setup.plunge_skin * np.array([t.diameter for t in tools]), hollow_ends(tools, setup))
     cut, under = np.zeros(len(moves), np.uint8), np.zeros(len(moves), np.uint8)
     limits, rapids = contact_limits(setup), rapid_arrays(moves, setup)
     lines, steps = LineArrays(field.height, field.origin, field.step, field.bottom), moves.arrays
@@ -210,7 +210,7 @@ def run_bodies(points: F64, moves: Moves, tools: Sequence[ToolBody], setup: Proo
         return np.zeros((0, 7)), 0
     grid = CellGrid.build(points)
     pts, bodies = np.ascontiguousarray(points[grid.order]), Bodies.of(tools, setup)
-    radii, cells, steps = np.array([t.radius for t in tools]), grid.arrays, moves.arrays
+    radii, cells, steps = np.array([t.widest_radius for t in tools]), grid.arrays, moves.arrays
 
     def job(tile: tuple[int, int, int, int]) -> Callable[[], object]:
         def work() -> object:

@@ -204,7 +204,7 @@ def end_radii(tools: Sequence[ToolBody], holes: Mapping[int, float] | None = Non
              "bull": lambda t: t.radius - 0.5 * t.corner_radius, "drill": lambda t: t.radius,
              "thread_mill": lambda t: t.radius, "tap": lambda t: 0.5 * known.get(t.number, 2.0 * TAP_CORE * t.radius),
              "chamfer": lambda t: 0.5 * t.tip_diameter if t.tip_diameter > 0.0 else t.radius}
-    return np.array([share[t.kind](t) for t in tools])
+    return np.array([share[t.end](t) for t in tools])
 
 
 def event_table() -> F64:

@@ -99,13 +99,13 @@ def _tips(places: CutPlaces, rows: INT, moves: Moves) -> F64:
 
 def _near(places: CutPlaces, rows: INT, tips: F64, moves: Moves, tool: ToolBody, slack: float) -> BOOL:
     """``_touched`` for tools that lean: places cut within a tool radius of a position that finishes another face."""
-    away, _ = cKDTree(tips).query(_tips(places, rows, moves), distance_upper_bound=tool.radius + slack)
+    away, _ = cKDTree(tips).query(_tips(places, rows, moves), distance_upper_bound=tool.widest_radius + slack)
     return np.asarray(np.isfinite(away))
 
 
 def _touched(places: CutPlaces, rows: INT, tips: F64, moves: Moves, tool: ToolBody, slack: float) -> BOOL:
     """(r,) bool: places within ``slack`` mm of the cylinder round the flutes of a tool along Z on one of ``tips``."""
-    p, out, wide = places.points[rows], np.zeros(len(rows), np.bool_), tool.radius + slack
+    p, out, wide = places.points[rows], np.zeros(len(rows), np.bool_), tool.widest_radius + slack
     aside, _ = cKDTree(tips[:, :2]).query(p[:, :2], distance_upper_bound=wide)
     level = np.floor(tips[:, 2] / slack).astype(np.int64)
     order = np.argsort(level, kind="stable")

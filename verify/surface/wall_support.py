@@ -212,7 +212,8 @@ def _pieces(moves: Moves, spacing: float) -> INT:
 
 def _boxes(moves: Moves, rows: INT, tools: Sequence[ToolBody], room: float) -> tuple[F64, F64]:
     """Boxes, corners (k, 3) and (k, 3), mm, that hold the cutting part of moves and ``room`` round it."""
-    reach = np.array([np.hypot(t.radius, t.flute_length) if moves.axes is not None else t.radius for t in tools])
+    reach = np.array([np.hypot(t.widest_radius, t.flute_length) if moves.axes is not None else t.widest_radius
+                      for t in tools])
     wide = reach[moves.tool[rows]][:, None] + room
     low, high = (f(moves.start[rows], moves.end[rows]) for f in (np.minimum, np.maximum))
     tall = wide if moves.axes is not None else np.array([t.flute_length for t in tools])[moves.tool[rows]][:, None]

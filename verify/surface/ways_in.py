@@ -150,7 +150,7 @@ def _behind(points: F64, normals: F64, cutting: Cutting) -> tuple[F64, F64, I32]
     ways = np.ascontiguousarray(-normals)
     begin, mover = residual_on_normals(points + deep * ways, ways, np.full(len(ways), cutting.farthest), cutting.moves,
                                        cutting.tools, threads=cutting.threads)
-    most = np.maximum(np.array([t.diameter for t in cutting.tools])[cutting.moves.tool[mover]], FRONT)
+    most = np.maximum(np.array([2.0 * t.widest_radius for t in cutting.tools])[cutting.moves.tool[mover]], FRONT)
     front, end = begin + deep, np.full(len(ways), np.inf)
     rows = np.flatnonzero((mover >= 0) & (front > DEEP) & (front < most))
     if len(rows):
