@@ -1,7 +1,8 @@
 """Where ends of cutters press deepest into the part: rays there see pits and lenses that lie between the guard points.
 
 A cut that is narrow to all sides mostly ends where the path turns: down and up, in and out. So the end of a tool is
-looked at wherever a feed move ends at a corner of the path, and at even distances along all feed moves. The points of
+looked at wherever a feed move ends at a corner of the path, and at even distances along all feed moves. Of a tapered
+mill that is its end, and the rim where its flutes end: no other place of it is farther out. The points of
 drills and pointed chamfer mills have findings of their own. Coordinates are float64, mm, in the setup frame.
 """
 
@@ -39,6 +40,23 @@ THIN = 0.05  # mm
 BATCH = 4096  # poses
 SPARE = 1e-6  # mm
 INT = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class _Ring:
+    """A circle round the axis of a tool that grows to a part of its shape, mm: to a corner, or not at all to a rim.
+
+    radius, high : of the circle, and its height over the tip; grown : by how much it grows
+    """
+
+    radius: float
+    high: float
+    grown: float
+
+    @property
+    def reach(self) -> float:
+        """Distance of its farthest place from the middle of the circle, mm."""
+        return self.radius + self.grown
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,15 +100,18 @@ def turning_feet(tree: TriangleTree, moves: Moves, tools: Sequence[ToolBody],
     for k, tool in enumerate(tools):
         if tool.cone_height <= 0.0:
             rows, share = _corners(moves, k)
-            found += [_pressed(tree, *_placed(moves, rows, share, tool, tree.mesh.bounds), tool, lift, least)
-                      for lift in _lifts(tool)]
-        if tool.cone_height <= 0.0 and not _seen(tool, least, tolerance):
+            found += [_pressed(tree, *_placed(moves, rows, share, tool, tree.mesh.bounds), ring, least)
+                      for ring in (_end(tool), *_rims(tool))]
+        along = [] if tool.cone_height > 0.0 else [*([] if _seen(tool, least, tolerance) else [_end(tool)]),
+                                                   *(_rims(tool) if tool.taper > 0.0 else [])]
+        if along:
             rows, share, step = _ways(moves, k, tool, tree.mesh.bounds)
             if step > TOLD:
                 notes.append(Assumed(AssumedKind.BETWEEN_SAMPLES, round(step, 2), f"the paths of {tool.id} are long: a "
                                      f"smooth dip shorter than {step:.1f} mm may be missed aside of the middle of its "
                                      "end", "verify a part of the program at a time"))
-            found.append(_pressed(tree, *_placed(moves, rows, share, tool, tree.mesh.bounds), tool, 0.0, least))
+            at = _placed(moves, rows, share, tool, tree.mesh.bounds)
+            found += [_pressed(tree, *at, ring, least) for ring in along]
     return _joined(found).thinned(), notes
 
 
@@ -103,8 +124,7 @@ def _joined(parts: Sequence[Feet]) -> Feet:
 
 def _seen(tool: ToolBody, least: float, tolerance: float) -> bool:
     """Whether every cut of a ball that is too deep covers a guard point by more than ``least`` mm."""
-    round_ = tool.corner_radius >= tool.radius - 1e-12
-    return round_ and 0.5 * (0.87 * GUARD_SPACING) ** 2 / tool.radius + least < tolerance
+    return tool.end == "ball" and 0.5 * (0.87 * GUARD_SPACING) ** 2 / tool.radius + least < tolerance
 
 
 def _corners(moves: Moves, k: int) -> tuple[INT, F64]:
@@ -122,11 +142,12 @@ def _corners(moves: Moves, k: int) -> tuple[INT, F64]:
 def _ways(moves: Moves, k: int, tool: ToolBody, bounds: F64) -> tuple[INT, F64, float]:
     """Even places along the feed moves of a tool that come near the part: moves, shares of them, and mm between two."""
     low, high = np.minimum(moves.start, moves.end), np.maximum(moves.start, moves.end)
-    near = ((low < bounds[1] + tool.radius) & (high > bounds[0] - tool.radius)).all(axis=1)
+    far = _far(tool)
+    near = ((low < bounds[1] + far) & (high > bounds[0] - far)).all(axis=1)
     rows = np.flatnonzero(moves.feed & (moves.tool == k) & near)
     length = np.linalg.norm(moves.end[rows] - moves.start[rows], axis=1)
     past = np.cumsum(length)
-    most = MAX_BALLS if tool.corner_radius >= tool.radius - 1e-12 else MAX_RINGS
+    most = MAX_BALLS if tool.kind == "ball" else MAX_RINGS
     if not len(rows) or past[-1] <= 0.0:
         return np.zeros(0, np.int64), np.zeros(0), STEP
     step = max(STEP, float(past[-1]) / most)
@@ -143,25 +164,31 @@ def _placed(moves: Moves, row: INT, share: F64, tool: ToolBody, bounds: F64) -> 
         turn = (share * moves.axes.angle[row])[:, None]
         axis = np.cos(turn) * moves.axes.axis[row] + np.sin(turn) * np.cross(moves.axes.about[row],
                                                                               moves.axes.axis[row])
-    near = ((tip > bounds[0] - 2.0 * tool.radius) & (tip < bounds[1] + 2.0 * tool.radius)).all(axis=1)
+    far = 2.0 * _far(tool)
+    near = ((tip > bounds[0] - far) & (tip < bounds[1] + far)).all(axis=1)
     both = np.round(np.column_stack([tip, axis])[near], 7)
     both = both[np.lexsort(both.T[::-1] if moves.axes is not None else both.T[2::-1])]
     both = both[np.append(True, (both[1:] != both[:-1]).any(axis=1))] if len(both) else both
     return both[:, :3], both[:, 3:]
 
 
-def _pressed(tree: TriangleTree, tip: F64, axis: F64, tool: ToolBody, lift: float, least: float) -> Feet:
-    """The deepest place of each pose (n, 3) that presses in by more than ``least`` mm, on a rim ``lift`` mm up.
+def _far(tool: ToolBody) -> float:
+    """How far from its tip a tool is looked at, mm."""
+    return tool.radius if tool.taper <= 0.0 else math.hypot(tool.widest_radius, tool.flute_length)
+
+
+def _pressed(tree: TriangleTree, tip: F64, axis: F64, ring: _Ring, least: float) -> Feet:
+    """The deepest place of each pose (n, 3) that presses in by more than ``least`` mm, on a ring.
 
     An end presses in nowhere by ``least`` where its middle is in air and no surface comes nearer to it than its rim is
     by as much: the way from the middle to a place so deep in the part goes through the surface before.
     """
-    middle, reach = tip + (tool.corner_radius + lift) * axis, tool.radius - least + SPARE
+    middle, reach = tip + ring.high * axis, ring.reach - least + SPARE
     alone = np.flatnonzero(nearest(tree, middle, reach)[1] < 0) if reach > 0.0 else np.arange(len(tip))
     may = np.ones(len(tip), np.bool_)
     may[alone] = _inside_alone(tree, middle[alone], max(reach, SPARE))
     tip, axis = tip[may], axis[may]
-    return _joined([_deepest(tree, tip[i:i + BATCH], axis[i:i + BATCH], tool, lift, least)
+    return _joined([_deepest(tree, tip[i:i + BATCH], axis[i:i + BATCH], ring, least)
                     for i in range(0, len(tip), BATCH)])
 
 
@@ -185,15 +212,21 @@ def _inside_alone(tree: TriangleTree, points: F64, radius: float) -> NDArray[np.
     return out
 
 
-def _lifts(tool: ToolBody) -> tuple[float, ...]:
-    return (0.0,) if tool.corner_radius > 0.0 else (0.0, min(LIFT, LIFT_SHARE * tool.radius))
+def _end(tool: ToolBody) -> _Ring:
+    return _Ring(tool.radius - tool.corner_radius, tool.corner_radius, tool.corner_radius)
 
 
-def _deepest(tree: TriangleTree, tip: F64, axis: F64, tool: ToolBody, lift: float, least: float) -> Feet:
+def _rims(tool: ToolBody) -> list[_Ring]:
+    """Of a sharp end a rim over it, and of a tapered mill the upper end of its side."""
+    out = [] if tool.corner_radius > 0.0 else [_Ring(tool.radius, min(LIFT, LIFT_SHARE * tool.radius), 0.0)]
+    return [*out, _Ring(tool.widest_radius, tool.flute_length, 0.0)] if tool.taper > 0.0 else out
+
+
+def _deepest(tree: TriangleTree, tip: F64, axis: F64, on: _Ring, least: float) -> Feet:
     x = square_to(axis)
     y = np.cross(axis, x)
-    ring, ball = tool.radius - tool.corner_radius, tool.corner_radius
-    middle = tip + (ball + lift) * axis
+    ring, ball = on.radius, on.grown
+    middle = tip + on.high * axis
 
     def depth(rows: INT, angle: F64) -> tuple[F64, F64, F64, INT]:
         """How deep the end presses in at angles (k,) rad of poses; feet, ways out, triangles."""
