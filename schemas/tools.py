@@ -25,7 +25,10 @@ MAX_TAPER = 45.0
 CORE_SHARE = 0.3
 """Default of ``core_diameter_mm`` as a share of the diameter."""
 
-Length = Annotated[Number, Field(ge=1e-3, le=2000)]
+MAX_LENGTH = 2000.0
+"""Greatest length and diameter, mm."""
+
+Length = Annotated[Number, Field(ge=1e-3, le=MAX_LENGTH)]
 
 
 class HolderSegment(WireModel):
@@ -158,13 +161,14 @@ class Tool(WireModel):
         self._check_taper()
         if self.corner_radius_mm > radius + LENGTH_EPSILON:
             raise ValueError(f"tool {self.id}: corner_radius_mm {self.corner_radius_mm:g} is larger than half the "
-                             f"diameter, {radius:g}")
+                             f"diameter, {radius:g}; give at most that")
         if self.kind in VERIFIED_KINDS and self.corner_radius_mm != 0:
             raise ValueError(f"tool {self.id}: a tool of kind {self.kind} has corner_radius_mm 0")
         tapered, end = self.kind.rpartition("_")[::2]
         other = f"{tapered}_" if tapered else ""
         if end == "flat" and self.corner_radius_mm != 0:
-            raise ValueError(f"tool {self.id}: a flat end mill has corner_radius_mm 0; use kind {other}bull")
+            raise ValueError(f"tool {self.id}: a flat end mill has corner_radius_mm 0, not "
+                             f"{self.corner_radius_mm:g}; use kind {other}bull")
         if end == "bull" and self.corner_radius_mm == 0:
             raise ValueError(f"tool {self.id}: a bull nose needs a corner_radius_mm above 0; use kind {other}flat")
         if end == "ball":
@@ -180,8 +184,10 @@ class Tool(WireModel):
                                  f"above 0 and at most {MAX_TAPER:g}; it is the angle between side and axis. Use kind "
                                  f"{self.kind.removeprefix('tapered_')} for 0, kind chamfer for more")
         elif self.taper_angle_deg != 0:
-            raise ValueError(f"tool {self.id}: taper_angle_deg belongs to kinds {', '.join(TAPERED_KINDS)}, and is 0 "
-                             f"for kind {self.kind}")
+            own = f"tapered_{self.kind}"
+            raise ValueError(f"tool {self.id}: taper_angle_deg {self.taper_angle_deg:g} belongs to kinds "
+                             f"{', '.join(TAPERED_KINDS)}, and is 0 for kind {self.kind}; "
+                             f"{f'use kind {own}, or ' if own in TAPERED_KINDS else ''}leave it out")
 
     def _check_cone(self) -> None:
         if self.point_angle_deg is None:
@@ -281,10 +287,13 @@ class Tool(WireModel):
             if a > b + LENGTH_EPSILON:
                 raise ValueError(f"tool {self.id}: {low} {a:g} is longer than {high} {b:g}; from the tip upwards it "
                                  "must hold that flute_length_mm <= neck_length_mm <= stickout_mm <= gauge_length_mm")
+        if self.widest_mm > MAX_LENGTH:
+            raise ValueError(f"tool {self.id}: its cone is {self.widest_mm:g} wide at the end of the flutes, more than "
+                             f"{MAX_LENGTH:g}; reduce taper_angle_deg or flute_length_mm")
         if _given(self.neck_diameter_mm) > self.widest_mm + LENGTH_EPSILON:
             widest = "diameter_mm" if self.taper_angle_deg == 0 else "the end of the cone,"
             raise ValueError(f"tool {self.id}: neck_diameter_mm {self.neck_diameter_mm:g} is larger than {widest} "
-                             f"{self.widest_mm:g}; a neck is relieved")
+                             f"{self.widest_mm:g}; a neck is relieved, so give at most that")
         if self.core_diameter_mm is not None and self.kind == "tap":
             if self.core_diameter_mm > self.diameter_mm:
                 raise ValueError(f"tool {self.id}: core_diameter_mm {self.core_diameter_mm:g} of a tap is at most its "
@@ -297,7 +306,7 @@ class Tool(WireModel):
                              f"radius {self.corner_height:g}, so the rounded end would not cut" if
                              self.taper_angle_deg == 0 else
                              f"tool {self.id}: flute_length_mm {self.flute_length_mm:g} ends below the cone, which "
-                             f"begins {self.corner_height:g} above the tip")
+                             f"begins {self.corner_height:g} above the tip; give at least that")
         if _given(self.flute_length_mm) < self.cone_height - LENGTH_EPSILON:
             raise ValueError(f"tool {self.id}: flute_length_mm {self.flute_length_mm:g} is shorter than the cone at "
                              f"its end, {self.cone_height:g} high; flute_length_mm counts from the tip of the cone")

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from geometry.errors import SetupError
 from schemas.materials import MATERIALS, find_material
 from schemas.setup import Setup, canonical_json, content_hash, setup_sha256
+from schemas.tools import BUILT_KINDS
 from service.cutting_data import cutting_data, feed_per_tooth
 from service.from_wire import (
     check_plannable,
@@ -72,7 +73,7 @@ def test_a_tool_that_leaves_lengths_out_is_straight():
     (tool(flute_length_mm=1), "shorter than the corner radius"),
     (tool(corner_radius_mm=1), "half its diameter"), (tool(corner_radius_mm=2), "larger than half"),
     (tool(kind="flat", corner_radius_mm=1), "use kind bull"), (tool(kind="bull"), "use kind flat"),
-    (tool(kind="barrel"), "not available yet"), (tool(kind="tapered_ball"), "not available yet"),
+    (tool(kind="barrel"), "not available yet"),
     (tool(point_angle_deg=118), "belongs to kinds drill, tap and chamfer"),
     (tool(kind="drill", tip_diameter_mm=1), "a drill has a point"),
     (tool(kind="drill", corner_radius_mm=1), "has corner_radius_mm 0"),
@@ -84,7 +85,7 @@ def test_a_tool_that_leaves_lengths_out_is_straight():
     (tool(kind="tap", tip_diameter_mm=2), "needs point_angle_deg"),
     (tool(kind="thread_mill", point_angle_deg=60), "belongs to kinds drill, tap and chamfer"),
     (tool(kind="drill", pitch_mm=1), "belongs to kinds tap and thread_mill"),
-    (tool(taper_angle_deg=3), "not available yet"), (tool(number=0), "greater than or equal to 1"),
+    (tool(number=0), "greater than or equal to 1"),
     (setup(quality={"scallop_height_mm": 1.5}), "radius 1.5 of the smallest tool T1"),
     (setup(quality={"scallop_height_mm": 0}), "greater than or equal to 0.0001"),
     (setup(quality={"scallop_height_mm": 1e-300}), "greater than or equal to 0.0001"),
@@ -186,7 +187,7 @@ def test_tools_of_programs_to_be_verified_have_their_cone_and_are_not_planned(gi
     assert canonical_json(parse_setup(canonical_json(one))) == canonical_json(one)
     with pytest.raises(SetupError, match=rf"T1 \({given['kind']}\)") as caught:
         check_plannable(one)
-    assert caught.value.code == "verify_only_tool" and caught.value.limit == ["ball", "flat", "bull"]
+    assert caught.value.code == "verify_only_tool" and caught.value.limit == list(BUILT_KINDS)
 
 
 def test_the_tool_in_the_spindle_is_one_of_the_setup():
