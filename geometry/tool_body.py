@@ -85,6 +85,11 @@ class ToolBody:
         return f"tapered_{self.end}" if self.taper > 0.0 else self.end
 
     @property
+    def taper_deg(self) -> float:
+        """Angle between the side and the axis, deg."""
+        return math.degrees(math.atan(self.taper))
+
+    @property
     def corner_end(self) -> tuple[float, float]:
         """Where the corner ends and the side begins: distance from the axis and height over the tip, mm."""
         long = math.hypot(1.0, self.taper)

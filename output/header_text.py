@@ -28,11 +28,17 @@ def decimal(value: float, digits: int = 4) -> str:
     return "0" if text in ("-0", "") else text
 
 
+def short_words(tool: ToolBody) -> str:
+    """'ball D3' or 'tapered ball D1 3 deg': kind, diameter, and angle between side and axis."""
+    angle = f" {decimal(tool.taper_deg)} deg" if tool.taper > 0.0 else ""
+    return f"{tool.kind.replace('_', ' ')} D{decimal(tool.diameter)}{angle}"
+
+
 def tool_words(tool: ToolBody) -> str:
     """Every dimension of a tool that a presetter can check, mm."""
     d = decimal
-    words = [f"{tool.kind} D{d(tool.diameter)}", f"corner R{d(tool.corner_radius)}",
-             f"flute length {d(tool.flute_length)}"]
+    cone = f" to D{d(2.0 * tool.widest_radius)}" if tool.taper > 0.0 else ""
+    words = [short_words(tool), f"corner R{d(tool.corner_radius)}", f"flute length {d(tool.flute_length)}{cone}"]
     if tool.neck_length > tool.flute_length:
         words.append(f"neck D{d(tool.neck_diameter)} to {d(tool.neck_length)}")
     words += [f"shank D{d(tool.shank_diameter)}", f"stickout {d(tool.stickout)}"]

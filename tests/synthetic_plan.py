@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +23,10 @@ BALL = ToolBody("T1", 1, 3.0, 1.5, 9.0, 2.8, 20.0, 6.0, 45.0, HOLDER)
 FLAT = ToolBody("T2", 2, 6.0, 0.0, 18.0, 6.0, 18.0, 6.0, 40.0, HOLDER)
 BULL = ToolBody("rougher Ø8", 7, 8.0, 1.0, 20.0, 7.6, 30.0, 8.0, 50.0, HOLDER)
 CLEAR = 25.0
+TAPERED = {body.kind: body for body in (
+    ToolBody("T1", 1, d, c, 12.0, 2.0, 20.0, 6.0, 45.0, HOLDER, taper=math.tan(math.radians(3.0)))
+    for d, c in ((1.0, 0.5), (2.0, 0.4), (2.0, 0.0)))}
+"""A tapered mill of each kind, 3 degrees between side and axis."""
 
 
 def write_linuxcnc(plan: Workplan) -> str:
@@ -92,6 +97,12 @@ def tiny() -> Workplan:
         line(TrajectoryKind.RAPID, (0.0, 2.5, 6.0), (0.0, 2.5, CLEAR)),
     )
     return plan(step(1, BALL, "waterline", trajectories=cut), labels={"order": "4711"}, comments=())
+
+
+def tapered(kind: str = "tapered_ball", **changes: object) -> Workplan:
+    """One step with a tapered mill."""
+    tool = TAPERED[kind]
+    return plan(step(1, tool, "waterline"), tools=(tool,), **changes)
 
 
 def long_plan(points: int, rows: int = 300) -> Workplan:

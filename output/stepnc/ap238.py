@@ -22,10 +22,11 @@ import numpy as np
 from geometry.errors import OutputError
 from geometry.mesh import F64, TriangleMesh
 from geometry.tool_body import ToolBody
-from output.header_text import decimal, height_word, step_title, tool_name
+from output.header_text import decimal, height_word, short_words, step_title, tool_name
 from output.program_grid import I64, GridArc, check_plan
 from output.stepnc.common import (
     Curve,
+    cutter_diameter,
     fresh_words,
     header_words,
     operation_words,
@@ -45,6 +46,10 @@ from output.workplan import Ap238, Workplan
 from toolpath.workingsteps import Trajectory, TrajectoryKind, Workingstep
 
 _KIND = {"ball": "ballnose endmill", "bull": "bullnose endmill", "flat": "endmill"}
+_TAPERED = "user defined milling tool"  # the standard has no tapered end mill since its second edition
+_OLD_KIND = {"ball": "ball endmill"}  # names in the first edition that differ
+_OLD_TAPERED = "tapered endmill"
+_DEGREE = 0.0174532925199433  # rad
 _TYPE = {
     TrajectoryKind.RAPID: "connect", TrajectoryKind.APPROACH: "approach", TrajectoryKind.CUT: "trajectory path",
     TrajectoryKind.CONNECT: "connect", TrajectoryKind.LIFT: "lift",
@@ -123,10 +128,11 @@ class _Ap238Writer:
         self.view = add(f"PRODUCT_DEFINITION_CONTEXT('CNC Machining',#{application},'manufacturing')")
         self.plain = add("REPRESENTATION_CONTEXT('','units not necessary')")
         self.mm = add("(LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT(.MILLI.,.METRE.))")
-        radian = add("(NAMED_UNIT(*) PLANE_ANGLE_UNIT() SI_UNIT($,.RADIAN.))")
+        self.radian = add("(NAMED_UNIT(*) PLANE_ANGLE_UNIT() SI_UNIT($,.RADIAN.))")
+        self.degree: int | None = None  # written where a tool has an angle
         steradian = add("(NAMED_UNIT(*) SI_UNIT($,.STERADIAN.) SOLID_ANGLE_UNIT())")
         self.space = add(f"(GEOMETRIC_REPRESENTATION_CONTEXT(3) "
-                         f"GLOBAL_UNIT_ASSIGNED_CONTEXT((#{self.mm},#{radian},#{steradian})) "
+                         f"GLOBAL_UNIT_ASSIGNED_CONTEXT((#{self.mm},#{self.radian},#{steradian})) "
                          f"REPRESENTATION_CONTEXT('','3D'))")
         self.up = add("DIRECTION('',(0.,0.,1.))")
         self.along = add("DIRECTION('',(1.,0.,0.))")
@@ -396,26 +402,53 @@ class _Ap238Writer:
         return strategy
 
     def _tool(self, number: int, tool: ToolBody, operations: list[int]) -> None:
+        """A tool with its body. One with a taper has its profile as the cutter of APT, and its kind in words."""
         add, known = self.file.add, self.plan.assembly(tool)
         kind = add("ACTION_RESOURCE_TYPE('milling cutting tool')")
-        words = _KIND[tool.kind]
-        if self.plan.ap238 is Ap238.INTEGRATED_CNC and tool.kind == "ball":
-            words = "ball endmill"
+        old = self.plan.ap238 is Ap238.INTEGRATED_CNC
+        if tool.taper > 0.0:
+            words = _OLD_TAPERED if old else _TAPERED
+        else:
+            words = _OLD_KIND.get(tool.end, _KIND[tool.end]) if old else _KIND[tool.end]
         self.file.fill(number, f"MACHINING_TOOL('{tool.number}','{words}',{refs(operations)},#{kind})")
         prop = add(f"RESOURCE_PROPERTY('tool body',{quoted(tool_name(tool))},#{number})")
-        items = [self._length("effective cutting diameter", tool.diameter),
+        items = [self._length("effective cutting diameter", cutter_diameter(tool)),
                  self._length("maximum depth of cut", tool.flute_length),
                  self._length("overall assembly length", known.gauge_length),
                  add("DESCRIPTIVE_REPRESENTATION_ITEM('hand of cut','right')")]
         if known.teeth is not None:
             items.append(add(f"MEASURE_REPRESENTATION_ITEM('number of effective teeth',COUNT_MEASURE({known.teeth}.),"
                              f"#{self.count})"))
-        if tool.kind != "flat":
+        if tool.taper > 0.0:
+            items += self._taper(tool, old)
+        elif tool.end != "flat":
             items.append(self._length("edge radius", tool.corner_radius))
         body = add(f"MACHINING_TOOL_BODY_REPRESENTATION('{words}',{refs(items)},#{self.plain})")
         add(f"RESOURCE_PROPERTY_REPRESENTATION('','',#{prop},#{body})")
         if known.life is not None:
             self._edge(number, tool, operations, known.gauge_length, known.life)
+
+    def _taper(self, tool: ToolBody, old: bool) -> list[int]:
+        """Angle and corner of a tapered mill: the cutter of APT, whose side touches the corner.
+
+        old : whether the names are those of the first edition
+        """
+        if self.degree is None:
+            none = self.file.add("DIMENSIONAL_EXPONENTS(0.,0.,0.,0.,0.,0.,0.)")
+            size = self.file.add(f"PLANE_ANGLE_MEASURE_WITH_UNIT(PLANE_ANGLE_MEASURE({real(_DEGREE, 16)}),"
+                                 f"#{self.radian})")
+            self.degree = self.file.add(f"(CONVERSION_BASED_UNIT('degree',#{size}) NAMED_UNIT(#{none}) "
+                                        "PLANE_ANGLE_UNIT())")
+        words = "edge radius,edge center horizontal,edge center vertical" if old else \
+            "corner radius,corner radius center horizontal,corner radius center vertical"
+        sizes = tool.corner_radius, tool.radius - tool.corner_radius, tool.corner_radius
+        items = [self._length(name, size) for name, size in zip(words.split(","), sizes, strict=True)]
+        if not old:
+            note = f"{short_words(tool)}; the effective cutting diameter is where its side meets the plane of its tip"
+            items.append(self.file.add(f"DESCRIPTIVE_REPRESENTATION_ITEM('tool description',{quoted(note)})"))
+        return [*items, self.file.add(
+            f"(MEASURE_REPRESENTATION_ITEM() MEASURE_WITH_UNIT(PLANE_ANGLE_MEASURE({real(tool.taper_deg, 6)}),"
+            f"#{self.degree}) PLANE_ANGLE_MEASURE_WITH_UNIT() REPRESENTATION_ITEM('taper angle'))")]
 
     def _edge(self, tool: int, body: ToolBody, operations: list[int], gauge: float, life: float) -> None:
         """The cutter of a tool and its life, min in cut."""

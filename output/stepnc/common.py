@@ -11,6 +11,7 @@ import numpy as np
 from geometry.errors import OutputError
 from geometry.mesh import F64
 from geometry.surfaces.nurbs import NurbsSurface
+from geometry.tool_body import ToolBody
 from output.clamping_sequence import Leg, each_clamped_step
 from output.header_text import face_words
 from output.inverse_kinematics import RotaryMachine
@@ -235,6 +236,20 @@ def written_feed(feed: float) -> float:
 def written_speed(rpm: float) -> float:
     """A spindle speed, 1/min, rounded as in programs: whole."""
     return float(round(rpm))
+
+
+def cutter_diameter(tool: ToolBody) -> float:
+    """Diameter of a cutter as STEP-NC counts it, mm: where its side would meet the plane of its tip, as in APT.
+
+    Without a taper it is the diameter of the tool. A side at the angle t that touches the corner meets the plane at
+    R - r + r (1 - sin t) / cos t, which is less than R.
+
+    >>> ball = ToolBody("T1", 1, 1.0, 0.5, 12.0, 2.0, 12.0, 4.0, 40.0, taper=math.tan(math.radians(3.0)))
+    >>> round(cutter_diameter(ball), 6)
+    0.948965
+    """
+    wide, high = tool.corner_end
+    return 2.0 * (wide - high * tool.taper) if tool.taper > 0.0 else tool.diameter
 
 
 def fresh_words(step: Workingstep) -> str:

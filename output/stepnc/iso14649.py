@@ -24,6 +24,7 @@ from output.header_text import step_title, tool_name
 from output.program_grid import GRID, GridArc, check_plan, to_grid
 from output.stepnc.common import (
     Curve,
+    cutter_diameter,
     fresh_words,
     header_words,
     knots_of,
@@ -299,15 +300,19 @@ class _Iso14649Writer:
         return self.technologies[key]
 
     def _tool(self, tool: ToolBody) -> int:
+        """A tool, one for the whole file; angles are degrees. A tapered mill of any end is a TAPERED_ENDMILL."""
         if tool.number not in self.tools:
-            add, ball = self.file.add, tool.kind == "ball"
+            add, ball = self.file.add, tool.end == "ball"
             edge = tool.radius if ball else tool.corner_radius
-            size = add(f"MILLING_TOOL_DIMENSION({real(tool.diameter)},$,$,{real(tool.flute_length)},{real(edge, 6)},"
-                       f"{real(edge, 6)},{real(0.0 if ball else tool.radius - edge, 6)})")
+            angle = real(tool.taper_deg, 6) if tool.taper else "$"
+            size = add(f"MILLING_TOOL_DIMENSION({real(cutter_diameter(tool), 6 if tool.taper else 4)},$,{angle},"
+                       f"{real(tool.flute_length)},{real(edge, 6)},{real(edge, 6)},"
+                       f"{real(0.0 if ball else tool.radius - edge, 6)})")
             # ENDMILL is abstract to some readers; a bull nose with edge radius 0 is a flat end mill to all
             known = self.plan.assembly(tool)
             teeth = "$" if known.teeth is None else str(known.teeth)
-            body = add(f"{'BALL_ENDMILL' if ball else 'BULLNOSE_ENDMILL'}(#{size},{teeth},.RIGHT.,.F.,$)")
+            kind = "TAPERED_ENDMILL" if tool.taper else "BALL_ENDMILL" if ball else "BULLNOSE_ENDMILL"
+            body = add(f"{kind}(#{size},{teeth},.RIGHT.,.F.,$" + (f",{angle})" if tool.taper else ")"))
             length, life = real(known.gauge_length), "$" if known.life is None else real(60.0 * known.life)
             part = add(f"CUTTING_COMPONENT({length},$,$,{life},$)")
             self.tools[tool.number] = add(f"MILLING_CUTTING_TOOL({quoted(tool_name(tool))},#{body},(#{part}),{length},"

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,20 @@ from output.stepnc.ap238 import write_stepnc_aim
 from output.stepnc.iso14649 import write_stepnc_arm
 from output.workplan import Ap238
 from tests import rs274
-from tests.synthetic_plan import BALL, block_mesh, clamped, full, long_plan, plan, shaped, step, tiny, write_linuxcnc
+from tests.synthetic_plan import (
+    BALL,
+    TAPERED,
+    block_mesh,
+    clamped,
+    full,
+    long_plan,
+    plan,
+    shaped,
+    step,
+    tapered,
+    tiny,
+    write_linuxcnc,
+)
 from toolpath.workingsteps import TrajectoryKind
 from verify.gcode.reader import read_program
 
@@ -25,7 +39,7 @@ CHECK = SHARED / "stepnc" / "p21check.py"
 GCODE = SHARED / "tools" / "gcode_check.sh"
 JOBS = {"five steps": plan, "tiny": tiny, "flat": lambda: plan(flat_step()), "long": lambda: long_plan(20_000, 40),
         "along borders": lambda: plan(step(1, BALL, "isoparametric"))}
-MORE = {"all there is": full, "with shapes": shaped, "a mesh as blank": lambda: shaped(
+MORE = {kind: partial(tapered, kind) for kind in TAPERED} | {"all there is": full, "with shapes": shaped, "a mesh as blank": lambda: shaped(
     cylinder=None, stock_mesh=block_mesh(), stock_words="solid of a STEP file"), "a block": lambda: shaped(
     cylinder=None, stock_words=""), "turning, all": lambda: shaped(job=clamped())}
 TURNING = {"one clamping": clamped, "a head": lambda: clamped("head-head-AC", tcp=False)}
@@ -53,10 +67,10 @@ def test_schema_accepts(write, schema, job, tmp_path):
 
 
 @pytest.mark.skipif(not CHECK.exists(), reason="the schema checker ../shared/stepnc/p21check.py is not there")
-@pytest.mark.parametrize("job", [full, clamped], ids=["all there is", "one clamping"])
-def test_the_schema_of_the_first_edition_accepts(job, tmp_path):
+@pytest.mark.parametrize(("job", "kind"), [(full, "ball"), (clamped, "ball"), (tapered, "tapered")])
+def test_the_schema_of_the_first_edition_accepts(job, kind, tmp_path):
     text = write_stepnc_aim(replace(job(), ap238=Ap238.INTEGRATED_CNC))
-    assert "FILE_SCHEMA(('INTEGRATED_CNC_SCHEMA'))" in text and "'ball endmill'" in text
+    assert "FILE_SCHEMA(('INTEGRATED_CNC_SCHEMA'))" in text and f"'{kind} endmill'" in text
     checked(text, "ap238e1_aim_lf.exp", tmp_path)
 
 

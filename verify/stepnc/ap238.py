@@ -8,6 +8,7 @@ and speeds are in the units of the file.
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable
 
@@ -20,7 +21,8 @@ from verify.program.turn_subdivision import TURN
 from verify.stepnc.ap238_attributes import EXECUTABLES, METHODS, RECORDS, REPRESENTATIONS, SHAPES, TABLE, UNITS
 from verify.stepnc.attribute_checks import FARTHEST, Checked, shown
 from verify.stepnc.curves import curve_points
-from verify.stepnc.iso14649 import sane_rates, shape_of, tool_number
+from verify.stepnc.cutter_shape import MAX_TAPER, SAME_SHAPE, CutterShape, contradiction, shape_of
+from verify.stepnc.iso14649 import sane_rates, tool_number
 from verify.stepnc.part21 import Part21File, Ref, Typed
 from verify.stepnc.tool_motion import MAX_DWELL, CutterRecord, MotionRecorder
 
@@ -57,13 +59,21 @@ _NAMES = {
     "FREEFORM_MILLING_STRATEGY": ("pathmode", "cutmode", "milling tolerances", "stepover length", "plane normal",
                                   "leading line", "forward direction", "sideward direction"),
 }
-_TOOLS = {"ballnose endmill": "ball", "ball endmill": "ball", "bullnose endmill": "bull", "endmill": "flat"}
+_TOOLS = {"ballnose endmill": "ball", "ball endmill": "ball", "bullnose endmill": "bull", "endmill": "flat",
+          "tapered endmill": "cone", "user defined milling tool": "cone"}
+_CORNER = {"edge radius": "corner", "corner radius": "corner", "edge center horizontal": "centre",
+           "corner radius center horizontal": "centre"}
+"""Sizes of the corner of a cutter with a cone, by their names in the first and the later editions."""
+_HEIGHTS = ("edge center vertical", "corner radius center vertical")
 DEVIATION = 0.001
 """mm, from the path, that a file may allow; the error bound includes it, as it does that of G64."""
 _NC_STOPS = ("program stop", "optional stop")
 _NC_QUIET = ("display message", "set mark")
 _ITEMS = ("effective cutting diameter", "maximum depth of cut", "overall assembly length", "hand of cut",
           "number of effective teeth", "edge radius", "coolant through tool", "functional length")
+_CONE_ITEMS = (*_CORNER, *_HEIGHTS, "taper angle", "tip outer angle", "tool description")
+_QUIET_ITEMS = ("coolant through tool", "tool description")
+_UNIT_OF = {"number of effective teeth": {}, "taper angle": {"angle": 1.0}, "tip outer angle": {"angle": 1.0}}
 
 
 def read_ap238(file: Part21File, recorder: MotionRecorder) -> None:
@@ -395,39 +405,61 @@ class Ap238Reader:
             raise self.file.error(tool, f"has {len(shown_by)} representations of its 'tool body', one is required")
         self.data.get(shown_by[0], "MACHINING_TOOL_BODY_REPRESENTATION")
         sizes: dict[str, float] = {}
+        kind = _TOOLS[self._word(tool, "MACHINING_TOOL", "description", _TOOLS)]
         for item in self._items(shown_by[0]):
-            name = self._item_name(item)
+            name = self._item_name(item, (*_ITEMS, *(_CONE_ITEMS if kind == "cone" else ())))
             if name == "hand of cut":
                 self.data.get(item, "DESCRIPTIVE_REPRESENTATION_ITEM")
                 self._word(item, "DESCRIPTIVE_REPRESENTATION_ITEM", "description", ("right", "neutral"))
-            elif name != "coolant through tool":
+            elif name not in _QUIET_ITEMS:
                 dimensions, sizes[name] = self._measured(item)
-                wanted = {} if name == "number of effective teeth" else {"length": 1.0}
+                wanted = _UNIT_OF.get(name, {"length": 1.0})
                 if dimensions != wanted:
                     raise self.file.error(item, f"'{name}' has a unit of {dimensions or 'nothing'}, "
                                                 f"{wanted or 'nothing'} is required")
                 self.data.within(item, f"'{name}'", sizes[name], 0.0, FARTHEST)
-        kind = _TOOLS[self._word(tool, "MACHINING_TOOL", "description", _TOOLS)]
         diameter = sizes.get("effective cutting diameter", 0.0)
         if not diameter > 0.0:
             raise self.file.error(shown_by[0], ", items: an 'effective cutting diameter' over 0 expected")
-        given = sizes.get("edge radius")
+        taper, given = 0.0, sizes.get("edge radius")
+        if kind == "cone":
+            shape = self._cone(tool, shown_by[0], sizes)
+            diameter, given, taper = shape.diameter, shape.corner, shape.taper
         corner = 0.5 * diameter if kind == "ball" else 0.0 if kind == "flat" else given
         if corner is None or not 0.0 <= corner <= 0.5 * diameter + 1e-9 or abs((given or corner) - corner) > 1e-6:
             raise self.file.error(shown_by[0], f", items: an 'edge radius' that suits a {kind} of {diameter:g} mm "
                                                f"expected, not {given}")
         name = str(self.data.one(tool, "MACHINING_TOOL", "name"))
-        return CutterRecord(tool_number(name), name, shape_of(diameter, corner), diameter, corner,
-                      sizes.get("maximum depth of cut"), sizes.get("overall assembly length"), tool)
+        return CutterRecord(tool_number(name), name, shape_of(diameter, corner, taper), diameter, corner,
+                      sizes.get("maximum depth of cut"), sizes.get("overall assembly length"), tool, taper=taper)
 
-    def _item_name(self, item: int) -> str:
-        """The name of an item of a tool body."""
+    def _cone(self, tool: int, body: int, sizes: dict[str, float]) -> CutterShape:
+        """The cutter of APT: its end is level, its side leans and touches its corner; else there is a remark."""
+        if sizes.get("tip outer angle", 0.0) != 0.0:
+            raise self.file.error(body, ", items: a 'tip outer angle' of 0 expected; pointed ends are not read")
+        found: dict[str, float] = {}
+        for name, meaning in _CORNER.items():
+            if name in sizes:
+                found[meaning] = sizes[name]
+        corner, taper = found.get("corner", 0.0), math.degrees(sizes.get("taper angle", 0.0))
+        self.data.within(body, "'taper angle', deg", taper, 0.0, MAX_TAPER)
+        for name in _HEIGHTS:
+            if abs(sizes.get(name, corner) - corner) > SAME_SHAPE:
+                raise self.file.error(body, f", items: {corner:g} mm expected as '{name}', the radius of the corner, not "
+                                            f"{sizes[name]:g}")
+        shape = CutterShape(sizes["effective cutting diameter"], corner, found.get("centre"), taper)
+        if shape.difference > SAME_SHAPE:
+            self.recorder.remarks.append(Remark(self.file.line(body), contradiction(tool, shape)))
+        return shape
+
+    def _item_name(self, item: int, known: tuple[str, ...]) -> str:
+        """The name of an item of a tool body, one of ``known``."""
         records = self.file.records(item)
         entity, values = next((r for r in records if r[0] == "REPRESENTATION_ITEM"), records[0])
         if not values or not isinstance(values[0], str):
             raise self.file.error(item, f"must be an item with a name, not {entity}")
-        if values[0] not in _ITEMS:
-            raise self.file.error(item, f", name: one of {', '.join(map(repr, _ITEMS))} expected, not {values[0]!r}")
+        if values[0] not in known:
+            raise self.file.error(item, f", name: one of {', '.join(map(repr, known))} expected, not {values[0]!r}")
         return values[0]
 
     def _security_plane(self) -> tuple[F64, F64] | None:

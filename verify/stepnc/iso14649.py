@@ -15,6 +15,7 @@ import numpy as np
 
 from geometry.errors import ProgramError
 from geometry.mesh import F64
+from verify.program.program import Remark
 from verify.stepnc.attribute_checks import (
     FARTHEST,
     FLAG,
@@ -32,6 +33,7 @@ from verify.stepnc.attribute_checks import (
     attributes,
 )
 from verify.stepnc.curves import CURVE_TABLE, CURVES, curve_points
+from verify.stepnc.cutter_shape import MAX_TAPER, SAME_SHAPE, CutterShape, contradiction, shape_of
 from verify.stepnc.part21 import Part21File, Ref, Typed, Value
 from verify.stepnc.tool_motion import MAX_DWELL, MAX_FEED, MAX_SPEED, MIN_FEED, CutterRecord, MotionRecorder
 
@@ -40,7 +42,7 @@ MM_MIN = 60_000.0  # of one m/s
 RPM = 60.0  # of one 1/s
 _EXECUTABLES = ("WORKPLAN", "MACHINING_WORKINGSTEP", "RAPID_MOVEMENT", "RETURN_HOME", "DISPLAY_MESSAGE",
                 "PROGRAM_STOP", "OPTIONAL_STOP", "SET_MARK")
-_CUTTERS = ("BALL_ENDMILL", "BULLNOSE_ENDMILL", "ENDMILL")
+_CUTTERS = ("BALL_ENDMILL", "BULLNOSE_ENDMILL", "ENDMILL", "TAPERED_ENDMILL")
 _AXES = ("THREE_AXES", "THREE_AXES_TILTED_TOOL", "FIVE_AXES_VAR_TILT_YAW")
 _TYPES = OneOf(("APPROACH", "LIFT", "CONNECT", "NON_CONTACT", "CONTACT", "TRAJECTORY_PATH"))
 _SPEED = Named((("SPEED_NAME", OneOf(("RAPID",))),))
@@ -125,7 +127,8 @@ TABLE: Table = {
         its_id=Text(), its_tool_body=To(_CUTTERS), its_cutting_edge=Many(To(("CUTTING_COMPONENT",)), 1),
         overall_assembly_length=Maybe(Real(0.0, FARTHEST)), direction_for_spindle_orientation=Maybe(To(("DIRECTION",))),
         tool_holder_diameter_for_spindle_orientation=Maybe(Real())),
-    **{name: attributes(**_BLADE) for name in _CUTTERS},
+    **{name: attributes(**_BLADE) for name in _CUTTERS if name != "TAPERED_ENDMILL"},
+    "TAPERED_ENDMILL": attributes(**_BLADE, taper_angle=Maybe(Real())),
     "MILLING_TOOL_DIMENSION": attributes(
         diameter=Real(0.0, FARTHEST), tool_tip_half_angle=Maybe(Real()), tool_circumference_angle=Maybe(Real()),
         cutting_edge_length=Maybe(Real(0.0, FARTHEST)), edge_radius=Maybe(Real(-1e-9, FARTHEST)),
@@ -412,18 +415,40 @@ class Iso14649Reader:
                             for a in ("diameter", "edge_radius", "cutting_edge_length"))
         if wide is None:
             raise self.file.error(size, ", diameter: a real number expected")
-        for angle in ("tool_tip_half_angle", "tool_circumference_angle"):
+        taper = self._taper(body, kind, size)
+        for angle in ("tool_tip_half_angle", *(() if taper > 0.0 else ("tool_circumference_angle",))):
             if self.data.one(size, "MILLING_TOOL_DIMENSION", angle) not in (None, 0.0):
-                raise self.file.error(size, f", {angle}: $ or 0. expected; tapered cutters are not read")
+                raise self.file.error(size, f", {angle}: $ or 0. expected; only the side of a TAPERED_ENDMILL may lean")
+        if taper > 0.0:
+            wide = self._tapered_end(number, size, CutterShape(wide, edge or 0.0, self.data.real(
+                size, "MILLING_TOOL_DIMENSION", "edge_center_horizontal"), taper))
         corner = 0.5 * wide if kind == "BALL_ENDMILL" else edge or 0.0
         if edge is not None and abs(edge - corner) > 1e-6 or corner > 0.5 * wide + 1e-9:
             raise self.file.error(size, f", edge_radius: {0.5 * wide:g} (half of the diameter) expected, or less on a "
                                         f"bull nose, not {edge}")
         edges = {float(self.data.real(n, "CUTTING_COMPONENT", "tool_offset_length") or 0.0)
                  for n in self.data.refs(number, "MILLING_CUTTING_TOOL", "its_cutting_edge")}
-        return CutterRecord(tool_number(name), name, shape_of(wide, corner), wide, corner, long,
+        return CutterRecord(tool_number(name), name, shape_of(wide, corner, taper), wide, corner, long,
                             self.data.real(number, "MILLING_CUTTING_TOOL", "overall_assembly_length"), number,
-                            tuple(sorted(edges)))
+                            tuple(sorted(edges)), taper)
+
+    def _taper(self, body: int, kind: str, size: int) -> float:
+        """Angle between the side of a tapered end mill and its axis, deg; 0 of all others."""
+        if kind != "TAPERED_ENDMILL":
+            return 0.0
+        own = self.data.real(body, kind, "taper_angle")
+        side = self.data.real(size, "MILLING_TOOL_DIMENSION", "tool_circumference_angle")
+        if own is not None and side is not None and abs(own - side) > 1e-6:
+            raise self.file.error(body, f", taper_angle: {side:g} expected, the tool_circumference_angle of #{size}, "
+                                        f"not {own:g}", size)
+        found = own if own is not None else side or 0.0
+        return self.data.within(body, "taper_angle, deg", found, 0.0, MAX_TAPER)
+
+    def _tapered_end(self, number: int, size: int, shape: CutterShape) -> float:
+        """Diameter of the end of a tapered mill, mm; a side that does not touch the corner is a remark."""
+        if shape.difference > SAME_SHAPE:
+            self.recorder.remarks.append(Remark(self.file.line(size), contradiction(number, shape)))
+        return shape.diameter
 
     def _plane(self, number: int) -> tuple[F64, F64]:
         """Point and unit normal of a security plane in the setup frame, mm."""
@@ -444,11 +469,4 @@ def sane_rates(data: Checked, technology: int, feed: float, speed: float) -> tup
     return feed, data.within(technology, "spindle in 1/min", speed, -MAX_SPEED, MAX_SPEED)
 
 
-def shape_of(diameter: float, corner: float) -> str:
-    """'ball', 'bull' or 'flat' by diameter and corner radius, mm."""
-    if corner <= 0.0:
-        return "flat"
-    return "ball" if corner >= 0.5 * diameter - 1e-6 else "bull"
-
-
-__all__ = ["SCHEMAS", "read_iso14649", "sane_rates", "shape_of", "tool_number"]
+__all__ = ["SCHEMAS", "read_iso14649", "sane_rates", "tool_number"]

@@ -14,6 +14,7 @@ from verify.stepnc.part21 import Part21File, is_exchange_file
 from verify.stepnc.tool_motion import CutterMoves, CutterRecord, MotionRecorder
 
 SAME_SIZE = 1e-4  # mm, between sizes of a tool in the file and in the setup
+SAME_ANGLE = 1e-3  # deg, between a taper in the file and in the setup
 SAME_LENGTH = 1.0  # mm, between lengths from the spindle to the tip, which are measured at the machine
 
 is_stepnc = is_exchange_file
@@ -91,7 +92,7 @@ def _known(recorder: MotionRecorder, cutter: CutterRecord, tools: Sequence[ToolB
                                   f"T{alike[0].number}")
             return alike[0].number
     if body is None:
-        raise ProgramError(f"{recorder.name}, #{cutter.instance}: tool '{cutter.name}', {cutter.kind} of "
+        raise ProgramError(f"{recorder.name}, #{cutter.instance}: tool '{cutter.name}', {cutter.kind.replace('_', ' ')} of "
                            f"{cutter.diameter:g} mm, matches no tool of the setup, or several",
                            subjects=(f"#{cutter.instance}",), measured=cutter.number,
                            limit=sorted(t.number for t in tools),
@@ -115,8 +116,11 @@ def _differs(cutter: CutterRecord, body: ToolBody) -> str:
     """Differences between a tool of the file and one of the setup, in words; '' where there is none."""
     pairs = (("diameter", cutter.diameter, body.diameter), ("corner radius", cutter.corner_radius, body.corner_radius),
              ("flute length", cutter.flute_length, body.flute_length))
-    return ", ".join(f"{word} {there:g} mm in the file and {here:g} mm in the setup" for word, there, here in pairs
-                     if there is not None and abs(there - here) > SAME_SIZE)
+    found = [f"{word} {there:g} mm in the file and {here:g} mm in the setup" for word, there, here in pairs
+             if there is not None and abs(there - here) > SAME_SIZE]
+    if abs(cutter.taper - body.taper_deg) > SAME_ANGLE:
+        found.append(f"taper {cutter.taper:g} deg in the file and {body.taper_deg:g} deg in the setup")
+    return ", ".join(found)
 
 
 __all__ = ["is_stepnc", "read_moves", "read_stepnc"]

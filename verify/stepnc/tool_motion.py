@@ -38,10 +38,11 @@ class CutterRecord:
 
     number        : T number, from the start of the id
     name          : the id in the file
-    kind          : 'ball', 'bull' or 'flat'
-    diameter, corner_radius, flute_length, assembly_length : mm
+    kind          : 'ball', 'bull' or 'flat', of a tapered mill with 'tapered_' before it
+    diameter, corner_radius, flute_length, assembly_length : mm; the diameter of a tapered mill is that of its end
     instance      : number of its instance
     offsets       : mm, lengths from the spindle to the cutting edges
+    taper         : deg, between side and axis; 0 for an upright side
     """
 
     number: int | None
@@ -53,6 +54,7 @@ class CutterRecord:
     assembly_length: float | None
     instance: int
     offsets: tuple[float, ...] = ()
+    taper: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
