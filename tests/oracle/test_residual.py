@@ -65,7 +65,7 @@ def test_the_measure_of_a_tapered_mill_is_that_of_dense_tips(body, level):
     rng = np.random.default_rng(3)
     path = np.cumsum(rng.normal(size=(7, 3)) * [1.5, 1.5, 0.0 if level else 0.4], axis=0)
     near = dense(path, 0.05)
-    n = 1000
+    n = 1500
     c, a = near[rng.integers(0, len(near), n)], rng.random(n) * 2 * np.pi
     high = rng.random(n) * body.flute_length
     outline = np.array([width(body, h) for h in high]) + np.abs(rng.normal(size=n) * 0.01)
@@ -78,7 +78,7 @@ def test_the_measure_of_a_tapered_mill_is_that_of_dense_tips(body, level):
         rho, h = np.hypot(points[:, 0] - tip[0], points[:, 1] - tip[1]), points[:, 2] - tip[2]
         true = np.minimum(true, off_mill(body, rho, h))
     out, seen = true > 1e-4, made.residual < UNTOUCHED
-    assert (out & seen).sum() > 30
+    assert (out & seen).sum() > 20
     assert (made.residual[seen & out] >= true[seen & out] - 1e-3).all()
     if level:
         np.testing.assert_allclose(made.residual[seen & out], true[seen & out], atol=1e-3)
@@ -97,7 +97,7 @@ def off_mill(body, rho, h):
     """Distance from places outside to the outline of a tapered mill that goes on above, as to 4000 of its points."""
     at = 3.0 * body.flute_length * np.linspace(0.0, 1.0, 6000)**2
     outline = np.column_stack([[width(body, x) for x in at], at])
-    flat = np.column_stack([np.linspace(0.0, outline[0, 0], 50), np.zeros(50)])
+    flat = np.column_stack([np.linspace(0.0, outline[0, 0], 800), np.zeros(800)])
     near = cKDTree(np.vstack([flat, outline])).query(np.column_stack([rho, h]))[0]
     inside = (h >= 0.0) & (rho < np.interp(h, at, outline[:, 0]))
     return np.where(inside, -near, near)
