@@ -162,7 +162,7 @@ def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float 
 
 def lightly_finished(setup: Setup, tool: Tool, body: ToolBody) -> bool:
     """Whether layers go before the finish of a tool and leave it little stock; see ``FINISHING_SPEED``."""
-    left = left_by_layers(STEP_DOWN[tool.kind.removeprefix("tapered_")] * tool.diameter_mm, lattice_step(body))
+    left = left_by_layers(STEP_DOWN[tool.kind] * tool.diameter_mm, lattice_step(body))
     return setup.operations.roughing and left <= LIGHT * tool.diameter_mm
 
 
@@ -175,7 +175,7 @@ def cutting_words(material: Material, tool: Tool, power: float | None = None) ->
     """
     return CuttingWords(tool.flutes, material.cutting_speed_m_min,
                         feed_per_tooth(material.feed_per_tooth, tool.diameter_mm),
-                        STEP_DOWN[tool.kind.removeprefix("tapered_")] * tool.diameter_mm**2, LAYER_LIMIT,
+                        STEP_DOWN[tool.kind] * tool.diameter_mm**2, LAYER_LIMIT,
                         material.specific_cutting_force_n_mm2, material.chip_thickness_exponent, tool.spindle_rpm,
                         tool.feed_mm_min, tool.plunge_feed_mm_min, tool.life_min,
                         None if tool.coolant is None else tool.coolant == "flood", tool.pitch_mm,
@@ -213,7 +213,7 @@ def layer_depth(setup: Setup, tool: Tool, body: ToolBody, engaged: float) -> flo
     ``STEP_DOWN`` of the diameter; less where the tool would bend too far even at its least chip
     (``DeflectionModel.bearable``). The limit is that of the thinnest layer, which leaves the least stock.
     """
-    depth = STEP_DOWN[tool.kind.removeprefix("tapered_")] * tool.diameter_mm
+    depth = STEP_DOWN[tool.kind] * tool.diameter_mm
     data = cutting_data(setup.material, tool, setup.machine, depth)
     model = bending(setup, tool, body, data, THINNEST * depth)
     width = 0.5 * diameter_in_cut(body, depth) * (1.0 - math.cos(engaged))
