@@ -62,7 +62,7 @@ def buckling(tool: ToolBody) -> float:
     20.19 E I / L^2 of a bar fixed at one end and hinged at the other; E I / L^2 is L over three times the compliance.
 
     >>> round(buckling(ToolBody("T1", 1, 1.0, 0.0, 60.0, 1.0, 60.0, 1.0, 60.0)), 1)
-    67.6
+    67.7
     """
     return 20.19 * tool.stickout / (3.0 * compliance(tool))
 

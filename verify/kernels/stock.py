@@ -232,8 +232,10 @@ def _lower(lines, box, a, d, cutter, end, descents, m, history, engaged, totals,
             near = wx * wx + wy * wy
             if near > reach * reach + EDGE * radius * radius:
                 continue
-            # a line on the very edge is lowered whatever rounding says, or the next pass would find it standing
-            low, s = lowest_within(x, y, a[0], a[1], a[2], d[0], d[1], d[2], radius * (1.0 + 0.5 * EDGE), cutter)
+            # a line on the very edge is lowered whatever rounding says, or the next pass would find it standing; a side
+            # that leans meets it where it is as wide as its top is high, and not before
+            touch = reach if cutter.taper > 0.0 else radius
+            low, s = lowest_within(x, y, a[0], a[1], a[2], d[0], d[1], d[2], touch * (1.0 + 0.5 * EDGE), cutter)
             gone = height[i, j] - low
             if gone <= 1e-9:
                 continue

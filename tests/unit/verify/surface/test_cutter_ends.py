@@ -1,6 +1,7 @@
 """Ends of cutters where paths turn, against closed forms on an inclined plane and at a wall."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -89,3 +90,16 @@ def test_a_stretch_of_a_wall_that_is_bitten_from_the_side():
     feet, _ = turning_feet(TriangleTree(mesh), moves(out, bite, out), [body], 0.01)
     on_wall = feet.points[np.abs(feet.points[:, 0] - 20.0) < 1e-9]
     assert len(on_wall) and np.abs(on_wall[:, 1] - 10.0).min() < 0.02 and on_wall[:, 2].max() == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize("corner", [0.0, 0.3, 1.0])
+def test_the_upper_end_of_a_cone_that_bites_into_a_wall(corner):
+    """Beside a wall that is higher than the flutes, the rim where they end is nearer than all below it."""
+    mesh = terraces([0, 20, 40], [0, 30], [[0.0, 8.0]], -5.0)
+    body = replace(tool(2.0, corner), flute_length=5.0, neck_length=5.0, taper=math.tan(math.radians(10.0)))
+    deep = 0.03
+    out, bite = (np.array([20.0 - body.widest_radius + d, 10.0, 0.5]) for d in (-2.0, deep))
+    feet, _ = turning_feet(TriangleTree(mesh), moves(out, bite, out), [body], 0.01)
+    k = int(np.argmax(feet.depth))
+    assert feet.depth[k] == pytest.approx(deep, abs=1e-3)
+    assert feet.points[k] == pytest.approx([20.0, 10.0, 5.5], abs=0.02)
