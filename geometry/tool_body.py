@@ -101,6 +101,20 @@ class ToolBody:
         wide, high = self.corner_end
         return wide + self.taper * max(self.flute_length - high, 0.0)
 
+    def cutting_profile(self, chords: int) -> list[tuple[float, float]]:
+        """Outline of the cutting part from the axis at the tip to the end of the flutes: radius and height, mm.
+
+        chords : number of chords of a round corner
+        """
+        if self.cone_height > 0.0:
+            return [(0.0, 0.0), (self.radius - self.corner_width, 0.0), (self.radius, self.cone_height),
+                    (self.radius, self.flute_length)]
+        c, flat = self.corner_radius, self.radius - self.corner_radius
+        turn = 0.5 * math.pi - math.atan(self.taper)
+        arc = [(flat + c * math.sin(turn * k / chords), c - c * math.cos(turn * k / chords))
+               for k in range(chords + 1)] if c > 0.0 else [(self.radius, 0.0)]
+        return [(0.0, 0.0), *arc, (self.widest_radius, self.flute_length)]
+
     @property
     def corner_width(self) -> float:
         """How much wider the side is than the flat end, in radius, mm."""

@@ -212,6 +212,11 @@ class Tool(WireModel):
                              f"{self.diameter_mm:g}, so there is no cone")
 
     @property
+    def end(self) -> str:
+        """Shape of the end, which tables by kind use: the kind without 'tapered_'."""
+        return self.kind.removeprefix("tapered_")
+
+    @property
     def cone_height(self) -> float:
         """Height of the cone over the tip, mm; 0 for an end without a cone."""
         if self.point_angle_deg is None or self.point_angle_deg >= 180.0:
@@ -224,12 +229,16 @@ class Tool(WireModel):
         """Height over the tip at which a round corner ends and the side begins, mm; 0 without one."""
         return self.corner_radius_mm * (1.0 - math.sin(math.radians(self.taper_angle_deg)))
 
+    def side_mm(self, height: float) -> float:
+        """Diameter of the side at a height over the tip, mm, from the end of the corner on."""
+        half = math.radians(self.taper_angle_deg)
+        side = max(height - self.corner_height, 0.0) * math.tan(half)
+        return self.diameter_mm + 2.0 * (side - self.corner_radius_mm * (1.0 - math.cos(half)))
+
     @property
     def widest_mm(self) -> float:
         """Largest diameter of the cutting part, mm: of a tapered mill at the end of the flutes."""
-        half = math.radians(self.taper_angle_deg)
-        side = max(_given(self.flute_length_mm) - self.corner_height, 0.0) * math.tan(half)
-        return self.diameter_mm + 2.0 * (side - self.corner_radius_mm * (1.0 - math.cos(half)))
+        return self.side_mm(_given(self.flute_length_mm))
 
     def _derive(self) -> None:
         self._flutes_given = self.flute_length_mm is not None

@@ -180,10 +180,10 @@ class Remainder(ReportModel):
                     "not_in_program: only in a verification; the program does not work on the face.")]
     would_need: Annotated[dict[str, Any], Field(
         description="The tool that would reach the area, in available sizes. It has kind, diameter_mm, "
-                    "corner_radius_mm, neck_length_mm, shank_diameter_mm and stickout_mm. like: the tool of the setup "
-                    "with the same holder. share: share of the area that it reaches. Or kind is 'other access', 'other "
-                    "clamping' or 'other process'; the last has slenderness. access: only with several accesses. Empty "
-                    "if no tool is needed or none would reach the area.")] = {}
+                    "corner_radius_mm, neck_length_mm, shank_diameter_mm and stickout_mm, and taper_angle_deg for a "
+                    "tapered mill. like: the tool of the setup with the same holder. share: share of the area that "
+                    "it reaches. Or kind is 'other access', 'other clamping' or 'other process'; the last has "
+                    "slenderness. access: only with several accesses. Empty if no tool is needed or none would reach the area.")] = {}
     tool_at_hand: Annotated[str | None, Field(description="Reason pass: the tool of the setup that touches the area. "
                                                           "Reason fixture: the tool that would touch it without "
                                                           "fixtures.")] = None
@@ -197,6 +197,8 @@ class ProposedTool(ReportModel):
     kind: str
     diameter_mm: float
     corner_radius_mm: float
+    taper_angle_deg: Annotated[float, Field(description="Angle between side and axis of a tapered mill, deg; 0 for all "
+                                                        "other kinds.")] = 0.0
     flute_length_mm: float
     neck_diameter_mm: float
     neck_length_mm: float

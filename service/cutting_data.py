@@ -32,7 +32,8 @@ DEFAULT_MAX_RPM = 18000.0
 DEFAULT_MAX_FEED_MM_MIN = 5000.0
 PLUNGE_FACTOR = 0.3
 STEP_DOWN = {"ball": 0.3, "bull": 0.3, "flat": 0.5, "drill": 0.5, "tap": 0.5, "chamfer": 0.5, "thread_mill": 0.5}
-"""Deepest layer by the kind of a tool, as a share of its diameter."""
+"""Deepest layer by the end of a tool, as a share of its diameter; of a tapered mill that of its end, so that the tip,
+its weakest place, bears the layer."""
 FINISHING_SPEED, LIGHT = 1.4, 0.1
 """Cutting speed of a finish over that of layers, where the stock before it is no more than ``LIGHT`` of the diameter.
 Table of solid end mills [Tungaloy2020], page 1084, middle of the speeds at a width of 0.05 to 0.1 D over that of slots:
@@ -105,6 +106,18 @@ def chip_thinning(corner_radius: float, depth: float | None, engaged: float = ma
     return 1.0 / max(axial * radial, 1.0 / MAX_CHIP_THINNING)
 
 
+def cut_diameter(tool: Tool, depth: float) -> float:
+    """Largest diameter of a tool in a layer of a depth, mm: that of the corner, or of the side above it.
+
+    >>> cone = Tool(id="T1", kind="tapered_flat", diameter_mm=2.0, taper_angle_deg=45.0, flute_length_mm=6.0)
+    >>> round(cut_diameter(cone, 1.5), 6)
+    5.0
+    """
+    if tool.taper_angle_deg > 0.0 and depth > tool.corner_height:
+        return tool.side_mm(depth)
+    return effective_diameter(tool.diameter_mm, tool.corner_radius_mm, depth)
+
+
 def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float | None = None, *,
                  light: bool = False) -> CuttingData:
     """Spindle speed and feed of a tool in a material on a machine.
@@ -123,8 +136,8 @@ def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float 
     its
     own, the limits are ``DEFAULT_MAX_RPM`` and ``DEFAULT_MAX_FEED_MM_MIN``. No feed is below the least feed.
     """
-    deep = tool.corner_radius_mm if depth is None else depth
-    wide = effective_diameter(tool.diameter_mm, tool.corner_radius_mm, deep)
+    # a finish cuts a thin skin a little over the end, so a cone does not count
+    wide = tool.diameter_mm if depth is None else cut_diameter(tool, depth)
     cut_back: list[tuple[str, float, float]] = []
 
     def given(field: str, value: float, *limits: float | None) -> float:
@@ -162,7 +175,7 @@ def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float 
 
 def lightly_finished(setup: Setup, tool: Tool, body: ToolBody) -> bool:
     """Whether layers go before the finish of a tool and leave it little stock; see ``FINISHING_SPEED``."""
-    left = left_by_layers(STEP_DOWN[tool.kind] * tool.diameter_mm, lattice_step(body))
+    left = left_by_layers(STEP_DOWN[tool.end] * tool.diameter_mm, lattice_step(body))
     return setup.operations.roughing and left <= LIGHT * tool.diameter_mm
 
 
@@ -175,7 +188,7 @@ def cutting_words(material: Material, tool: Tool, power: float | None = None) ->
     """
     return CuttingWords(tool.flutes, material.cutting_speed_m_min,
                         feed_per_tooth(material.feed_per_tooth, tool.diameter_mm),
-                        STEP_DOWN[tool.kind] * tool.diameter_mm**2, LAYER_LIMIT,
+                        STEP_DOWN[tool.end] * tool.diameter_mm**2, LAYER_LIMIT,
                         material.specific_cutting_force_n_mm2, material.chip_thickness_exponent, tool.spindle_rpm,
                         tool.feed_mm_min, tool.plunge_feed_mm_min, tool.life_min,
                         None if tool.coolant is None else tool.coolant == "flood", tool.pitch_mm,
@@ -213,7 +226,7 @@ def layer_depth(setup: Setup, tool: Tool, body: ToolBody, engaged: float) -> flo
     ``STEP_DOWN`` of the diameter; less where the tool would bend too far even at its least chip
     (``DeflectionModel.bearable``). The limit is that of the thinnest layer, which leaves the least stock.
     """
-    depth = STEP_DOWN[tool.kind] * tool.diameter_mm
+    depth = STEP_DOWN[tool.end] * tool.diameter_mm
     data = cutting_data(setup.material, tool, setup.machine, depth)
     model = bending(setup, tool, body, data, THINNEST * depth)
     width = 0.5 * diameter_in_cut(body, depth) * (1.0 - math.cos(engaged))
@@ -240,5 +253,6 @@ def rates_of(setup: Setup) -> Rates:
 
 
 __all__ = ["DEFAULT_MAX_FEED_MM_MIN", "DEFAULT_MAX_RPM", "MATERIALS", "MAX_CHIP_THINNING",
-           "PLUNGE_FACTOR", "STEP_DOWN", "CuttingData", "bending", "chip_thinning", "cutting_data", "cutting_words",
+           "PLUNGE_FACTOR", "STEP_DOWN", "CuttingData", "bending", "chip_thinning", "cut_diameter", "cutting_data",
+           "cutting_words",
            "feed_per_tooth", "find_material", "layer_depth", "lightly_finished", "link_feed", "rates_of"]

@@ -9,9 +9,9 @@ paper: the unit of the drawing is a mm of paper.
 from __future__ import annotations
 
 import html
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from geometry.tool_body import ToolBody
 from output.header_text import decimal
@@ -22,6 +22,7 @@ MIDDLE, TIP_MIDDLE = 38.0, 97.0  # of the assembly and of the larger tip
 ASSEMBLY_ROOM, TIP_ROOM = (32.0, FLOOR - CEILING), (24.0, 46.0)  # width, height
 MIN_TIP_WIDTH = 10.0  # mm of paper; a narrower cutting part is also drawn larger
 MAX_LABELS = 16
+CHORDS = 18  # of a round corner
 APART, LETTER = 4.2, 2.9  # mm between labels; height of letters
 SCALES = (50.0, 20.0, 10.0, 5.0, 2.0, 1.0, 1 / 2, 1 / 5, 1 / 10, 1 / 20, 1 / 50, 1 / 100)
 
@@ -69,7 +70,8 @@ class ToolDrawing:
 def draw_tool(body: ToolBody, gauge: float) -> ToolDrawing:
     """The drawing of an assembly whose spindle face is ``gauge`` mm above the tip."""
     top = max(gauge, body.stickout + sum(h.length for h in body.holder))
-    widest = max([body.diameter, body.shank_diameter, *(max(h.diameter, h.diameter_top) for h in body.holder)])
+    widest = max([2.0 * body.widest_radius, body.shank_diameter,
+                  *(max(h.diameter, h.diameter_top) for h in body.holder)])
     scale = _scale(ASSEMBLY_ROOM, widest, top)
     outlines = _outlines(body)
     areas = [_placed(part, "assembly", points, MIDDLE, scale) for part, points in outlines]
@@ -85,8 +87,9 @@ def draw_tool(body: ToolBody, gauge: float) -> ToolDrawing:
     tip_scale = None
     if scale * body.diameter < MIN_TIP_WIDTH:
         tip_scale = _add_tip(body, outlines[0][1], areas, strokes, words)
-    what = body.named.replace("_", " ") or f"{body.kind} end mill"
-    title = f"T{body.number}: {what} of {decimal(body.diameter)} mm, to scale"
+    what = body.named.replace("_", " ") or f"{body.kind.replace('_', ' ')} end mill"
+    cone = f" and {decimal(body.taper_deg)} deg" if body.taper > 0.0 else ""
+    title = f"T{body.number}: {what} of {decimal(body.diameter)} mm{cone}, to scale"
     return ToolDrawing(title, scale, tip_scale, tuple(areas), tuple(strokes), tuple(words))
 
 
@@ -94,19 +97,28 @@ def _add_tip(body: ToolBody, outline: Sequence[Point], areas: list[FilledOutline
              words: list[DrawnText]) -> float:
     """The larger tip, cut off where its shape does not change any more; returns its scale."""
     shown = min(body.flute_length, max(1.6 * body.diameter, 1.2 * body.corner_radius))
-    cut = [(x, min(h, shown)) for x, h in outline]
-    scale = _scale(TIP_ROOM, body.diameter, shown)
+    cut = [*(p for p in outline if p[1] < shown), (_radius_at(outline, shown), shown)]
+    scale = _scale(TIP_ROOM, 2.0 * max(cut[-1][0], body.radius), shown)
     areas.append(_placed("flutes", "tip", cut, TIP_MIDDLE, scale))
     half, y = 0.5 * scale * body.diameter, FLOOR - scale * shown
     strokes.append(DrawnLine("axis", ((TIP_MIDDLE, FLOOR + 2.0), (TIP_MIDDLE, y - 2.0))))
     above = y - 4.0
-    strokes += [DrawnLine("measure", ((TIP_MIDDLE + side * half, y), (TIP_MIDDLE + side * half, above - 1.0)))
+    low = FLOOR - scale * body.corner_end[1] if body.taper > 0.0 else y  # a cone has that diameter at its foot only
+    strokes += [DrawnLine("measure", ((TIP_MIDDLE + side * half, low), (TIP_MIDDLE + side * half, above - 1.0)))
                 for side in (-1.0, 1.0)]
     strokes.append(DrawnLine("measure", ((TIP_MIDDLE - half, above), (TIP_MIDDLE + half, above))))
     words += [DrawnText(f"Ø{decimal(body.diameter)}", (TIP_MIDDLE, above - 1.2), "middle"),
               DrawnText(f"tip {_ratio(scale)}, corner R{decimal(body.corner_radius)}", (TIP_MIDDLE, HEIGHT - 1.5),
                         "middle")]
     return scale
+
+
+def _radius_at(outline: Sequence[Point], height: float) -> float:
+    """Radius of an outline at a height, mm; ``outline`` rises."""
+    for (r0, z0), (r1, z1) in pairwise(outline):
+        if z0 < height <= z1:
+            return r0 + (r1 - r0) * (height - z0) / (z1 - z0)
+    return outline[-1][0]
 
 
 def _scale(room: tuple[float, float], width: float, height: float) -> float:
@@ -122,12 +134,7 @@ def _outlines(body: ToolBody) -> list[tuple[str, list[Point]]]:
     """Each part as half widths right of the axis and heights above the tip, mm, from the tip up; ``_placed`` mirrors
     it.
     """
-    r, c = body.radius, body.corner_radius
-    turns = [math.radians(90.0 * k / 18) for k in range(19)] if c > 0.0 else []
-    nose = [(r - c + c * math.sin(a), c - c * math.cos(a)) for a in turns] or [(r, 0.0)]
-    if body.cone_height > 0.0:
-        nose = [(r - body.corner_width, 0.0), (r, body.cone_height)]
-    out = [("flutes", [(0.0, 0.0), *nose, (r, body.flute_length)])]
+    out = [("flutes", body.cutting_profile(CHORDS))]
     n, s = 0.5 * body.neck_diameter, 0.5 * body.shank_diameter
     if body.neck_length > body.flute_length:
         out.append(("neck", [(n, body.flute_length), (n, body.neck_length)]))
@@ -149,7 +156,7 @@ def _placed(part: str, view: str, half: Sequence[Point], middle: float, scale: f
 def _heights(body: ToolBody, gauge: float) -> list[tuple[float, float, str]]:
     """Heights of the parts: height above the tip, half width where the line begins, and text, from the tip up."""
     d = decimal
-    out = [(0.0, 0.0, "0 tip"), (body.flute_length, body.radius, f"{d(body.flute_length)} flutes")]
+    out = [(0.0, 0.0, "0 tip"), (body.flute_length, body.widest_radius, f"{d(body.flute_length)} flutes")]
     if body.neck_length > body.flute_length:
         out.append((body.neck_length, 0.5 * body.neck_diameter, f"{d(body.neck_length)} neck"))
     out.append((body.stickout, 0.5 * body.shank_diameter, f"{d(body.stickout)} stickout"))
@@ -169,6 +176,12 @@ def _diameters(body: ToolBody) -> list[tuple[float, float, str]]:
     """Diameters of the parts, at the middle of each, in the same form."""
     d = decimal
     out = [(0.5 * body.flute_length, body.radius, f"Ø{d(body.diameter)}")]
+    if body.taper > 0.0:
+        wide, low = body.corner_end
+        middle = 0.5 * (low + body.flute_length)
+        out = [(low, wide, f"Ø{d(body.diameter)} tip"),
+               (middle, wide + body.taper * (middle - low), f"{d(body.taper_deg)}° side"),
+               (body.flute_length, body.widest_radius, f"Ø{d(2.0 * body.widest_radius)} cone")]
     if body.neck_length > body.flute_length:
         out.append((0.5 * (body.flute_length + body.neck_length), 0.5 * body.neck_diameter,
                     f"Ø{d(body.neck_diameter)} neck"))

@@ -99,7 +99,7 @@ def _zone(ready: Prepared, zone: ZoneArea) -> dict[str, Any]:
             "axis": [r(v, 9) for v in view.direction.tolist()], "depth_mm": [r(zone.top), r(zone.bottom)],
             "approach": _cone(ready, zone), "cutting_plane_mm": r(zone.plane),
             "area_mm2": r(float(ready.samples.area[zone.samples].sum()), 3),
-            "strategy": {"steep": "waterline", "level": "planar_floor" if zone.tool.kind != "ball" else "zigzag",
+            "strategy": {"steep": "waterline", "level": "planar_floor" if zone.tool.end != "ball" else "zigzag",
                          "shallow": "zigzag"}[str(zone.form)],
             "patches": [{"face": f"F{p.face}", "area_mm2": r(p.area, 3), "whole": p.whole, "loops": len(p.loops)}
                         for p in ready.patches.get(zone.id, ())],
@@ -316,7 +316,8 @@ def _tools(ready: Prepared, proof: Proof, steps: Sequence[Workingstep]) -> list[
         mine = [s for s in steps if s.tool.id == t.id]
         bent = [s.bend.deflection for s in mine if s.bend is not None]
         engaged = proof.engaged.get(t.number)
-        slender = (t.neck_length if t.neck_diameter < t.diameter else t.stickout) / max(t.neck_diameter, 1e-9)
+        relieved = t.neck_diameter < 2.0 * t.widest_radius
+        slender = (t.neck_length if relieved else t.stickout) / max(t.neck_diameter, 1e-9)
         out.append({"id": t.id, "number": t.number, "minutes_in_cut": r(proof.minutes.get(t.number, 0.0), 3),
                     "metres_in_cut": r(0.001 * sum(map(cutting_length, mine)), 3),
                     "life_min": lives[t.id], "cutters": sum(s.fresh for s in mine) + bool(mine),

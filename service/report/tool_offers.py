@@ -167,7 +167,8 @@ def as_dict(inputs: JobInputs, found: Offers) -> dict[str, Any]:
     for o in found.tools:
         t = o.proposed
         lengths = {k: round(getattr(t, k), 4) for k in LENGTHS}
-        tools.append({"kind": t.kind, **lengths, "slenderness": round(t.neck_length_mm / t.diameter_mm, 2),
+        cone = {"taper_angle_deg": t.taper_angle_deg} if t.taper_angle_deg else {}
+        tools.append({"kind": t.kind, **lengths, **cone, "slenderness": round(t.neck_length_mm / t.diameter_mm, 2),
                       "instead_of": t.instead_of or None, "like": t.holder_of, "access": o.access,
                       "area_mm2": round(o.area_mm2, 3), "tool": _entry(inputs, o)})
     return {"tools": tools, "emptied_mm2": round(found.emptied_mm2, 3),
@@ -181,7 +182,8 @@ def _entry(inputs: JobInputs, offer: Offer) -> dict[str, Any]:
     lengths = {k: round(getattr(t, k), 4) for k in LENGTHS}
     assert like.gauge_length_mm is not None and like.stickout_mm is not None  # every Tool fills both in
     gauge = like.gauge_length_mm - like.stickout_mm + t.stickout_mm
-    entry = Tool(id=offer.body.id, number=offer.body.number, kind=t.kind, flutes=like.flutes,
+    entry = Tool(id=offer.body.id, number=offer.body.number, kind=t.kind, taper_angle_deg=t.taper_angle_deg,
+                 flutes=like.flutes,
                  center_cutting=like.center_cutting, gauge_length_mm=round(gauge, 4), max_rpm=like.max_rpm,
                  holder=like.holder, **lengths)
     return entry.model_dump(mode="json")

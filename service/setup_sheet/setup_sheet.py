@@ -35,6 +35,7 @@ from service.setup_sheet.tables import (
     files_table,
     findings_section,
     job_section,
+    kind_words,
     number,
     place,
     proof_section,
@@ -265,7 +266,7 @@ def _card(inputs: JobInputs, body: ToolBody, gauge: float, report: Mapping[str, 
                                             else ", tool life not given")))
     mind = tuple(f"{c['message']}; {c['remedy']}" for c in report["warnings"] if body.id in c["subjects"])
     own = "" if body.id == f"T{body.number}" else f" {body.id}"
-    heading = f"T{body.number}{own}: {tool.kind} Ø{number(tool.diameter_mm)}"
+    heading = f"T{body.number}{own}: {kind_words(tool.kind, tool.taper_angle_deg)} Ø{number(tool.diameter_mm)}"
     return ToolCard(heading, draw_tool(body, gauge), Facts(pairs), mind)
 
 

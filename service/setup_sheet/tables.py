@@ -25,6 +25,11 @@ def number(value: float | None, digits: int = 3) -> str:
     return NONE if value is None else decimal(value, digits)
 
 
+def kind_words(kind: str, taper: float) -> str:
+    """'ball' or 'tapered ball 3°'; taper, deg: between side and axis."""
+    return kind.replace("_", " ") + (f" {number(taper)}°" if taper else "")
+
+
 def minutes(seconds: float | None) -> str:
     """Seconds as minutes."""
     return NONE if seconds is None else decimal(seconds / 60.0, 2)
@@ -138,8 +143,9 @@ def tools_table(report: Mapping[str, Any], inputs: JobInputs, used: Sequence[str
         neck = NONE if tool.neck_length_mm == tool.flute_length_mm else \
             f"Ø{number(tool.neck_diameter_mm)} to {number(tool.neck_length_mm)}"
         rows.append((
-            f"T{tool.number}" + ("" if name == f"T{tool.number}" else f" {name}"), tool.kind, number(tool.diameter_mm),
-            number(tool.corner_radius_mm), str(tool.flutes), number(tool.flute_length_mm), neck,
+            f"T{tool.number}" + ("" if name == f"T{tool.number}" else f" {name}"),
+            kind_words(tool.kind, tool.taper_angle_deg), number(tool.diameter_mm), number(tool.corner_radius_mm),
+            str(tool.flutes), number(tool.flute_length_mm), neck,
             number(tool.shank_diameter_mm), number(tool.stickout_mm), number(tool.gauge_length_mm),
             ranged([s["spindle_rpm"] for s in mine]), ranged([s["feed_mm_min"] for s in mine]),
             number(fact["minutes_in_cut"], 2), str(fact["cutters"]) if mine else "not used"))
@@ -207,10 +213,10 @@ def needed(item: Mapping[str, Any]) -> str:
     if item["tool_at_hand"]:
         words.append(f"{item['tool_at_hand']} would reach it")
     if "diameter_mm" in need:
-        round_end = f" R{number(need['corner_radius_mm'])}" if need["kind"] == "bull" else ""
-        words.append(f"{need['kind']} Ø{number(need['diameter_mm'])}{round_end}, "
-                     f"neck {number(need['neck_length_mm'])}, shank Ø{number(need['shank_diameter_mm'])}, "
-                     f"stickout {number(need['stickout_mm'])}")
+        round_end = f" R{number(need['corner_radius_mm'])}" if need["kind"].endswith("bull") else ""
+        kind = kind_words(need["kind"], need.get("taper_angle_deg", 0.0))
+        words.append(f"{kind} Ø{number(need['diameter_mm'])}{round_end}, neck {number(need['neck_length_mm'])}, "
+                     f"shank Ø{number(need['shank_diameter_mm'])}, stickout {number(need['stickout_mm'])}")
         if need.get("share", 1.0) < 1.0:
             words.append(f"for {share(need['share'])} of it")
     elif "kind" in need:
@@ -236,5 +242,5 @@ def proof_section(report: Mapping[str, Any]) -> SheetSection:
 
 
 __all__ = ["NONE", "SHORT_SHA", "assumed_table", "cautions_section", "files_table", "findings_section", "job_section",
-           "minutes", "needed", "number", "place", "proof_section", "ranged", "remainder_table", "share", "steps_table",
-           "tools_table", "zones_table"]
+           "kind_words", "minutes", "needed", "number", "place", "proof_section", "ranged", "remainder_table", "share",
+           "steps_table", "tools_table", "zones_table"]

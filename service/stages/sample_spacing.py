@@ -1,7 +1,7 @@
 """Faces that need few samples inside, by what the tools of the setup can leave there.
 
 Passes on a slope leave a cusp between every two of them, so samples must lie close. On a level plane a flat end leaves
-nothing within its passes, and on an upright plane the side of a tool leaves nothing within its layers. What can stay
+nothing within its passes, and on an upright plane an upright side leaves nothing within its layers. What can stay
 there is a place no pass has gone over: as wide as a pass, or at the border of the face. So such faces have samples
 close together near their borders and wide apart inside (docs/theory/sampling.md).
 """
@@ -43,7 +43,7 @@ def coarse_spacing(part: Part, inputs: JobInputs, directions: F64) -> dict[int, 
         return {}
     flats = [b.radius - b.corner_radius for b in inputs.bodies if b.radius > b.corner_radius]
     floor = FLOOR_SHARE * min(flats, default=0.0)
-    wall = WALL_SHARE * min(b.radius for b in inputs.bodies)
+    wall = WALL_SHARE * min((b.radius for b in inputs.bodies if b.taper <= 0.0), default=0.0)
     mesh, out = part.mesh, {}
     area = np.bincount(mesh.face_ids, weights=mesh.areas)
     for face in part.faces:
@@ -91,14 +91,15 @@ def split_where_zones_meet(samples: SurfaceSamples, planning: SurfaceSamples, zo
     close    : mm between close samples
 
     A coarse sample stays where all planning samples near it belong to one zone, or all to none. On a level plane the
-    tool of that zone must have a flat bottom.
+    tool of that zone must have a flat bottom, on an upright one an upright side.
     """
     if samples.covers is None:
         return samples
     owner = np.zeros(len(planning), np.int64)
     for k, zone in enumerate(zones, start=1):
         owner[zone.samples] = k
-    fits = np.array([True, *(z.form is not AreaForm.LEVEL or z.tool.radius > z.tool.corner_radius for z in zones)])
+    fits = np.array([True, *(z.tool.radius > z.tool.corner_radius if z.form is AreaForm.LEVEL else z.tool.taper <= 0.0
+                             for z in zones)])
     wide = samples.covers > 0
     split = np.zeros(len(samples), np.bool_)
     for face in np.unique(samples.face[wide]).tolist():

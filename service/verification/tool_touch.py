@@ -144,7 +144,7 @@ class ToolTouch:
 
 def _cutter(tool: ToolBody) -> ToolBody:
     """The cutting part alone."""
-    return replace(tool, shank_diameter=tool.diameter, holder=())
+    return replace(tool, shank_diameter=2.0 * tool.widest_radius, holder=())
 
 
 __all__ = ["ToolTouch"]

@@ -196,13 +196,7 @@ def _finding(f: Mapping[str, Any], track: ToolTrack, open_: bool) -> dict[str, A
 
 def tool_shape(tool: ToolBody) -> dict[str, Any]:
     """A tool assembly as profiles of its bodies: points (radius, height above the tip), mm, from the tip up."""
-    r, c = tool.radius, tool.corner_radius
-    turn = np.linspace(0.0, 0.5 * np.pi, ARC + 1) if c > 0.0 else np.zeros(0)
-    corner = [[round(float(v), 5) for v in p] for p in np.column_stack([r - c + c * np.sin(turn),
-                                                                       c - c * np.cos(turn)])]
-    if tool.cone_height > 0.0:
-        corner = [[round(r - tool.corner_width, 5), 0.0], [r, round(tool.cone_height, 5)]]
-    cutter = [[0.0, 0.0], *(corner or [[r, 0.0]]), [r, tool.flute_length]]
+    cutter = [[round(r, 5), round(z, 5)] for r, z in tool.cutting_profile(ARC)]
     neck, shank = 0.5 * tool.neck_diameter, 0.5 * tool.shank_diameter
     bodies = [{"kind": "cutting part", "profile": cutter}]
     if tool.neck_length > tool.flute_length:
@@ -216,7 +210,9 @@ def tool_shape(tool: ToolBody) -> dict[str, Any]:
         z += h.length
     if holder:
         bodies.append({"kind": "holder", "profile": holder})
-    return {"id": tool.id, "number": tool.number, "kind": tool.kind, "diameter_mm": tool.diameter, "bodies": bodies}
+    cone = {"taper_deg": round(tool.taper_deg, 6)} if tool.taper > 0.0 else {}
+    return {"id": tool.id, "number": tool.number, "kind": tool.kind, "diameter_mm": tool.diameter, **cone,
+            "bodies": bodies}
 
 
 __all__ = ["VIEW_NAME", "VIEW_VERSION", "plan_view", "tool_shape", "verification_view"]

@@ -39,7 +39,8 @@ CHECK = SHARED / "stepnc" / "p21check.py"
 GCODE = SHARED / "tools" / "gcode_check.sh"
 JOBS = {"five steps": plan, "tiny": tiny, "flat": lambda: plan(flat_step()), "long": lambda: long_plan(20_000, 40),
         "along borders": lambda: plan(step(1, BALL, "isoparametric"))}
-MORE = {kind: partial(tapered, kind) for kind in TAPERED} | {"all there is": full, "with shapes": shaped, "a mesh as blank": lambda: shaped(
+TAPERS = {kind: partial(tapered, kind) for kind in TAPERED}
+MORE = TAPERS | {"all there is": full, "with shapes": shaped, "a mesh as blank": lambda: shaped(
     cylinder=None, stock_mesh=block_mesh(), stock_words="solid of a STEP file"), "a block": lambda: shaped(
     cylinder=None, stock_words=""), "turning, all": lambda: shaped(job=clamped())}
 TURNING = {"one clamping": clamped, "a head": lambda: clamped("head-head-AC", tcp=False)}

@@ -3,6 +3,7 @@
 ``web/tests/stock.mjs`` runs what the page runs, without a browser.
 """
 
+import itertools
 import json
 import subprocess
 from dataclasses import replace
@@ -72,6 +73,40 @@ def page(data, seconds, tmp_path):
     out = [json.loads(line) for line in done.stdout.splitlines()]
     return [{k: np.array(v).reshape(-1, 3) if k in ("place", "normal", "index") else np.array(v) for k, v in s.items()}
             for s in out]
+
+
+def test_the_cutter_of_the_page_is_the_shape_of_the_tool():
+    """Nodes beside a tool at rest have their distance from it, with and without a taper."""
+    if node() is None or not (ROOT / "web" / "node_modules" / "typescript").is_dir():
+        pytest.skip("no Node with the packages of the page here: make web")
+    bodies = [ToolBody("T1", 1, d, c, 6.0, 2.0, 20.0, 6.0, 40.0, taper=np.tan(np.radians(angle)))
+              for d, c in ((1.0, 0.5), (2.0, 0.4), (2.0, 0.0), (3.0, 0.5)) for angle in (0.0, 3.0, 30.0)]
+    n, step, tip = 34, 0.26, np.array([4.1, 4.3, 1.2])
+    axis = np.array([0.3, -0.2, 0.9]) / np.linalg.norm([0.3, -0.2, 0.9])
+    words = ({"nx": n, "ny": n, "nz": n, "step": step, "origin": [0, 0, 0]}, tip.tolist(), axis.tolist(),
+             [tool_shape(b) for b in bodies])
+    done = subprocess.run([node(), str(ROOT / "web" / "tests" / "cutter.mjs"), *map(json.dumps, words)],
+                          capture_output=True, text=True, cwd=ROOT / "web")
+    assert done.returncode == 0, done.stderr[-2000:]
+    places = step * np.stack(np.meshgrid(*(np.arange(n),) * 3, indexing="ij"), axis=-1).reshape(-1, 3) - tip
+    up = places @ axis
+    aside = np.sqrt(np.maximum((places**2).sum(axis=1) - up**2, 0.0))
+    for body, text in zip(bodies, done.stdout.splitlines(), strict=True):
+        values, outline = np.array(json.loads(text)), np.array([*body.cutting_profile(400), (0.0, body.flute_length)])
+        far = np.full(len(up), np.inf)
+        for (r0, z0), (r1, z1) in itertools.pairwise(outline):
+            way = np.array([r1 - r0, z1 - z0])
+            if way @ way > 0.0:
+                share = np.clip(((aside - r0) * way[0] + (up - z0) * way[1]) / (way @ way), 0.0, 1.0)
+                far = np.minimum(far, np.hypot(aside - r0 - share * way[0], up - z0 - share * way[1]))
+        wide = np.interp(up, outline[:-1, 1], outline[:-1, 0])
+        inside = (up > 0.0) & (up < body.flute_length) & (aside < wide)
+        assert inside.sum() > 40 and (values[inside] <= 1e-6).all()
+        near = ~inside & (far < 0.9 * step) & (up < body.flute_length)  # the page cuts nodes a step away
+        # beside an edge the field has the larger of two distances, which is none too large
+        assert near.sum() > 60 and (values[near] <= far[near] + 2e-4).all()
+        side = near & (up > body.corner_end[1] + body.taper * aside) & (up < body.flute_length - 2.0 * step)
+        assert side.sum() > 30 and np.allclose(values[side], far[side], atol=2e-4)
 
 
 def test_its_surface_is_that_of_the_verifier(given, tmp_path):

@@ -445,8 +445,8 @@ class Ap238Reader:
         self.data.within(body, "'taper angle', deg", taper, 0.0, MAX_TAPER)
         for name in _HEIGHTS:
             if abs(sizes.get(name, corner) - corner) > SAME_SHAPE:
-                raise self.file.error(body, f", items: {corner:g} mm expected as '{name}', the radius of the corner, not "
-                                            f"{sizes[name]:g}")
+                raise self.file.error(body, f", items: {corner:g} mm expected as '{name}', the radius of the corner, "
+                                            f"not {sizes[name]:g}")
         shape = CutterShape(sizes["effective cutting diameter"], corner, found.get("centre"), taper)
         if shape.difference > SAME_SHAPE:
             self.recorder.remarks.append(Remark(self.file.line(body), contradiction(tool, shape)))

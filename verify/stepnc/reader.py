@@ -92,7 +92,8 @@ def _known(recorder: MotionRecorder, cutter: CutterRecord, tools: Sequence[ToolB
                                   f"T{alike[0].number}")
             return alike[0].number
     if body is None:
-        raise ProgramError(f"{recorder.name}, #{cutter.instance}: tool '{cutter.name}', {cutter.kind.replace('_', ' ')} of "
+        kind = cutter.kind.replace("_", " ")
+        raise ProgramError(f"{recorder.name}, #{cutter.instance}: tool '{cutter.name}', {kind} of "
                            f"{cutter.diameter:g} mm, matches no tool of the setup, or several",
                            subjects=(f"#{cutter.instance}",), measured=cutter.number,
                            limit=sorted(t.number for t in tools),

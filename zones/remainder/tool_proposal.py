@@ -7,6 +7,7 @@ with the samples it takes. The list is a minimum set cover, solved exactly. Theo
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,6 +38,7 @@ class ToolToAdd:
 
     instead_of : id of the tool at hand with the same cutter and a shorter neck or stickout, '' where there is none
     holder_of  : id of the tool at hand whose shank and holder were used
+    taper_angle_deg : deg, between side and axis; 0 for an upright side
     """
 
     kind: str
@@ -49,11 +51,13 @@ class ToolToAdd:
     stickout_mm: float
     instead_of: str
     holder_of: str
+    taper_angle_deg: float = 0.0
 
     def body(self, id: str, number: int, holder: tuple[HolderFrustum, ...]) -> ToolBody:
         """The tool as a ToolBody in a given holder."""
         return ToolBody(id, number, self.diameter_mm, self.corner_radius_mm, self.flute_length_mm,
-                        self.neck_diameter_mm, self.neck_length_mm, self.shank_diameter_mm, self.stickout_mm, holder)
+                        self.neck_diameter_mm, self.neck_length_mm, self.shank_diameter_mm, self.stickout_mm, holder,
+                        taper=math.tan(math.radians(self.taper_angle_deg)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,4 +225,4 @@ def _named(c: _Candidate, need: F64) -> ToolToAdd:
     neck, stickout = (float(v) for v in need.max(axis=0))
     return ToolToAdd(t.kind, t.diameter, round(t.corner_radius, 6), round(min(t.flute_length, neck), 6),
                         round(t.neck_diameter, 6), neck, t.shank_diameter, stickout,
-                        c.cutter.like if c.cutter.at_hand else "", c.cutter.like)
+                        c.cutter.like if c.cutter.at_hand else "", c.cutter.like, round(t.taper_deg, 6))

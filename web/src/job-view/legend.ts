@@ -3,6 +3,7 @@ import { CLASSES, CONNECTION, OTHER, PALE, REMAINDER_CSS, STEPS, STOCK, UNCUT, U
 import type { Mode } from "../scene/part";
 import { add, el, swatch } from "../shared/dom";
 import type { ViewHead } from "../shared/view-file";
+import { cutterWords } from "../shared/wording";
 
 const MAX_WALLS = 8;
 const MAX_CONNECTIONS = 6;
@@ -44,7 +45,7 @@ function zoneEntries(h: ViewHead): HTMLElement {
 }
 
 function toolEntries(h: ViewHead, drawn: Set<number>): HTMLElement {
-  return entries(...h.tools.map((t, i) => (drawn.has(t.number) ? entry(css(toolColour(i)), `T${t.number} ${t.kind} D${t.diameter_mm}`, false, true) : null)));
+  return entries(...h.tools.map((t, i) => (drawn.has(t.number) ? entry(css(toolColour(i)), `T${t.number} ${cutterWords(t, t.taper_deg)}`, false, true) : null)));
 }
 
 function entries(...all: (HTMLElement | null)[]): HTMLElement {

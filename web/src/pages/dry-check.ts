@@ -3,12 +3,13 @@ import { get, type Job, type JobFiles } from "../shared/api";
 import { el, figure } from "../shared/dom";
 import { fileList } from "../shared/files";
 import type { ViewRest, ViewZone } from "../shared/view-file";
-import { counted, needs, slenderness, spaced } from "../shared/wording";
+import { counted, cutterWords, needs, slenderness, spaced } from "../shared/wording";
 
 interface OfferedTool {
   kind: string;
   diameter_mm: number;
   corner_radius_mm: number;
+  taper_angle_deg?: number;
   neck_length_mm: number;
   area_mm2: number;
 }
@@ -43,7 +44,7 @@ function summary(z: Zones): string {
 }
 
 function toolName(t: OfferedTool): string {
-  return `${t.kind} D${t.diameter_mm}${t.kind === "bull" ? ` R${t.corner_radius_mm}` : ""}`;
+  return `${cutterWords(t, t.taper_angle_deg)}${t.kind.endsWith("bull") ? ` R${t.corner_radius_mm}` : ""}`;
 }
 
 function section(title: string, head: string[], rows: string[][]): HTMLElement {

@@ -2,6 +2,7 @@
 import type { Tool } from "../shared/api";
 import { el, fill } from "../shared/dom";
 import { store, stored } from "../shared/browser-storage";
+import { spaced } from "../shared/wording";
 
 type OwnTool = Partial<Record<keyof Tool, unknown>> & { id: string; kind: string; diameter_mm: number; holder?: unknown };
 /** A tool of the setup, or the name of one in the library. */
@@ -14,10 +15,11 @@ const DEFAULTS: OwnTool[] = [
   { id: "T2", number: 2, kind: "ball", diameter_mm: 3, flutes: 2, flute_length_mm: 9, neck_diameter_mm: 2.8, neck_length_mm: 20, shank_diameter_mm: 6, stickout_mm: 36, holder: HOLDER },
   { id: "T3", number: 3, kind: "ball", diameter_mm: 1, flutes: 2, flute_length_mm: 3, neck_diameter_mm: 0.9, neck_length_mm: 13, shank_diameter_mm: 4, stickout_mm: 29, holder: HOLDER },
 ];
-const KINDS = ["flat", "ball", "bull"];
+const KINDS = ["flat", "ball", "bull", "tapered_flat", "tapered_ball", "tapered_bull"];
 const COLUMNS: { key: string; title: string; hint: string }[] = [
   { key: "number", title: "T", hint: "T number" }, { key: "kind", title: "Kind", hint: "Kind of tool" },
   { key: "diameter_mm", title: "Ø", hint: "Diameter, mm" }, { key: "corner_radius_mm", title: "Corner R", hint: "Corner radius of a bull-nose tool, mm" },
+  { key: "taper_angle_deg", title: "Taper", hint: "Angle between side and axis of a tapered mill, degrees" },
   { key: "flutes", title: "Teeth", hint: "Number of teeth" }, { key: "flute_length_mm", title: "Flute length", hint: "Flute length, mm" },
   { key: "neck_diameter_mm", title: "Neck Ø", hint: "Neck diameter, mm" }, { key: "neck_length_mm", title: "Neck length", hint: "Neck length, tip to shank, mm" },
   { key: "shank_diameter_mm", title: "Shank Ø", hint: "Shank diameter, mm" }, { key: "stickout_mm", title: "Stickout", hint: "Stickout, tip to holder, mm" },
@@ -37,7 +39,8 @@ export class ToolTable {
     return this.tools.map((t) => {
       if (typeof t === "string") return t;
       const out = { ...t };
-      if (out.kind !== "bull") delete out.corner_radius_mm;
+      if (!out.kind.endsWith("bull")) delete out.corner_radius_mm;
+      if (!out.kind.startsWith("tapered_")) delete out.taper_angle_deg;
       return out;
     });
   }
@@ -77,7 +80,7 @@ export class ToolTable {
     const values = t as Record<string, unknown>;
     const value = values[key];
     const input = key === "kind"
-      ? el("select", { "aria-label": label }, ...KINDS.map((k) => el("option", { value: k, selected: k === t.kind }, k)))
+      ? el("select", { "aria-label": label }, ...KINDS.map((k) => el("option", { value: k, selected: k === t.kind }, spaced(k))))
       : el("input", { type: "number", "aria-label": label, min: 0, step: "any", value: typeof value === "number" ? value : "" });
     input.addEventListener("change", () => {
       if (key === "kind") t.kind = input.value;

@@ -9,11 +9,12 @@ export interface Grid {
   origin: [number, number, number];
 }
 
-/** Cutting part of a tool: radius, corner radius and flute length, mm. */
+/** Cutting part of a tool: radius of its end, corner radius and flute length, mm; angle between side and axis, rad. */
 export interface Cutter {
   radius: number;
   corner: number;
   length: number;
+  taper: number;
 }
 
 type Three = ArrayLike<number>;
@@ -37,8 +38,10 @@ function place(g: Grid, values: Float32Array, tool: Cutter, px: number, py: numb
   const { step: h, nx, ny, nz } = g;
   const { radius, corner, length } = tool;
   const flat = radius - corner;
+  const [sin, cos] = [Math.sin(tool.taper), Math.cos(tool.taper)];
+  const widest = flat + (corner + Math.max(0, length - corner) * sin) / cos; // from the middle of the corner along the side
   const range = (p: number, a: number, n: number): [number, number] => {
-    const aside = radius * Math.sqrt(Math.max(0, 1 - a * a)) + h;
+    const aside = widest * Math.sqrt(Math.max(0, 1 - a * a)) + h;
     return [Math.max(0, Math.ceil((Math.min(p, p + length * a) - aside) / h)), Math.min(n - 1, Math.floor((Math.max(p, p + length * a) + aside) / h))];
   };
   const [i0, i1] = range(px, ax, nx);
@@ -57,10 +60,11 @@ function place(g: Grid, values: Float32Array, tool: Cutter, px: number, py: numb
         const up = base + z * az;
         if (up - length >= now || -up >= now) continue;
         const r2 = Math.max(0, xy + z * z - up * up);
-        const wide = radius + now;
+        const wide = widest + Math.max(now, now / cos);
         if (wide <= 0 || r2 >= wide * wide) continue;
         const r = Math.sqrt(r2);
-        const end = up < corner && r > flat ? Math.hypot(r - flat, corner - up) - corner : Math.max(r - radius, -up);
+        const [out, over] = [r - flat, up - corner]; // from the middle of the corner
+        const end = out > 0 && out * sin + over * cos < 0 ? Math.hypot(out, over) - corner : Math.max(out * cos - over * sin - corner, -up);
         const d = Math.max(end, up - length, -h);
         if (d < now) values[n] = d;
       }

@@ -107,10 +107,14 @@ export class StockStates {
 }
 
 /** The cutting part from its profile: points (radius, height) from the tip to the end of the flutes. */
-function cutterOf(tool: ToolShape): Cutter {
+export function cutterOf(tool: ToolShape): Cutter {
   const profile = tool.bodies[0]!.profile;
-  const radius = Math.max(...profile.map(([r]) => r));
   const length = profile[profile.length - 1]![1];
+  if (tool.taper_deg) {
+    const radius = 0.5 * tool.diameter_mm; // of the end; the second point is where its flat ends
+    return { radius, corner: radius - profile[1]![0], length, taper: (tool.taper_deg * Math.PI) / 180 };
+  }
+  const radius = Math.max(...profile.map(([r]) => r));
   const full = profile.find(([r]) => r >= radius - 1e-6)!;
-  return { radius, corner: Math.min(radius, full[1]), length };
+  return { radius, corner: Math.min(radius, full[1]), length, taper: 0 };
 }

@@ -28,7 +28,10 @@ export interface ToolShape {
   id: string;
   number: number;
   kind: string;
+  /** Of a tapered mill that of its end. */
   diameter_mm: number;
+  /** Angle between the side of a tapered mill and its axis; missing for all others. */
+  taper_deg?: number;
   bodies: { kind: string; profile: [number, number][] }[];
 }
 

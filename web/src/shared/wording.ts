@@ -22,10 +22,15 @@ export function findingPlace(f: ViewFinding): string {
   return `${f.kind}: ${f.message}${f.line ? `; ${f.program} line ${f.line}` : ""}${at}`;
 }
 
-/** "ball D3" for a T number; empty if the setup has no such tool. */
+/** "ball D3", "tapered ball D1 3°". */
+export function cutterWords(t: { kind: string; diameter_mm: number }, taper?: number): string {
+  return `${spaced(t.kind)} D${t.diameter_mm}${taper ? ` ${taper}°` : ""}`;
+}
+
+/** The same for a T number; empty if the setup has no such tool. */
 export function toolWords(h: ViewHead, number: number): string {
   const t = h.tools.find((x) => x.number === number);
-  return t ? `${t.kind} D${t.diameter_mm}` : "";
+  return t ? cutterWords(t, t.taper_deg) : "";
 }
 
 const OTHER_NEEDS: Record<string, string> = { "other access": "another tool axis", "other process": "another process" };
@@ -34,6 +39,7 @@ interface Need {
   kind?: string;
   diameter_mm?: number;
   corner_radius_mm?: number;
+  taper_angle_deg?: number;
   neck_length_mm?: number;
   shank_diameter_mm?: number;
   stickout_mm?: number;
@@ -52,11 +58,12 @@ export function slenderness(all: ViewRest[]): string {
 /** What would cut an entry of the remainder. With `slenderness` it says as much as the setup sheet (service/setup_sheet/tables.py). */
 export function needs(r: ViewRest): string {
   const w = r.would_need as Need;
-  const corner = w.kind === "bull" ? ` with corner radius ${w.corner_radius_mm} mm` : "";
+  const corner = w.kind?.endsWith("bull") ? ` with corner radius ${w.corner_radius_mm} mm` : "";
+  const cone = w.taper_angle_deg ? ` and ${w.taper_angle_deg}°` : "";
   return [
     r.why_left,
     r.tool_at_hand && `${r.tool_at_hand} would reach it`,
-    w.diameter_mm !== undefined && `needs a ${w.kind} of ${w.diameter_mm} mm${corner}, neck ${w.neck_length_mm} mm, shank ${w.shank_diameter_mm} mm, stickout ${w.stickout_mm} mm`,
+    w.diameter_mm !== undefined && `needs a ${spaced(w.kind!)} of ${w.diameter_mm} mm${cone}${corner}, neck ${w.neck_length_mm} mm, shank ${w.shank_diameter_mm} mm, stickout ${w.stickout_mm} mm`,
     w.diameter_mm !== undefined && (w.share ?? 1) < 1 && `for ${percent(w.share)} of the area`,
     w.diameter_mm === undefined && w.kind && `needs ${OTHER_NEEDS[w.kind] ?? w.kind}`,
     w.access && `along ${w.access}`,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import xml.etree.ElementTree as ET
 
 import pytest
@@ -18,7 +19,11 @@ LONG = ToolBody("T9", 9, 0.4, 0.0, 0.8, 0.38, 6.0, 4.0, 60.0, (HolderFrustum(63.
 CROWDED = ToolBody("T3", 3, 1.0, 0.5, 1.0, 0.9, 1.2, 3.0, 1.4, (HolderFrustum(40.0, 40.0, 0.3),) * 12)
 STACKED = ToolBody("T4", 4, 6.0, 0.0, 12.0, 6.0, 12.0, 6.0, 30.0, (HolderFrustum(20.0, 22.0, 1.0),) * 50)
 DRILL = ToolBody("T5", 5, 3.0, 0.0, 24.0, 3.0, 24.0, 3.0, 40.0, (), "drill", 0.0, 0.9)
-TOOLS = [(DRILL, 40.0), (BALL, 87.0), (BULL, 50.0), (LONG, 560.0), (CROWDED, 5.0), (STACKED, 80.0)]
+TAPERED = [ToolBody("T6", 6, 1.0, 0.5, 12.0, 2.1, 20.0, 4.0, 40.0, HOLDER, taper=math.tan(math.radians(3.0))),
+           ToolBody("T8", 8, 4.0, 0.6, 30.0, 8.0, 40.0, 10.0, 55.0, HOLDER, taper=math.tan(math.radians(5.0))),
+           ToolBody("T10", 10, 2.0, 0.0, 12.0, 6.0, 20.0, 6.0, 40.0, (), taper=math.tan(math.radians(20.0)))]
+TOOLS = [(DRILL, 40.0), (BALL, 87.0), (BULL, 50.0), (LONG, 560.0), (CROWDED, 5.0), (STACKED, 80.0),
+         *((t, 82.0) for t in TAPERED)]
 
 
 def read(body: ToolBody, gauge: float) -> ET.Element:
@@ -37,7 +42,7 @@ def test_every_part_is_drawn_to_scale(body, gauge):
     root = read(body, gauge)
     scale = float(root.attrib["data-scale"])
     floor = None
-    wanted = [("flutes", body.diameter, 0.0, body.flute_length)]
+    wanted = [("flutes", 2 * body.widest_radius, 0.0, body.flute_length)]
     if body.neck_length > body.flute_length:
         wanted.append(("neck", body.neck_diameter, body.flute_length, body.neck_length))
     wanted.append(("shank", body.shank_diameter, body.neck_length, body.stickout))
@@ -61,6 +66,29 @@ def test_a_drill_has_its_point_and_its_name():
     low = max(y for _, y in flutes)
     assert sorted({round((low - y) / drawing.scale, 6) for _, y in flutes}) == pytest.approx([0.0, 0.9, 24.0])
     assert drawing.title == "T5: drill of 3 mm, to scale"
+
+
+@pytest.mark.parametrize("body", TAPERED, ids=lambda b: b.kind)
+def test_a_tapered_mill_is_drawn_with_its_cone(body):
+    """Every point of the cutting part lies on the end, the corner or the side, in both views."""
+    drawing = draw_tool(body, 82.0)
+    for view, scale in (("assembly", drawing.scale), ("tip", drawing.tip_scale)):
+        (area,) = [a for a in drawing.areas if a.view == view and a.part == "flutes"]
+        middle, low = (sum(x for x, _ in area.points) / len(area.points), max(y for _, y in area.points))
+        wide, high = body.corner_end
+        heights = []
+        for x, y in area.points:
+            r, z = abs(x - middle) / scale, (low - y) / scale
+            corner = math.hypot(r - body.radius + body.corner_radius, z - body.corner_radius) - body.corner_radius
+            side = r - wide - body.taper * (z - high)
+            assert min(abs(corner) if z <= high + 1e-6 else math.inf, abs(side), z) == pytest.approx(0.0, abs=1e-6)
+            heights.append(z)
+        assert view == "tip" or max(heights) == pytest.approx(body.flute_length)
+    angle = f"{math.degrees(math.atan(body.taper)):g}"
+    assert drawing.title.endswith(f"{body.kind.replace('_', ' ')} end mill of {body.diameter:g} mm and {angle} deg, "
+                                  "to scale")
+    words = [w.text for w in drawing.words]
+    assert f"{angle}° side" in words and f"Ø{round(2 * body.widest_radius, 4):g} cone" in words
 
 
 def test_the_tip_is_drawn_larger_and_round_where_it_is_small():

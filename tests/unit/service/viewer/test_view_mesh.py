@@ -8,6 +8,7 @@ import pytest
 
 from geometry.sampling import sample_surface
 from geometry.step_import.reader import read_part
+from geometry.tool_body import ToolBody
 from service.viewer.view_data import tool_shape
 from service.viewer.view_file import read_view, write_view
 from service.viewer.view_mesh import (
@@ -138,6 +139,19 @@ def test_the_profile_of_a_tool_is_its_shape(body):
     assert np.allclose(np.hypot(arc[:, 0] - (body.radius - c), arc[:, 1] - c), c, atol=1e-4)
     assert [b["kind"] for b in shape["bodies"]][-1] in ("shank", "holder")
     json.dumps(shape, allow_nan=False)
+
+
+@pytest.mark.parametrize("end", [(1.0, 0.5), (2.0, 0.4), (2.0, 0.0)])
+def test_the_profile_of_a_tapered_mill_has_its_cone(end):
+    body = ToolBody("T1", 1, *end, 12.0, 2.0, 20.0, 6.0, 40.0, taper=np.tan(np.radians(3.0)))
+    shape = tool_shape(body)
+    cutter = np.array(shape["bodies"][0]["profile"])
+    wide, high = body.corner_end
+    assert shape["kind"] == body.kind and shape["taper_deg"] == 3.0
+    assert np.allclose(cutter[-2:], [[wide, high], [body.widest_radius, 12.0]], atol=1e-5)
+    flat = body.radius - body.corner_radius
+    assert np.allclose(np.hypot(cutter[1:-1, 0] - flat, cutter[1:-1, 1] - body.corner_radius), body.corner_radius,
+                       atol=2e-5)
 
 
 def test_the_profile_of_a_chamfer_mill_has_its_cone():
