@@ -183,7 +183,8 @@ class Remainder(ReportModel):
                     "corner_radius_mm, neck_length_mm, shank_diameter_mm and stickout_mm, and taper_angle_deg for a "
                     "tapered mill. like: the tool of the setup with the same holder. share: share of the area that "
                     "it reaches. Or kind is 'other access', 'other clamping' or 'other process'; the last has "
-                    "slenderness. access: only with several accesses. Empty if no tool is needed or none would reach the area.")] = {}
+                    "slenderness. access: only with several accesses. Empty if no tool is needed or none would reach "
+                    "the area.")] = {}
     tool_at_hand: Annotated[str | None, Field(description="Reason pass: the tool of the setup that touches the area. "
                                                           "Reason fixture: the tool that would touch it without "
                                                           "fixtures.")] = None

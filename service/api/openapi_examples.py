@@ -27,7 +27,7 @@ from schemas.jobs import (
 from schemas.keys import Key, KeyList, MadeKey
 from schemas.machine import Machine
 from schemas.materials import MATERIALS
-from schemas.tools import Tool
+from schemas.tools import BUILT_KINDS, Tool
 from service.errors import ERROR_TABLE, problem_document
 
 JOB_ID = "j0660cde19ab0bbcba666faa426aeaf78"
@@ -83,7 +83,7 @@ ANSWERS: dict[str, Any] = {
     "listKeys": KeyList(items=[KEY]), "createKey": MadeKey(key=NO_KEY, about=KEY),
     "capabilities": {
         "version": "0.2.0", "code": SHA, "kinds": ["plan", "zones", "verify"], "stepnc": ["AP238", "ISO 14649"],
-        "dialects": [{"name": "linuxcnc", "extension": "ngc"}], "tools": ["ball", "flat", "bull"],
+        "dialects": [{"name": "linuxcnc", "extension": "ngc"}], "tools": list(BUILT_KINDS),
         "machines": ["3-axis", "5-axis"], "kinematics": ["table-table-AC"], "stock": ["part_offset", "box"],
         "materials": ["Ti-6Al-4V"], "webhooks": True, "slots": 4, "principal": "mes", "scopes": ["submit", "read"],
         "limits": {"body_bytes": 256000000, "job_time_s": 1800.0, "job_memory_bytes": 8000000000, "attempts": 3,

@@ -14,7 +14,14 @@ from benchmarks.passes.feeds_sweep import MACHINES, OVERRIDES, faults, varied
 from examples.demo import demo_setup
 from geometry.cutting_mechanics import effective_diameter
 from schemas.materials import MATERIALS
-from service.cutting_data import MAX_CHIP_THINNING, chip_thinning, cutting_data
+from service.cutting_data import (
+    MAX_CHIP_THINNING,
+    chip_thinning,
+    cut_diameter,
+    cutting_data,
+    cutting_words,
+    feed_per_tooth,
+)
 from service.from_wire import parse_setup, tool_bodies
 from service.stages.cautions import bent, dry, limited, uncut_centres
 from service.stages.job_inputs import JobInputs
@@ -62,6 +69,27 @@ def test_finishing_keeps_the_figures_of_the_table_and_layers_of_a_ball_count_the
     flat = setup(FLAT)
     same = [cutting_data(flat.material, flat.tools[0], flat.machine, d) for d in (None, 2.0)]
     assert same[0] == same[1]
+
+
+@pytest.mark.parametrize(("kind", "share"), [("tapered_ball", 0.3), ("tapered_bull", 0.3), ("tapered_flat", 0.5)])
+def test_a_tapered_mill_has_the_figures_of_its_end_and_layers_count_its_cone(kind, share):
+    end = {"corner_radius_mm": 0.4} if kind == "tapered_bull" else {}
+    given = {"id": "T1", "number": 1, "diameter_mm": 2, "flutes": 2, "flute_length_mm": 10, "stickout_mm": 20, **end}
+    cone = setup({**given, "kind": kind, "taper_angle_deg": 20})
+    plain = setup({**given, "kind": kind.removeprefix("tapered_")})
+    tool, straight = cone.tools[0], plain.tools[0]
+    assert cutting_data(cone.material, tool, cone.machine) == cutting_data(plain.material, straight, plain.machine)
+    words = cutting_words(cone.material, tool)
+    assert (words.per_tooth, words.section) == (feed_per_tooth(cone.material.feed_per_tooth, 2.0), share * 4.0)
+    depth = 0.9
+    body = tool_bodies(cone)[0]
+    wide, high = body.corner_end
+    assert depth > high and cut_diameter(straight, depth) < cut_diameter(tool, depth)
+    assert cut_diameter(tool, depth) == pytest.approx(2 * (wide + math.tan(math.radians(20)) * (depth - high)))
+    assert cut_diameter(tool, 10.0) == pytest.approx(2 * body.widest_radius)
+    rough = cutting_data(cone.material, tool, cone.machine, depth)
+    assert rough.spindle_rpm == min(18000, math.floor(130e3 / (math.pi * cut_diameter(tool, depth))))
+    assert 0.0 < JobInputs.of(cone).cut_table["T1"].step_down <= share * 2.0
 
 
 def test_a_bound_on_the_engaged_angle_feeds_layers_faster_and_no_finish():

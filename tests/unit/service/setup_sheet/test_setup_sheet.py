@@ -22,6 +22,7 @@ from service.pictures.clamping_picture import box_mesh, corners_of
 from service.setup_sheet.model import Facts, SetupSheet, SheetSection
 from service.setup_sheet.pdf import latin, pdf_of
 from service.setup_sheet.setup_sheet import clamp_pictures, sheet_files
+from service.setup_sheet.tables import needed
 from service.stages.blank_model import blank_of
 from service.stages.job_inputs import JobInputs
 from tests.synthetic_plan import plan, step
@@ -176,6 +177,19 @@ def test_all_that_the_report_names_is_on_both(proved):
     for text in both(proved):
         assert [w for w in wanted if w not in text] == []
         assert "not to be seen" not in text and "UNPROVED" not in text
+
+
+def test_a_tapered_mill_has_its_angle_in_table_heading_and_drawing(monkeypatch):
+    cone = {**SETUP["tools"][0], "kind": "tapered_ball", "diameter_mm": 1, "taper_angle_deg": 3, "flute_length_mm": 12,
+            "neck_diameter_mm": 2.1}
+    monkeypatch.setitem(SETUP, "tools", [cone, *SETUP["tools"][1:]])
+    for text in both(made()):
+        assert [w for w in ("T1: tapered ball 3° Ø1", "3° side", "Ø2.2068 cone", "Ø1 tip") if w not in text] == []
+        assert text.count("tapered ball 3°") >= 2
+    need = {"kind": "tapered_bull", "diameter_mm": 2, "corner_radius_mm": 0.4, "taper_angle_deg": 1.5,
+            "neck_length_mm": 14, "shank_diameter_mm": 4, "stickout_mm": 18}
+    assert needed({"why_left": None, "tool_at_hand": None, "would_need": need}) == \
+        "tapered bull 1.5° Ø2 R0.4, neck 14, shank Ø4, stickout 18"
 
 
 def test_what_users_write_stays_text(proved):

@@ -15,13 +15,23 @@ from zones.reach.access_reach import able
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import touchable
 from zones.remainder import tool_proposal
-from zones.remainder.tool_catalogue import DIAMETERS, MAX_SLENDERNESS, catalogue
-from zones.remainder.tool_proposal import propose
+from zones.remainder.tool_catalogue import DIAMETERS, MAX_SLENDERNESS, catalogue, sold
+from zones.remainder.tool_proposal import _Candidate, _named, propose
 from zones.remainder.tool_requirements import CuttingPart, ToolRequirement
 from zones.zoning.zones import LEAST_ZONE_MM2
 
 LIFT = 0.002
 HOLDER = (HolderFrustum(10, 16, 8), HolderFrustum(16, 16, 20))
+
+
+def test_a_tapered_mill_keeps_its_taper_and_cutters_of_the_series_have_none():
+    body = replace(tool(2.0, 1.0), taper=0.1)
+    assert sold(body, 3.0, 1.5).kind == "ball" and sold(body, 3.0, 1.5).taper == 0.0
+    at_hand = _named(_Candidate(CuttingPart(2.0, 1.0, body.id, True), body, np.zeros(1, np.int64), np.zeros((1, 2))),
+                     np.array([[14.0, 30.0]]))
+    assert (at_hand.kind, at_hand.taper_angle_deg) == ("tapered_ball", round(body.taper_deg, 6))
+    bought = at_hand.body("P9", 9, HOLDER)
+    assert bought.kind == "tapered_ball" and bought.taper == pytest.approx(0.1) and bought.neck_length == 14.0
 
 
 def takes(mesh, body, samples, margin=4.0):
