@@ -64,7 +64,8 @@ def tapered_of(radius, corner_radius, taper, widest):
     long = math.sqrt(1.0 + taper * taper)
     join, high = d + r / long, r * (1.0 - taper / long)
     wide = max(widest, join)
-    return Tapered(wide, r, d, join, high, 1.0 / taper, _bend(r, d, join, high, wide, high + (wide - join) / taper, 1.0 / taper))
+    top, grade = high + (wide - join) / taper, 1.0 / taper
+    return Tapered(wide, r, d, join, high, grade, _bend(r, d, join, high, wide, top, grade))
 
 
 @njit(**KERNEL)

@@ -27,7 +27,6 @@ from schemas.setup import Access, Operations, Quality, Setup, Stock, setup_sha25
 from schemas.tools import Tool
 from service.cutting_data import (
     bending,
-    cut_diameter,
     cutting_data,
     cutting_words,
     layer_depth,

@@ -1,4 +1,4 @@
-"""Tapered mills as shapes of a drop, against the outline of the same mill, which has a kernel of its own, and a twin."""
+"""Tapered mills as shapes of a drop, against the outline of the same mill, which has a kernel of its own."""
 
 import math
 
@@ -52,7 +52,7 @@ def places(mesh, count, seed=0):
 @pytest.mark.parametrize("name", MILLS)
 @pytest.mark.parametrize("shape", SHAPES)
 def test_tip_is_that_of_the_outline(shape, name):
-    mesh, (radius, corner, side, tool) = SHAPES[shape](), mill(name)
+    mesh, (radius, corner, side, _) = SHAPES[shape](), mill(name)
     tree, xy = TriangleTree(mesh), places(mesh, 400)
     tips = drop_tips(tree, xy, radius, corner, side=side)
     turned = drop_turned(tree, xy, Outline.tapered(radius, corner, *side))

@@ -40,10 +40,13 @@ def able(tool: ToolBody, normals: F64, scallop: float) -> NDArray[np.bool_]:
     return np.asarray((nz > LEVEL) | (np.abs(nz) <= 0.5 * scallop / 0.1))
 
 
-def preference(tool: ToolBody, form: AreaForm) -> tuple[float, float, float]:
-    """Sort key of the tools for a form, best first: flat ends on level planes, then stout and short ones."""
+def preference(tool: ToolBody, form: AreaForm) -> tuple[float, float, float, float]:
+    """Sort key of the tools for a form, best first: flat ends on level planes, then stout and short ones.
+
+    Of two ends of one diameter that of the wider cone is the stouter tool.
+    """
     kind = {"flat": 0.0, "bull": 1.0, "ball": 2.0}[tool.end] if form is AreaForm.LEVEL else 0.0
-    return (kind, -tool.diameter, tool.stickout)
+    return (kind, -tool.diameter, -tool.taper, tool.stickout)
 
 
 def connection_bands(view: View, decomposition: Decomposition) -> dict[str, list[tuple[float, float]]]:

@@ -153,8 +153,8 @@ def build_zones(views: Sequence[View], decomposition: Decomposition, scallop: fl
     if categories is not None:
         found = [replace(z, category=categories.of(z.region)) for z in found]
     place = {v.id: k for k, v in enumerate(views)}
-    found.sort(key=lambda z: (place[z.access], -z.tool.diameter, z.tool.stickout, z.tool.id, _stage(z), z.category.rank,
-                              -z.top, z.region, z.form))
+    found.sort(key=lambda z: (place[z.access], -z.tool.diameter, -z.tool.taper, z.tool.stickout, z.tool.id, _stage(z),
+                              z.category.rank, -z.top, z.region, z.form))
     zones = tuple(replace(z, id=f"Z{k}") for k, z in enumerate(found, start=1))
     return Zoning(zones, mcz, (*between, *_neck_planes(zones, sights)), taken, tuple(s.reach for s in sights))
 
