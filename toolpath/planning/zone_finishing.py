@@ -163,8 +163,10 @@ class Finish:
             return self._rounds(step_id, every)
         self.settled = True
         other, refused = self.layout.along_borders
-        leans = self.settings.turning is not None and self.field.tool.taper == 0.0
-        leans = leans and bool(self.faces) and len(every) > 0 and bool(every.all())
+        leans = self.settings.turning is not None and bool(self.faces) and len(every) > 0 and bool(every.all())
+        if leans and self.field.tool.taper > 0.0:
+            leans = False
+            refused = (*refused, *_untilted())
         if other is None and not leans:
             self.strategy = replace(self.strategy, rejected=(*self.strategy.rejected, *refused))
             return self._rounds(step_id, every)
@@ -429,3 +431,7 @@ def step_of(step_id: str, name: str, zone: str | None, zones: Sequence[ZoneArea]
                        settings.scallop_height, settings.chordal_tolerance, with_few_changes(walked, settings.rates),
                        outline, max(z.top for z in zones), min(z.bottom for z in zones), settings.cut_direction,
                        rates=settings.rates, bend=cut.bend)
+
+
+def _untilted() -> tuple[dict[str, object], ...]:
+    return tuple({"strategy": name, "reason": "tapered mills are planned upright only"} for name in sorted(LEANING))
