@@ -164,9 +164,6 @@ class Finish:
         self.settled = True
         other, refused = self.layout.along_borders
         leans = self.settings.turning is not None and bool(self.faces) and len(every) > 0 and bool(every.all())
-        if leans and self.field.tool.taper > 0.0:
-            leans = False
-            refused = (*refused, *_untilted())
         if other is None and not leans:
             self.strategy = replace(self.strategy, rejected=(*self.strategy.rejected, *refused))
             return self._rounds(step_id, every)
@@ -208,7 +205,8 @@ class Finish:
         given = self.checks, self.field.tool, self.cut, self.settings
         found: list[tuple[str, Runs]] = []
         if self.zone.form is AreaForm.STEEP:
-            found.append((flank.NAME, flank.flanked(alone, *given, self._surroundings(), self.field.allowance)))
+            found.append((flank.NAME, flank.flanked(alone, *given, self._surroundings(), self.field.allowance)
+                          if self.field.tool.taper == 0.0 else Runs((), ("the side of the tool leans",))))
         if self.zone.form is not AreaForm.LEVEL and curvature_matched.suits(self.field.tool):
             curved = [face for face in alone if not face.flat]
             found.append((curvature_matched.NAME,
@@ -431,7 +429,3 @@ def step_of(step_id: str, name: str, zone: str | None, zones: Sequence[ZoneArea]
                        settings.scallop_height, settings.chordal_tolerance, with_few_changes(walked, settings.rates),
                        outline, max(z.top for z in zones), min(z.bottom for z in zones), settings.cut_direction,
                        rates=settings.rates, bend=cut.bend)
-
-
-def _untilted() -> tuple[dict[str, object], ...]:
-    return tuple({"strategy": name, "reason": "tapered mills are planned upright only"} for name in sorted(LEANING))

@@ -80,12 +80,14 @@ def shells(tool: ToolBody, discs: Sequence[Disc], clear: Clearances, off_flank: 
              *((d.radius, d.height, math.inf) for d in discs))
     # by powers of two, so that a few serve all passes
     high = step * 2.0 ** math.ceil(math.log2(max(high, step) / step))
-    return _shells(tool.radius, tool.corner_radius, tool.flute_length, outer, off_flank, off_end, step, high)
+    return _shells(tool.radius, tool.corner_radius, tool.flute_length, tool.taper, outer, off_flank, off_end, step, high)
 
 
 @lru_cache(maxsize=KEPT)
-def _shells(radius: float, corner: float, flute: float, outer: tuple[tuple[float, float, float], ...], off_flank: float,
-            off_end: float, step: float, high: float) -> tuple[Shell, Shell]:
+def _shells(radius: float, corner: float, flute: float, taper: float, outer: tuple[tuple[float, float, float], ...],
+            off_flank: float, off_end: float, step: float, high: float) -> tuple[Shell, Shell]:
+    mill = ToolBody("", 0, 2.0 * radius, corner, flute, 0.0, 0.0, 0.0, 0.0, taper=taper)
+    (wide, begins), widest = mill.corner_end, mill.widest_radius
     flank: list[F64] = [np.zeros((0, 3))]
     inner = 0.0
     for h in _heights(min(off_end, flute), min(flute, high), step):
@@ -95,9 +97,12 @@ def _shells(radius: float, corner: float, flute: float, outer: tuple[tuple[float
             continue
         at = radius - corner + math.sqrt((corner - off_end) ** 2 - low * low) if corner > off_end else radius
         # over the corner the side counts: stock that may stand under the end may not stand beside it
-        low = max(corner - max(h - off_end, 0.0), 0.0)
+        up = max(h - off_end, 0.0)
+        low = max(corner - up, 0.0)
         side = radius - corner + math.sqrt(max(corner * corner - low * low, 0.0)) - off_flank
-        at = max(min(max(at, side), radius - off_flank), 0.0)
+        if taper > 0.0 and up > begins:
+            side = wide + taper * (up - begins) - off_flank
+        at = max(min(max(at, side), widest - off_flank), 0.0)
         begin = 0.0 if len(flank) == 1 else min(inner + step, at)
         flank += [_ring(r, h, step) for r in _between(begin, at, step)]
         inner = at
