@@ -213,6 +213,20 @@ def test_layers_of_a_slot_bend_no_more_than_each_of_them():
     assert "0.50 mm depth" in cautions["deflection"].message
 
 
+def test_a_slot_of_a_tapered_mill_bends_it_as_its_section_and_its_cone_say():
+    """1.5 mm deep with a flat of 2 mm and a side of 20 degrees: the mean width of the slot is that half way up."""
+    cone = ToolBody("T1", 1, 2.0, 0.0, 6.0, 6.0, 6.0, 6.0, 45.0, taper=math.tan(math.radians(20.0)))
+    width = 2.0 + 1.5 * cone.taper
+    force = cutting_force(WORDS.kc, WORDS.mc, 600 / (8000 * 4), 1.5, width, cone, 4)
+    bend = force * compliance(cone)
+    _, cautions = judged(slot(1.5, 600), replace(WORDS, bend=0.5 * bend), cone)
+    assert cautions["deflection"].measured == pytest.approx(bend, rel=0.08)
+    assert "1.50 mm depth" in cautions["deflection"].message
+    _, cautions = judged(slot(1.5, 1000, 30000), tool=cone)
+    top = 2.0 * (1.0 + 1.5 * cone.taper)
+    assert cautions["cutting_speed"].measured == pytest.approx(math.pi * top * 30.0, rel=1e-6)
+
+
 def climbing(degrees):
     """Up through the full height of the block, from beside it."""
     rise = 6.0 * math.tan(math.radians(degrees))
