@@ -19,7 +19,7 @@ const KINDS = ["flat", "ball", "bull", "tapered_flat", "tapered_ball", "tapered_
 const COLUMNS: { key: string; title: string; hint: string }[] = [
   { key: "number", title: "T", hint: "T number" }, { key: "kind", title: "Kind", hint: "Kind of tool" },
   { key: "diameter_mm", title: "Ø", hint: "Diameter, mm" }, { key: "corner_radius_mm", title: "Corner R", hint: "Corner radius of a bull-nose tool, mm" },
-  { key: "taper_angle_deg", title: "Taper", hint: "Angle between side and axis of a tapered mill, degrees" },
+  { key: "taper_angle_deg", title: "Taper °", hint: "Angle between side and axis of a tapered mill, degrees" },
   { key: "flutes", title: "Teeth", hint: "Number of teeth" }, { key: "flute_length_mm", title: "Flute length", hint: "Flute length, mm" },
   { key: "neck_diameter_mm", title: "Neck Ø", hint: "Neck diameter, mm" }, { key: "neck_length_mm", title: "Neck length", hint: "Neck length, tip to shank, mm" },
   { key: "shank_diameter_mm", title: "Shank Ø", hint: "Shank diameter, mm" }, { key: "stickout_mm", title: "Stickout", hint: "Stickout, tip to holder, mm" },
