@@ -1,4 +1,4 @@
-"""Jobs with tapered mills: walls that lean more than the cone are cut, upright ones are told, another tool takes them."""
+"""Jobs with tapered mills: walls that lean more than the cone are cut, upright ones are told and left to others."""
 
 import pytest
 

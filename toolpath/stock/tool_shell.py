@@ -80,7 +80,8 @@ def shells(tool: ToolBody, discs: Sequence[Disc], clear: Clearances, off_flank: 
              *((d.radius, d.height, math.inf) for d in discs))
     # by powers of two, so that a few serve all passes
     high = step * 2.0 ** math.ceil(math.log2(max(high, step) / step))
-    return _shells(tool.radius, tool.corner_radius, tool.flute_length, tool.taper, outer, off_flank, off_end, step, high)
+    return _shells(tool.radius, tool.corner_radius, tool.flute_length, tool.taper, outer, off_flank, off_end, step,
+                   high)
 
 
 @lru_cache(maxsize=KEPT)
