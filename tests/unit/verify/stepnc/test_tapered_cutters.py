@@ -88,6 +88,7 @@ def test_the_profile_is_written_as_the_standard_has_it():
     assert f"LENGTH_MEASURE({foot:.6f})" in aim and f"MILLING_TOOL_DIMENSION({foot:.6f},$,3.,12.,0.5,0.5,0.)" in arm
     assert "'user defined milling tool'" in aim and "'tool description','tapered ball D1 3 deg; " in aim
     assert "'corner radius center horizontal'" in aim and "'edge center horizontal'" in old
+    assert "T1: tapered ball D1 3 deg, corner R0.5" in write_linuxcnc(tapered())
     assert "TAPERED_ENDMILL(" in arm and "T1: tapered ball D1 3 deg, corner R0.5, flute length 12 to D2.2068" in arm
 
 
