@@ -26,17 +26,22 @@ INF = np.inf
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _bottom_with_side(rho, over, cutter):
+    """As ``bottom``, of a cone or a tapered mill, ``over`` mm beyond its flat end."""
+    r = cutter.round
+    if r <= 0.0:
+        return over * cutter.cone / cutter.corner
+    wide, high = corner_end(cutter)
+    return high + (rho - wide) / cutter.taper if rho >= wide else r - math.sqrt(max(r * r - over * over, 0.0))
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def bottom(rho, cutter: CutterSizes):
     """Height of the cutting profile over the tip at distance rho from the axis, which may be beyond its radius."""
     r = cutter.corner
-    over = max(rho - cutter.radius + r, 0.0)
+    over = max(rho - (cutter.radius - r), 0.0)
     if cutter.cone > 0.0:
-        if cutter.round <= 0.0:
-            return over * cutter.cone / r
-        wide, high = corner_end(cutter)
-        if rho >= wide:
-            return high + (rho - wide) / cutter.taper
-        r = cutter.round
+        return _bottom_with_side(rho, over, cutter)
     return r - math.sqrt(max(r * r - over * over, 0.0))
 
 
@@ -77,35 +82,15 @@ def _lowest_on_cone(dz, plan, s0, miss2, b, slope):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _lowest_s(wx, wy, dx, dy, dz, s0, miss2, s1, s2, cutter):
-    """Where on [s1, s2] the profile over the line is lowest (a convex function of s).
-
-    A tapered mill is smooth where its side begins: it is lowest on the side, or nearer than that on its corner.
-    """
-    if dz == 0.0:
-        return min(max(s0, s1), s2)
-    a, r = cutter.radius - cutter.corner, cutter.corner
-    if r <= 0.0:
-        return s1 if dz > 0.0 else s2
-    plan = math.sqrt(dx * dx + dy * dy)
-    if cutter.cone > 0.0:
-        if cutter.round <= 0.0:
-            return min(max(_lowest_on_cone(dz, plan, s0, miss2, a, 1.0 / slope_of(cutter)), s1), s2)
-        b, r = corner_end(cutter)[0], cutter.round
-        g = -dz * cutter.taper / plan
-        if abs(g) >= 1.0 or g * g * miss2 >= (1.0 - g * g) * max(b * b - miss2, 0.0):
-            return min(max(_lowest_on_cone(dz, plan, s0, miss2, b, 1.0 / cutter.taper), s1), s2)
-        half = math.sqrt(b * b - miss2) / plan  # the corner over the line, and then its lowest place within the move
-        return min(max(_lowest_on_corner(wx, wy, dx, dy, dz, plan, s0, miss2, s0 - half, s0 + half, a, r), s1), s2)
-    return _lowest_on_corner(wx, wy, dx, dy, dz, plan, s0, miss2, s1, s2, a, r)
+def _lowest_on_ball(dz, plan, s0, miss2, s1, s2, r):
+    """Where on [s1, s2] a ball of radius r over the line is lowest."""
+    w = math.sqrt(max(r * r - miss2, 0.0))
+    return min(max(s0 - w * dz / math.sqrt(plan * plan + dz * dz) / plan, s1), s2)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
-def _lowest_on_corner(wx, wy, dx, dy, dz, plan, s0, miss2, s1, s2, a, r):
-    """As ``_lowest_s``, of a round corner alone: a ball, or the flat end and the torus round it."""
-    if a <= 1e-12:
-        w = math.sqrt(max(r * r - miss2, 0.0))
-        return min(max(s0 - w * dz / math.sqrt(plan * plan + dz * dz) / plan, s1), s2)
+def _lowest_on_torus(wx, wy, dx, dy, dz, s1, s2, a, r):
+    """Where on [s1, s2] a flat of radius a with a torus round it is lowest over the line."""
     lo, hi = s1, s2
     for _ in range(40):
         s = 0.5 * (lo + hi)
@@ -119,6 +104,40 @@ def _lowest_on_corner(wx, wy, dx, dy, dz, plan, s0, miss2, s1, s2, a, r):
         else:
             lo = s
     return 0.5 * (lo + hi)
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _lowest_with_side(wx, wy, dx, dy, dz, plan, s0, miss2, s1, s2, cutter):
+    """As ``_lowest_s``, of a cone or a tapered mill.
+
+    A tapered mill is smooth where its side begins: it is lowest on the side, or nearer than that on its corner.
+    """
+    a, r = cutter.radius - cutter.corner, cutter.round
+    if r <= 0.0:
+        return min(max(_lowest_on_cone(dz, plan, s0, miss2, a, 1.0 / slope_of(cutter)), s1), s2)
+    b, g = corner_end(cutter)[0], -dz * cutter.taper / plan
+    if abs(g) >= 1.0 or g * g * miss2 >= (1.0 - g * g) * max(b * b - miss2, 0.0):
+        return min(max(_lowest_on_cone(dz, plan, s0, miss2, b, 1.0 / cutter.taper), s1), s2)
+    if a <= 1e-12:
+        return _lowest_on_ball(dz, plan, s0, miss2, s1, s2, r)
+    half = math.sqrt(b * b - miss2) / plan  # while the corner is over the line
+    return min(max(_lowest_on_torus(wx, wy, dx, dy, dz, s0 - half, s0 + half, a, r), s1), s2)
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _lowest_s(wx, wy, dx, dy, dz, s0, miss2, s1, s2, cutter):
+    """Where on [s1, s2] the profile over the line is lowest (a convex function of s)."""
+    if dz == 0.0:
+        return min(max(s0, s1), s2)
+    a, r = cutter.radius - cutter.corner, cutter.corner
+    if r <= 0.0:
+        return s1 if dz > 0.0 else s2
+    plan = math.sqrt(dx * dx + dy * dy)
+    if cutter.cone > 0.0:
+        return _lowest_with_side(wx, wy, dx, dy, dz, plan, s0, miss2, s1, s2, cutter)
+    if a <= 1e-12:
+        return _lowest_on_ball(dz, plan, s0, miss2, s1, s2, r)
+    return _lowest_on_torus(wx, wy, dx, dy, dz, s1, s2, a, r)
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)

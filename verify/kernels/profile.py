@@ -28,7 +28,7 @@ def leaning(rho, h, cutter: CutterSizes):
     arc; over the rim of the cone it is the rim or the cylinder. Inside, the distance is that to the nearest tangent.
     """
     m, r = slope_of(cutter), cutter.round
-    x, y = rho - cutter.radius + cutter.corner, h - r
+    x, y = rho - (cutter.radius - cutter.corner), h - r
     if x > 0.0 and m * x + y < 0.0:
         out = math.sqrt(x * x + y * y) - r
     else:
@@ -45,7 +45,7 @@ def standing(rho, h, cutter: CutterSizes):
     if cutter.cone > 0.0:
         return max(leaning(rho, h, cutter), h - cutter.length)
     r = cutter.corner
-    x, y = rho - cutter.radius + r, r - h
+    x, y = rho - (cutter.radius - r), r - h
     out = math.sqrt(max(x, 0.0) ** 2 + max(y, 0.0) ** 2) if x > 0.0 or y > 0.0 else max(x, y)
     return max(out - r, h - cutter.length)
 
@@ -92,7 +92,7 @@ def _beside_cone(qx, qy, qz, dx, dy, dz, plan2, cutter):
         s = min(max(s - g * math.sqrt(miss2 / (1.0 - g * g)) / plan, 0.0), 1.0)
     h = qz - s * dz
     rho = math.sqrt((qx - s * dx) ** 2 + (qy - s * dy) ** 2)
-    x, y = rho - cutter.radius + cutter.corner, h - cutter.round
+    x, y = rho - (cutter.radius - cutter.corner), h - cutter.round
     past, low = rho - cutter.radius, h - cutter.cone
     if m * x + y <= 0.0 or m * past + low >= 0.0:
         return math.inf
@@ -133,7 +133,7 @@ def carried(qx, qy, qz, dx, dy, dz, cutter: CutterSizes):
         s = min(max((qx * dx + qy * dy + z * dz) / (plan2 + dz * dz), 0.0), 1.0)
         wx, wy, wz = qx - s * dx, qy - s * dy, z - s * dz
         # the nearest place is on the ball: under its equator, or where a cone begins
-        if wz + cutter.taper * math.sqrt(wx * wx + wy * wy) <= 0.0:
+        if (wz if cone == 0.0 else wz + cutter.taper * math.sqrt(wx * wx + wy * wy)) <= 0.0:
             return math.sqrt(wx * wx + wy * wy + wz * wz) - r
     if plan2 == 0.0 and cone == 0.0 and r <= 0.5 * length:
         # straight along the axis: no height is better than the middle of the flutes

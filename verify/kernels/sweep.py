@@ -343,22 +343,26 @@ def torus_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, r):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _tapered_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter):
+    """As ``cutter_interval``, of a tapered mill: its corner, and the cone from where that ends."""
+    lo, hi, r, flat = INF, -INF, cutter.round, cutter.radius - cutter.corner
+    if r > 0.0 and flat <= 1e-12:
+        lo, hi = sphere_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, r, r, cutter.length)
+    elif r > 0.0:
+        lo, hi = torus_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, flat + r, r)
+    wide, high = corner_end(cutter)
+    if cutter.length - high > LEAST_CONE:
+        u, v = cone_interval(qx, qy, qz - high, nx, ny, nz, dx, dy, dz, wide, cutter.radius, cutter.length - high)
+        lo, hi = min(lo, u), max(hi, v)
+    return lo, hi
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def cutter_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter: CutterSizes):
     """Interval of t inside the sweep of a whole cutting part; (inf, -inf) where the ray misses it."""
-    radius, corner, length, cone, r, taper = cutter
-    if taper > 0.0:
-        lo, hi = INF, -INF
-        if r > 0.0:
-            flat = radius - corner
-            if flat <= 1e-12:
-                lo, hi = sphere_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, r, r, length)
-            else:
-                lo, hi = torus_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, flat + r, r)
-        wide, high = corner_end(cutter)
-        if length - high > LEAST_CONE:
-            u, v = cone_interval(qx, qy, qz - high, nx, ny, nz, dx, dy, dz, wide, radius, length - high)
-            lo, hi = min(lo, u), max(hi, v)
-        return lo, hi
+    radius, corner, length, cone = cutter.radius, cutter.corner, cutter.length, cutter.cone
+    if cutter.taper > 0.0:
+        return _tapered_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter)
     lo, hi = cylinder_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, cone if cone > 0.0 else corner, length)
     if cone > 0.0:
         u, v = cone_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius - corner, radius, cone)
