@@ -6,18 +6,29 @@ import numpy as np
 import pytest
 
 from geometry.kernels.drop import bull_of
+from geometry.kernels.tapered import tapered_of
 from toolpath.kernels.stock import HALF_DIAGONAL, stamp
 from zones.kernels.lattice import LatticeFrame
 
 
-def twin(top, cover, frame, points, radius, corner):
-    """Every position on its own, over all nodes at once."""
+WIDER = 1.6  # times that the side of a tapered mill is wider than its end
+
+
+def twin(top, cover, frame, points, radius, corner, taper=0.0):
+    """Every position on its own, over all nodes at once; radius : mm, of the end where the side leans."""
     x, y = np.meshgrid(frame.x0 + frame.step * np.arange(top.shape[1]), frame.y0 + frame.step * np.arange(top.shape[0]))
 
     def bottom(rho):
-        u = rho - (radius - corner)
+        u = rho - (end - corner)
         with np.errstate(invalid="ignore"):
-            return np.where(u <= 0.0, 0.0, corner - np.sqrt(np.maximum(corner * corner - u * u, 0.0)))
+            curve = np.where(u <= 0.0, 0.0, corner - np.sqrt(np.maximum(corner * corner - u * u, 0.0)))
+        if taper == 0.0:
+            return curve
+        return np.where(rho > join, corner * (1.0 - taper / long) + (rho - join) / taper, curve)
+
+    end, long = radius, np.sqrt(1.0 + taper * taper)
+    join = end - corner * (1.0 - 1.0 / long)
+    radius = radius if taper == 0.0 else WIDER * radius
 
     for a, b in zip(points[:max(len(points) - 1, 1)], np.vstack([points[1:], points[-1:]]), strict=False):
         pieces = max(1, int(np.ceil(np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2) / (0.7 * frame.step))))
@@ -29,6 +40,23 @@ def twin(top, cover, frame, points, radius, corner):
             top[lowered] = np.minimum(top, cz + bottom(rho))[lowered]
             lowered &= rho + half <= radius
             cover[lowered] = np.minimum(cover, cz + bottom(rho + half))[lowered]
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("corner", [0.0, 0.4, 1.0])
+def test_a_tapered_mill_lowers_with_its_side(seed, corner):
+    rng = np.random.default_rng(seed)
+    frame = LatticeFrame(*rng.uniform(-1.0, 1.0, 2), 0.1)
+    top = rng.uniform(0.0, 2.0, (50, 40))
+    cover = top + rng.uniform(0.0, 0.3, top.shape)
+    points = np.column_stack([frame.x0 + rng.uniform(0.0, 4.0, 6), frame.y0 + rng.uniform(0.0, 5.0, 6),
+                              [1.4, 1.0, 1.0, 0.3, 0.3, 0.5]])
+    given = top.copy(), cover.copy()
+    stamp(*given, frame, points, tapered_of(1.0, corner, 0.2, WIDER))
+    twin(top, cover, frame, points, 1.0, corner, 0.2)
+    np.testing.assert_allclose(given[0], top, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(given[1], cover, rtol=0, atol=1e-12)
+    assert (top < 1.0).mean() > 0.2
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from geometry.kernels.drop import bull_of
+from geometry.kernels.tapered import tapered_of
 from geometry.mesh_queries.bvh import TriangleTree
 from tests.hand_parts import ball, box_mesh, tool
 from toolpath.counterexamples import Counterexamples
@@ -24,7 +25,7 @@ def block(step=0.1, top=2.0, size=30.0):
     return StockMap.box(TriangleTree(mesh), np.array([0.0, 0, -4]), np.array([size, size, top]), step)
 
 
-def twin(top, x0, y0, step, tips, ways, radius, corner, skin, window):
+def twin(top, x0, y0, step, tips, ways, radius, corner, skin, window, taper=0.0, widest=None):
     """The same, place by place: a set of sectors for each tip, joined back along the way."""
     sets = []
     for (x, y, z), way in zip(tips, ways, strict=True):
@@ -33,16 +34,21 @@ def twin(top, x0, y0, step, tips, ways, radius, corner, skin, window):
             for j in range(top.shape[1]):
                 wx, wy, over = x0 + j * step - x, y0 + i * step - y, top[i, j] - z
                 rho = math.hypot(wx, wy)
-                if rho > radius or over <= skin or way[0] * wx + way[1] * wy < -step:
+                if rho > (widest or radius) or over <= skin or way[0] * wx + way[1] * wy < -step:
                     continue
+                long = math.hypot(1.0, taper)
+                join, side_from = radius - corner + corner / long, corner * (1.0 - taper / long)
                 run = max(rho - (radius - corner), 0.0)
-                if over - (corner - math.sqrt(max(corner**2 - run**2, 0.0))) <= skin:
+                bottom = side_from + (rho - join) / taper if taper and rho > join else \
+                    corner - math.sqrt(max(corner**2 - run**2, 0.0))
+                if over - bottom <= skin:
                     continue
-                edge = radius if over >= corner else radius - corner + math.sqrt(over * (2.0 * corner - over))
+                edge = min(join + taper * (over - side_from), widest or radius) if over >= side_from else \
+                    radius - corner + math.sqrt(over * (2.0 * corner - over))
                 side = way[0] * wy - way[1] * wx
                 low, high = (math.asin(max(-1.0, min(1.0, (side + s * 0.5 * step) / edge))) for s in (-1.0, 1.0))
                 first, last = (min(max(int((a / math.pi + 0.5) * SECTORS), 0), SECTORS - 1) for a in (low, high))
-                if over >= corner:
+                if over >= side_from:
                     first, last = first if side - step >= -edge else 0, last if side + step <= edge else SECTORS - 1
                 own |= set(range(first, last + 1))
         sets.append(own)
@@ -69,12 +75,16 @@ def test_the_kernel_says_what_the_obvious_twin_says(corner):
     ways = np.column_stack([np.cos(turn), np.sin(turn)])
     given = (top, 0.05, -0.03, 0.1, tips, ways, 1.0, corner, 0.05)
     met, again, got = np.zeros(12, np.int64), np.zeros(12, np.int64), np.empty(12)
-    compiled = (*given[:6], bull_of(1.0, corner), 0.05)
-    sectors(*compiled, met)
-    sectors_parallel(*compiled, again)
+    sectors(*given[:6], bull_of(1.0, corner), 0.05, met)
+    sectors_parallel(*given[:6], bull_of(1.0, corner), 0.05, again)
     joined(met, tips, 0.9, got)
     assert np.allclose(got, twin(*given, 0.9)) and 0.0 < got.min() < got.max()
     assert np.array_equal(met, again)
+    # a side that leans is wider where it is higher, and its stock is met farther out
+    cone = np.zeros(12, np.int64)
+    sectors(*given[:6], tapered_of(1.0, corner, 0.5, 1.4), 0.05, cone)
+    joined(cone, tips, 0.9, got)
+    assert np.allclose(got, twin(*given, 0.9, 0.5, 1.4)) and not np.array_equal(cone, met)
 
 
 @pytest.mark.parametrize("share", [0.2, 0.6, 1.0, 1.5])
