@@ -5,7 +5,8 @@
     │   ├── StepError             not a STEP file, truncated, or without a usable solid
     │   ├── PartError             a readable shape that cannot be planned (open, several, size)
     │   ├── SetupError            tools, machine or tolerances contradict each other
-    │   └── ProgramError          an NC program cannot be read
+    │   ├── ProgramError          an NC program cannot be read
+    │   └── LibraryError          a tool library cannot be read
     ├── GeometryError         a computation on valid input did not converge or overflowed
     ├── ResourceError         a child ran out of time or memory, or died of a signal
     ├── PlanningError         a plan could not be made although the input is valid
@@ -100,6 +101,12 @@ class ProgramError(InputError):
     default_code = "bad_program"
 
 
+class LibraryError(InputError):
+    """A tool library that cannot be read or written; the subjects name the entry."""
+
+    default_code = "bad_library"
+
+
 class GeometryError(CamError):
     """A computation on valid input did not converge."""
 
@@ -145,8 +152,8 @@ class InternalError(CamError):
 ERROR_CLASSES: dict[str, type[CamError]] = {
     c.__name__: c
     for c in (
-        CamError, InputError, StepError, PartError, SetupError, ProgramError, GeometryError, ResourceError,
-        PlanningError, VerificationError, OutputError, CancelledError, InternalError,
+        CamError, InputError, StepError, PartError, SetupError, ProgramError, LibraryError, GeometryError,
+        ResourceError, PlanningError, VerificationError, OutputError, CancelledError, InternalError,
     )
 }
 
