@@ -116,6 +116,16 @@ def find_material(name: str) -> Material:
     return MATERIALS[found]
 
 
+def same_material(name: str, other: str) -> bool:
+    """Whether two names mean one material: equal but for case, spaces and hyphens, or names of one built-in material.
+
+    >>> same_material("ti6al4v", "Ti-6Al-4V"), same_material("AISI 304", "1.4301"), same_material("C45", "316L")
+    (True, True, False)
+    """
+    keys = _key(name), _key(other)
+    return keys[0] == keys[1] or (keys[0] in _BY_KEY and _BY_KEY[keys[0]] == _BY_KEY.get(keys[1]))
+
+
 def _resolve(value: Any, info: ValidationInfo) -> Any:
     value = library_entry(value, "materials", info)
     return find_material(value) if isinstance(value, str) else value

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PrivateAttr, field_serializer, model_validator
 
 from schemas.base import Count, Number, WireModel
+from schemas.materials import same_material
 
 ToolKind = Literal["ball", "flat", "bull", "tapered_ball", "tapered_bull", "tapered_flat", "barrel", "drill", "tap",
                    "chamfer", "thread_mill"]
@@ -22,6 +23,8 @@ POINT_ANGLES = {"drill": 118.0, "chamfer": 90.0}
 LENGTH_EPSILON = 1e-9
 MAX_TAPER = 45.0
 """Largest ``taper_angle_deg``, deg; a wider cone is a chamfer mill."""
+CUTTING_FIELDS = ("spindle_rpm", "feed_mm_min", "plunge_feed_mm_min")
+"""Speeds and feeds that a tool states for all materials, or in ``cutting_data`` for each."""
 CORE_SHARE = 0.3
 """Default of ``core_diameter_mm`` as a share of the diameter."""
 
@@ -29,6 +32,8 @@ MAX_LENGTH = 2000.0
 """Greatest length and diameter, mm."""
 
 Length = Annotated[Number, Field(ge=1e-3, le=MAX_LENGTH)]
+Line = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]*$")]
+"""Text without line ends and control characters."""
 
 
 class HolderSegment(WireModel):
@@ -44,6 +49,21 @@ class HolderSegment(WireModel):
         if self.diameter_top_mm is None:
             self.diameter_top_mm = self.diameter_mm
         return self
+
+
+class ToolCuttingData(WireModel):
+    """Speeds and feeds of a tool in one material."""
+
+    material: Annotated[Line | None, Field(
+        min_length=1, max_length=100, description="Name of the material, as in material of the setup; a known other "
+                                                  "name of a built-in material counts too. null: any material that "
+                                                  "has no entry of its own.")] = None
+    spindle_rpm: Annotated[Number | None, Field(
+        ge=1, le=1e6, description="Spindle speed, 1/min. null: computed from the material.")] = None
+    feed_mm_min: Annotated[Number | None, Field(
+        ge=0.1, le=1e6, description="Cutting feed, mm/min. null: computed.")] = None
+    plunge_feed_mm_min: Annotated[Number | None, Field(
+        ge=0.1, le=1e6, description="Downward feed into stock, mm/min. null: computed.")] = None
 
 
 class Tool(WireModel):
@@ -114,6 +134,15 @@ class Tool(WireModel):
     gauge_length_mm: Annotated[Length | None, Field(
         description="Tip to spindle face, mm. Used for the length offset, the travel in Z and the kinematics only. "
                     "Default: stickout_mm plus the lengths of the holder.")] = None
+    description: Annotated[Line, Field(max_length=400, description="Your own words for the tool.")] = ""
+    order_code: Annotated[Line, Field(max_length=200, description="Order number of the cutter.")] = ""
+    library_id: Annotated[Line, Field(
+        max_length=200, description="Id of the entry in the tool library that the tool was imported from. An export "
+                                    "writes it back.")] = ""
+    cutting_data: Annotated[list[ToolCuttingData], Field(
+        max_length=200, description="Speeds and feeds by material. Those of the material of the setup are used, or "
+                                    "else those without a material, where spindle_rpm, feed_mm_min or "
+                                    "plunge_feed_mm_min of the tool is null.")] = []
     max_rpm: Annotated[Number | None, Field(
         ge=1, le=1e6, description="Highest spindle speed of the tool, 1/min; null: no limit.")] = None
     max_engagement_deg: Annotated[Number | None, Field(
@@ -289,6 +318,22 @@ class Tool(WireModel):
         """Whether the setup gives the gauge length; otherwise it is the default."""
         return self._gauge_given
 
+    def in_material(self, name: str) -> Tool:
+        """The tool with its speeds and feeds in a material, where it does not state them for all materials.
+
+        name : of the material of the setup
+
+        >>> tool = Tool(id="T1", kind="flat", diameter_mm=6, cutting_data=[{"material": "ti6al4v", "spindle_rpm": 3000}])
+        >>> tool.in_material("Ti-6Al-4V").spindle_rpm, tool.in_material("C45").spindle_rpm
+        (3000.0, None)
+        """
+        own = [d for d in self.cutting_data if d.material is not None and same_material(d.material, name)]
+        usual = [d for d in self.cutting_data if d.material is None]
+        for data in (own or usual)[:1]:
+            stated = {f: getattr(data, f) for f in CUTTING_FIELDS if getattr(self, f) is None}
+            return self.model_copy(update=stated)
+        return self
+
     def _check_lengths(self) -> None:
         chain = [(n, _given(getattr(self, n)))
                  for n in ("flute_length_mm", "neck_length_mm", "stickout_mm", "gauge_length_mm")]
@@ -358,5 +403,5 @@ def numbered(tools: list[Tool]) -> list[Tool]:
     return [t.model_copy(update={"number": numbers[t.id]}) for t in tools]
 
 
-__all__: list[Any] = ["BUILT_KINDS", "TAPERED_KINDS", "VERIFIED_KINDS", "HolderSegment", "Tool", "ToolKind",
-                      "default_numbers", "numbered"]
+__all__: list[Any] = ["BUILT_KINDS", "CUTTING_FIELDS", "TAPERED_KINDS", "VERIFIED_KINDS", "HolderSegment", "Tool",
+                      "ToolCuttingData", "ToolKind", "default_numbers", "numbered"]

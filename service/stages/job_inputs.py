@@ -100,8 +100,10 @@ class JobInputs:
     @classmethod
     def of(cls, setup: Setup, others: Sequence[OtherSolid] = ()) -> JobInputs:
         """The inputs of a job from its setup; others : the other solids of the part's file."""
+        sha256 = setup_sha256(setup)
+        setup = setup.model_copy(update={"tools": [t.in_material(material_name(setup)) for t in setup.tools]})
         c, bodies = setup.clearance_mm, tool_bodies(setup)
-        return cls(setup_sha256(setup), setup.labels, setup.part.solid, setup.part.fuse, placement_of(setup),
+        return cls(sha256, setup.labels, setup.part.solid, setup.part.fuse, placement_of(setup),
                    tuple(setup.access), tuple(setup.tools), bodies, _cut_table(setup, bodies),
                    gauge_lengths(setup.tools, bodies), setup.machine, setup.stock,
                    fixtures_of(setup, others), () if setup.part.others else tuple(others),

@@ -1,0 +1,1 @@
+"""The formats of tool libraries: each module turns bytes into entries, and entries into bytes."""
