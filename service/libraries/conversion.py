@@ -220,7 +220,8 @@ def _lengths(entry: Entry, fields: dict[str, Any]) -> None:
             entry.note(f"the diameter of the neck from {flutes:g} to {neck:g} mm is not stated; the shank of "
                        f"{shank:g} mm begins at the end of the flutes")
         neck = None
-    if neck is None:
+    if neck is None and neck_diameter is not None:
+        entry.note(f"the neck of {neck_diameter:g} mm is left out, since its length is not stated")
         neck_diameter = None
     if stickout is None:
         start = max(neck or 0.0, flutes or 0.0)
