@@ -57,7 +57,7 @@ def converted(entries: Sequence[Entry]) -> list[Converted]:
     numbers = Counter(e.t_number for e in entries if e.t_number and not e.problem)
     out = []
     for entry in entries:
-        tool_id = tool_id_of(entry)
+        tool_id = entry.tool.id if entry.tool is not None else tool_id_of(entry)
         if tool_id in used and not entry.problem:
             entry.leave_out(f"its id {entry.library_id or tool_id} is also that of {used[tool_id].name}; "
                             "each entry needs its own")
@@ -89,6 +89,8 @@ def tool_id_of(entry: Entry) -> str:
 
 
 def _converted(entry: Entry, tool_id: str, numbers: Counter[int | None]) -> Converted:
+    if entry.tool is not None and not entry.problem:
+        return Converted(entry, TAKEN, entry.tool)
     fields = {} if entry.problem else _shape(entry)
     if not entry.problem:
         _lengths(entry, fields)
@@ -97,7 +99,7 @@ def _converted(entry: Entry, tool_id: str, numbers: Counter[int | None]) -> Conv
     if not entry.library_id:
         entry.note(f"the library states no id; {tool_id} is made from the content of the entry")
     fields |= {k: entry.values[k] for k in _COPIED if k in entry.values}
-    fields |= {"id": tool_id, "number": _number(entry, numbers), "library_id": shown(entry.library_id, 200),
+    fields |= {"id": tool_id, "number": _number(entry, numbers), "library_id": "" if entry.library_id == tool_id else shown(entry.library_id, 200),
                "description": shown(entry.description, 400), "order_code": shown(entry.order_code, 200),
                "coolant": _coolant(entry), "cutting_data": _cutting_data(entry, fields),
                "holder": [{"diameter_mm": s.diameter, "diameter_top_mm": s.diameter_top, "length_mm": s.length}

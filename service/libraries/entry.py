@@ -15,6 +15,7 @@ from enum import StrEnum
 from typing import Any
 
 from geometry.errors import LibraryError
+from schemas.tools import Tool
 
 MAX_ENTRIES = 20_000
 MAX_SEGMENTS = 50
@@ -112,6 +113,7 @@ class Entry:
     values      : dimensions and counts by name; lengths mm, angles deg
     notes       : what the reader could not take over
     problem     : why the entry cannot be taken; "" where it can
+    tool        : the tool, where the library is one of this program
     """
 
     place: str
@@ -130,6 +132,7 @@ class Entry:
     presets: list[Preset] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     problem: str = ""
+    tool: Tool | None = None
 
     @property
     def name(self) -> str:

@@ -13,9 +13,8 @@ TO_AUTODESK = {
     "flat": "flat end mill", "ball": "ball end mill", "bull": "bull nose end mill", "tapered_flat": "tapered mill",
     "tapered_ball": "tapered mill", "tapered_bull": "tapered mill", "drill": "drill", "chamfer": "chamfer mill",
     "tap": "tap right hand", "thread_mill": "thread mill"}
-_NOT_AVAILABLE = (
-    (r"lolli?pop|barrel|tonnen|t-?slot|t-?nut|dovetail|schwalben|woodruff|undercut|form mill|radius mill|concave|"
-     r"corner round|viertelkreis"),)
+_NOT_AVAILABLE = re.compile(r"lolli?pop|barrel|tonnen|t-?slot|t-?nut|dovetail|schwalben|woodruff|undercut|form mill|"
+                            r"radius mill|concave|corner round|viertelkreis")
 _WORDS = (
     (r"gewindefr|thread ?-?mill", "thread_mill"),
     (r"tap ?drill|kernloch", "drill"),
@@ -38,6 +37,6 @@ def kind_of_words(text: str) -> str:
     ('', '')
     """
     words = text.casefold()
-    if any(re.search(p, words) for group in _NOT_AVAILABLE for p in group):
+    if _NOT_AVAILABLE.search(words):
         return ""
     return next((kind for pattern, kind in _WORDS if re.search(pattern, words)), "")
