@@ -323,7 +323,8 @@ class Tool(WireModel):
 
         name : of the material of the setup
 
-        >>> tool = Tool(id="T1", kind="flat", diameter_mm=6, cutting_data=[{"material": "ti6al4v", "spindle_rpm": 3000}])
+        >>> tool = Tool(id="T1", kind="flat", diameter_mm=6,
+        ...             cutting_data=[{"material": "ti6al4v", "spindle_rpm": 3000}])
         >>> tool.in_material("Ti-6Al-4V").spindle_rpm, tool.in_material("C45").spindle_rpm
         (3000.0, None)
         """

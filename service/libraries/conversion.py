@@ -30,7 +30,6 @@ _UNFIT = re.compile(r"[^A-Za-z0-9_-]+")
 _COPIED = ("point_angle_deg", "tip_diameter_mm", "pitch_mm", "flutes", "center_cutting", "core_diameter_mm",
            "ramp_angle_deg", "max_rpm", "max_engagement_deg", "life_min", "spindle_rpm", "feed_mm_min",
            "plunge_feed_mm_min", "gauge_length_mm")
-_SHANKLESS = "shank_diameter_mm is not stated"
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,7 @@ def converted(entries: Sequence[Entry]) -> list[Converted]:
     """
     check_count(len(entries))
     used: dict[str, Entry] = {}
-    numbers = Counter(e.t_number for e in entries if e.t_number and not e.problem)
+    numbers: Counter[int | None] = Counter(e.t_number for e in entries if e.t_number and not e.problem)
     out = []
     for entry in entries:
         tool_id = entry.tool.id if entry.tool is not None else tool_id_of(entry)
@@ -99,7 +98,8 @@ def _converted(entry: Entry, tool_id: str, numbers: Counter[int | None]) -> Conv
     if not entry.library_id:
         entry.note(f"the library states no id; {tool_id} is made from the content of the entry")
     fields |= {k: entry.values[k] for k in _COPIED if k in entry.values}
-    fields |= {"id": tool_id, "number": _number(entry, numbers), "library_id": "" if entry.library_id == tool_id else shown(entry.library_id, 200),
+    own = "" if entry.library_id == tool_id else shown(entry.library_id, 200)
+    fields |= {"id": tool_id, "number": _number(entry, numbers), "library_id": own,
                "description": shown(entry.description, 400), "order_code": shown(entry.order_code, 200),
                "coolant": _coolant(entry), "cutting_data": _cutting_data(entry, fields),
                "holder": [{"diameter_mm": s.diameter, "diameter_top_mm": s.diameter_top, "length_mm": s.length}
@@ -192,55 +192,79 @@ def _tapered(entry: Entry, radius: float, taper: float) -> dict[str, Any]:
 
 def _lengths(entry: Entry, fields: dict[str, Any]) -> None:
     """Lengths and diameters from the flutes upwards, each default with a note."""
-    v, diameter = entry.values, fields["diameter_mm"]
-    flutes, neck, stickout = v.get("flute_length_mm"), v.get("neck_length_mm"), v.get("stickout_mm")
-    overall = v.get("overall_length_mm", math.inf)
-    if stickout is None and entry.holder:
+    v = entry.values
+    if v.get("stickout_mm") is None and entry.holder:
         entry.leave_out("it has a holder, and the library does not state how far the tool stands out of it")
         return
-    if flutes is None and fields["kind"] != "drill":
-        cap = min(x for x in (neck, stickout, overall, math.inf) if x is not None)
-        flutes = v["flute_length_mm"] = round(min(max(3.0 * diameter, _least(entry, fields)), cap), 9)
-        entry.note(f"flute_length_mm is not stated; {flutes:g} is taken, 3 x diameter_mm at most as long as the tool")
     if v.get("flutes") is None:
         entry.note("flutes is not stated; 2 teeth are taken")
-    if flutes is not None and neck is not None and neck < flutes:
-        entry.note(f"the neck ends at {neck:g} mm, below the flutes; their length {flutes:g} is taken")
-        neck = flutes
-    shank = v.get("shank_diameter_mm")
+    flutes = _flutes(entry, fields)
     widest = _widest(fields, flutes)
+    shank = v.get("shank_diameter_mm")
     if shank is None:
-        entry.note(f"{_SHANKLESS}; {widest:g} is taken, the widest diameter of the cutting part")
+        entry.note(f"shank_diameter_mm is not stated; {widest:g} is taken, the widest diameter of the cutting part")
         shank = widest
-    neck_diameter = v.get("neck_diameter_mm")
-    if neck_diameter is not None and neck_diameter > widest + 1e-9:
-        entry.note(f"the neck of {neck_diameter:g} mm is wider than the cutting part; a shank of that diameter begins "
-                   "at the end of the flutes")
-        shank, neck, neck_diameter = max(shank, neck_diameter), None, None
-    if neck is not None and flutes is not None and neck > flutes and neck_diameter is None:
-        if shank > widest + 1e-9:
-            entry.note(f"the diameter of the neck from {flutes:g} to {neck:g} mm is not stated; the shank of "
-                       f"{shank:g} mm begins at the end of the flutes")
-        neck = None
-    if neck is None and neck_diameter is not None:
-        entry.note(f"the neck of {neck_diameter:g} mm is left out, since its length is not stated")
-        neck_diameter = None
-    if stickout is None:
-        start = max(neck or 0.0, flutes or 0.0)
-        stickout = round(max(start, min(10.0 * diameter, overall)), 9)
-        entry.note(f"stickout_mm is not stated; {stickout:g} is taken"
-                   + (", 10 x diameter_mm" if stickout == 10.0 * diameter else ""))
-    elif neck is not None and neck > stickout:
+    neck, neck_diameter, shank = _neck(entry, flutes, widest, shank)
+    stickout = _stickout(entry, fields["diameter_mm"], max(neck or 0.0, flutes or 0.0))
+    if neck is not None and neck > stickout:
         entry.note(f"the neck is {neck:g} mm long, and {stickout:g} mm of the tool stand out of the holder; the neck "
                    "ends there")
         neck = stickout
-    gauge = v.get("gauge_length_mm")
-    if gauge is not None and gauge < stickout:
-        entry.note(f"gauge_length_mm {gauge:g} is less than the stickout {stickout:g}; it is left out")
-        del v["gauge_length_mm"]
     found = {"flute_length_mm": flutes, "neck_length_mm": neck, "neck_diameter_mm": neck_diameter,
              "shank_diameter_mm": shank, "stickout_mm": stickout}
     fields |= {k: x for k, x in found.items() if x is not None}
+
+
+def _flutes(entry: Entry, fields: dict[str, Any]) -> float | None:
+    """Length of the flutes, mm; None for a drill that does not state it, since a proof tells the two apart."""
+    v, kind = entry.values, fields["kind"]
+    stated: float | None = v.get("flute_length_mm")
+    if stated is not None or kind == "drill":
+        return stated
+    bounds = [v[k] for k in ("neck_length_mm", "stickout_mm", "overall_length_mm") if k in v]
+    usual = max(0.0 if kind == "chamfer" else 3.0 * fields["diameter_mm"], _least(entry, fields))
+    taken = round(min([usual, *bounds]), 9)
+    entry.note(f"flute_length_mm is not stated; {taken:g} is taken, "
+               + ("the height of the cone" if kind == "chamfer" else "3 x diameter_mm or less"))
+    return taken
+
+
+def _neck(entry: Entry, flutes: float | None, widest: float,
+          shank: float) -> tuple[float | None, float | None, float]:
+    """Length and diameter of the neck, None for no neck, and diameter of the shank, mm."""
+    v = entry.values
+    neck, diameter = v.get("neck_length_mm"), v.get("neck_diameter_mm")
+    if flutes is not None and neck is not None and neck < flutes:
+        entry.note(f"the neck ends at {neck:g} mm, below the end of the flutes at {flutes:g} mm; there is no neck")
+        return None, None, shank
+    if diameter is not None and diameter > widest + 1e-9:
+        entry.note(f"the neck of {diameter:g} mm is wider than the cutting part; a shank of at least that diameter "
+                   "begins at the end of the flutes")
+        return None, None, max(shank, diameter)
+    if neck is None:
+        if diameter is not None and diameter < widest:
+            entry.note(f"the neck of {diameter:g} mm is left out, since its length is not stated")
+        return None, None, shank
+    if diameter is None and (flutes is None or neck > flutes):
+        if shank > widest + 1e-9:
+            entry.note(f"the diameter of the neck up to {neck:g} mm is not stated; the shank of {shank:g} mm begins "
+                       "at the end of the flutes")
+        return None, None, shank
+    return neck, diameter, shank
+
+
+def _stickout(entry: Entry, diameter: float, start: float) -> float:
+    """What stands out of the holder, mm; start : mm, where the shank begins."""
+    v = entry.values
+    stated = v.get("stickout_mm")
+    if stated is None:
+        stated = round(max(start, min(10.0 * diameter, v.get("overall_length_mm", math.inf))), 9)
+        entry.note(f"stickout_mm is not stated; {stated:g} is taken")
+    gauge = v.get("gauge_length_mm")
+    if gauge is not None and gauge < stated:
+        entry.note(f"gauge_length_mm {gauge:g} is less than the stickout {stated:g}; it is left out")
+        del v["gauge_length_mm"]
+    return float(stated)
 
 
 def _least(entry: Entry, fields: dict[str, Any]) -> float:

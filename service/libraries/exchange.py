@@ -134,7 +134,8 @@ def _cut_down(entry: Entry, kind: Format) -> tuple[str, ...]:
     if "coolant" not in kind.carried and entry.coolant:
         lost.append("coolant")
         entry.coolant = None
-    for name, value in (("number", entry.t_number), ("order_code", entry.order_code)):
+    for name, value in (("number", entry.t_number), ("order_code", entry.order_code),
+                        ("description", entry.description)):
         if value and name not in kind.carried:
             lost.append(name)
     lost += _cut_presets(entry, kind)

@@ -43,7 +43,7 @@ class Format:
     endings : of file names, the first is that of written files
     write   : entries to bytes; None: it is read only
     kinds   : kinds of tools that it carries
-    carried : fields of a tool that it carries, besides id, description and kind
+    carried : fields of a tool that it carries, besides its kind
     media   : media type of a written file
     """
 
@@ -57,28 +57,29 @@ class Format:
     media: str = "application/octet-stream"
 
 
-_ALL = frozenset(VALUES) | {"number", "order_code", "coolant", "holder", SPEEDS, "library_id"}
+NAMED = frozenset({"description", "library_id"})
+_ALL = frozenset(VALUES) | NAMED | {"number", "order_code", "coolant", "holder", SPEEDS}
 _XML = "application/xml"
 FORMATS: dict[str, Format] = {f.name: f for f in (
     Format("zonemill", "tools of a setup", (".json",), setup_tools.read, None, ALL_KINDS, _ALL, "application/json"),
     Format("fusion", "Autodesk Fusion", (".json", ".tools"), fusion.read, fusion.write, ALL_KINDS,
-           AUTODESK_VALUES | {"number", "order_code", "coolant", "holder", SPEEDS, "library_id"}, "application/json"),
+           AUTODESK_VALUES | {"number", "order_code", "coolant", "holder", SPEEDS} | NAMED, "application/json"),
     Format("fusion-tools", "Autodesk Fusion, zipped", (".tools",), fusion.read, fusion.write_tools, ALL_KINDS,
-           AUTODESK_VALUES | {"number", "order_code", "coolant", "holder", SPEEDS, "library_id"}, "application/zip"),
+           AUTODESK_VALUES | {"number", "order_code", "coolant", "holder", SPEEDS} | NAMED, "application/zip"),
     Format("hsmlib", "HSMWorks", (".hsmlib", ".xml"), hsmlib.read, hsmlib.write, ALL_KINDS,
-           AUTODESK_VALUES | {"number", "order_code", "coolant", "holder", ONE_SPEED, "library_id"}, _XML),
+           AUTODESK_VALUES | {"number", "order_code", "coolant", "holder", ONE_SPEED} | NAMED, _XML),
     Format("freecad", "FreeCAD", (".zip", ".fctl", ".fctb"), freecad.read, freecad.write, frozenset(freecad.TO_SHAPE),
-           SHAPE | NECK | {"taper_angle_deg", "point_angle_deg", "tip_diameter_mm", "pitch_mm", "number",
-                           "library_id"}, "application/zip"),
+           SHAPE | NECK | {"taper_angle_deg", "point_angle_deg", "tip_diameter_mm", "pitch_mm", "number"} | NAMED,
+           "application/zip"),
     Format("linuxcnc", "LinuxCNC tool table", (".tbl",), linuxcnc.read, linuxcnc.write, ALL_KINDS,
-           frozenset(linuxcnc.REMARKED) | {"diameter_mm", "number", "library_id"}, "text/plain; charset=utf-8"),
+           frozenset(linuxcnc.REMARKED) | {"diameter_mm", "number"} | NAMED, "text/plain; charset=utf-8"),
     Format("iso13399", "ISO 13399, GTC", (".p21", ".zip"), iso13399.read, iso13399.write, frozenset(iso13399.KINDS),
-           SHAPE | NECK | {"point_angle_deg", "pitch_mm", "stickout_mm", "library_id"}),
+           SHAPE | NECK | {"point_angle_deg", "pitch_mm", "stickout_mm"} | NAMED),
     Format("din4000", "DIN 4000", (".xml", ".csv"), din4000.read, din4000.write, frozenset(din4000.WRITTEN),
-           SHAPE | NECK | {"point_angle_deg", "pitch_mm", "order_code", "library_id"}, _XML),
+           SHAPE | NECK | {"point_angle_deg", "pitch_mm", "order_code"} | NAMED, _XML),
     Format("hypermill", "hyperMILL", (".xml", ".omtdx"), named_parameters.read_hypermill,
            named_parameters.write_hypermill, frozenset(named_parameters.HYPERMILL_TYPES),
-           SHAPE | NECK | {"point_angle_deg", "pitch_mm", "order_code", SPEEDS, "library_id"}, _XML),
+           SHAPE | NECK | {"point_angle_deg", "pitch_mm", "order_code", SPEEDS} | NAMED, _XML),
     Format("solidcam", "SolidCAM", (".xml",), named_parameters.read_solidcam, named_parameters.write_solidcam,
            frozenset(named_parameters.SOLIDCAM_TYPES),
            SHAPE | NECK | {"point_angle_deg", "pitch_mm", "order_code", "stickout_mm", "number", ONE_SPEED,

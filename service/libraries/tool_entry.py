@@ -25,6 +25,9 @@ def tool_entry(tool: Tool, place: str) -> Entry:
     else:
         values["cone_tip_diameter_mm"] = cone_tip_diameter(tool.diameter_mm, tool.corner_radius_mm,
                                                            tool.taper_angle_deg)
+    if values.get("neck_diameter_mm") == tool.widest_mm and values.get("neck_length_mm") == tool.flute_length_mm:
+        # the defaults of a tool without a neck
+        del values["neck_diameter_mm"], values["neck_length_mm"]
     if tool.center_cutting:
         values.pop("center_cutting")
     return Entry(place, tool.kind, tool.kind, tool.library_id or tool.id, tool.description, tool.order_code,

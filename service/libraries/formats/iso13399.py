@@ -131,9 +131,9 @@ def write(entries: Sequence[Entry]) -> bytes:
 
 def _file(entry: Entry) -> bytes:
     v = entry.values
-    named = f"{_NAMES[entry.kind]} {entry.description}".strip()
-    if kind_of_words(entry.description) and entry.kind in (kind_of_words(entry.description),):
-        named = entry.description
+    spoken = kind_of_words(entry.description)
+    means = spoken == entry.kind or (spoken == "mill" and entry.kind in ("flat", "ball", "bull"))
+    named = entry.description if means else f"{_NAMES[entry.kind]} {entry.description}".strip()
     lines = ["ISO-10303-21;", "HEADER;", "FILE_DESCRIPTION(('tool'),'2;1');",
              f"FILE_NAME({quoted(entry.library_id)},'1970-01-01T00:00:00',(''),(''),'zonemill','zonemill','');",
              f"FILE_SCHEMA(('{SCHEMA}'));", "ENDSEC;", "DATA;", "#1=LANGUAGE($,'eng');",

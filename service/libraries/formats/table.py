@@ -199,7 +199,8 @@ def _fill(entry: Entry, cells: dict[str, tuple[Any, Unit | None]], source: Sourc
     if text("center_cutting"):
         entry.values["center_cutting"] = text("center_cutting").casefold() in ("true", "yes", "1", "ja")
     for part in text("holder").split():
-        entry.segment(*(part.split(":") + ["", "", ""])[:3], Unit.MM)
+        low, top, high = (part.split(":") + ["", "", ""])[:3]
+        entry.segment(low, top, high, Unit.MM)
     _cutting_data(entry, text("cutting_data"))
     if text("material"):
         speeds = {n: entry.values.pop(n, None) for n in ("spindle_rpm", "feed_mm_min", "plunge_feed_mm_min")}
