@@ -1,4 +1,4 @@
-"""``zonemill``: plan, zones, verify, serve, view, keys, demo, family, warm, openapi.
+"""``zonemill``: plan, zones, verify, serve, view, keys, tools, demo, family, warm, openapi.
 
 Exit codes: 0 proved (zones: done), 2 bad input, 3 not proved (verify: clean or unproved), 1 a bug. Only the result goes
 to stdout; logs and progress go to stderr. Heavy imports are inside the commands, so that ``--help`` is quick.
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.commands import key_commands
+from service.commands import key_commands, tool_commands
 from service.commands.arguments import (
     blank_file,
     error_reporting,
@@ -33,12 +33,16 @@ if TYPE_CHECKING:
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
                   help="Turns a STEP file and a list of tools into G-code and STEP-NC that a simulator has verified.")
 app.add_typer(key_commands.app, name="keys")
+app.add_typer(tool_commands.app, name="tools")
 
 Part = Annotated[Path, typer.Argument(metavar="PART.step", help="STEP file of the part.", show_default=False)]
 SetupPath = Annotated[Path, typer.Option("--setup", metavar="SETUP.json", help="The setup.", show_default=False)]
 MeshBox = Annotated[str | None, typer.Option(metavar="x0,y0,z0,x1,y1,z1", help="Mesh only this window, mm in program "
                                                                                "coordinates; small windows allow steps "
                                                                                "down to 0.002.")]
+Data = Annotated[Path | None, typer.Option("--data", metavar="DIR", help="Data folder of the service, for tools, "
+                                                                          "machines and materials as lib:NAME in the "
+                                                                          "setup.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print errors as JSON (problem document) on stdout.")]
 
 
@@ -66,7 +70,7 @@ def plan(part: Part, setup: SetupPath,
          out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.")],
          mesh_step: Annotated[float | None, typer.Option(help="Also write machined.stl, the part after the program; "
                                                               "the value is the distance of its nodes, mm.")] = None,
-         mesh_box: MeshBox = None, as_json: AsJson = False) -> None:
+         mesh_box: MeshBox = None, data: Data = None, as_json: AsJson = False) -> None:
     """Plan and prove a part; write report, zones, programs and STEP-NC into DIR, and the report to stdout."""
 
     def run(given: Setup, progress: Progress, blank: Path | None, reading: PartReading) -> tuple[Any, int]:
@@ -79,11 +83,11 @@ def plan(part: Part, setup: SetupPath,
 
     with error_reporting(as_json):
         make_folder(out)
-    _exit(part, setup, run, as_json)
+    _exit(part, setup, run, as_json, data)
 
 
 @app.command()
-def zones(part: Part, setup: SetupPath, as_json: AsJson = False) -> None:
+def zones(part: Part, setup: SetupPath, data: Data = None, as_json: AsJson = False) -> None:
     """Print zones.json: walls, connections, channels, zones, remainder."""
 
     def run(given: Setup, progress: Progress, blank: Path | None, reading: PartReading) -> tuple[Any, int]:
@@ -91,7 +95,7 @@ def zones(part: Part, setup: SetupPath, as_json: AsJson = False) -> None:
 
         return zones_only(part, given, progress, blank_path=blank, reading=reading), 0
 
-    _exit(part, setup, run, as_json)
+    _exit(part, setup, run, as_json, data)
 
 
 @app.command()
@@ -110,7 +114,7 @@ def verify(part: Part, setup: SetupPath,
                                                                                  "file is written.")] = None,
            mesh_step: Annotated[float, typer.Option(help="Distance of the nodes of machined.stl, mm; "
                                                          "0: no such file.")] = 0.2,
-           mesh_box: MeshBox = None, as_json: AsJson = False) -> None:
+           mesh_box: MeshBox = None, data: Data = None, as_json: AsJson = False) -> None:
     """Prove any program or STEP-NC, also from other CAM systems; print the report to stdout, a summary to stderr.
 
     Exit code 0: proved. 3: clean (no harm, but work is left undone) or unproved.
@@ -137,7 +141,7 @@ def verify(part: Part, setup: SetupPath,
     if out is not None:
         with error_reporting(as_json):
             make_folder(out, verification=True)
-    _exit(part, setup, run, as_json)
+    _exit(part, setup, run, as_json, data)
 
 
 @app.command()
@@ -268,8 +272,10 @@ def write_family_part(recipe: str, seed: int, out: Path, wanted: dict[str, int],
 
 
 def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress, Path | None, PartReading], tuple[Any, int]],
-          as_json: bool) -> None:
+          as_json: bool, data: Path | None) -> None:
     """Run a command on part and setup, print its result and exit with its exit code.
+
+    data : data folder whose library the setup may refer to; None: it refers to none
 
     The part is read by another process while the command imports what it needs.
     """
@@ -281,7 +287,7 @@ def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress, Path | None, 
         from service.part_reading import PartReading
 
         collect_rarely()
-        given = read_setup(setup)
+        given = read_setup(setup, tool_commands.library_of(data))
         check_text(part)
         blank = blank_file(setup, given)
         progress = Progress()

@@ -19,7 +19,7 @@ from service.api.head_requests import HeadMiddleware
 from service.api.metrics import Metrics, MetricsMiddleware
 from service.api.openapi import document
 from service.api.principals import PostRate
-from service.api.routes import capabilities, events, health, jobs, keys, library, submissions, view
+from service.api.routes import capabilities, events, health, jobs, keys, library, submissions, tool_libraries, view
 from service.jobs.engine import Engine
 from service.settings import Settings
 from service.version import VERSION
@@ -60,7 +60,7 @@ def create_app(settings: Settings | None = None, chain: str = "service.pipeline"
     app.state.streams = Counter()
     app.state.post_rate = PostRate(settings.post_rate)
     problems.install(app)
-    for module in (submissions, jobs, events, library, keys, capabilities, health, view):
+    for module in (submissions, jobs, events, tool_libraries, library, keys, capabilities, health, view):
         app.include_router(module.router)
     app.add_middleware(BodyLimitMiddleware, limit=settings.max_body_bytes)
     app.add_middleware(MetricsMiddleware, metrics=app.state.metrics)

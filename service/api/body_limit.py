@@ -13,7 +13,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.api.problems import BODY_LIMIT, problem_response, too_large
 
-FORMS = ("/v1/jobs", "/v1/zones", "/v1/verifications")
+FORMS = ("/v1/jobs", "/v1/zones", "/v1/verifications", "/v1/tools:import")
 LARGEST_JSON = 1_000_000  # bytes, ten times a tool with the finest profile
 
 

@@ -25,6 +25,7 @@ from schemas.jobs import (
     ToolList,
 )
 from schemas.keys import Key, KeyList, MadeKey
+from schemas.libraries import ImportedEntry, LibraryImport
 from schemas.machine import Machine
 from schemas.materials import MATERIALS
 from schemas.tools import BUILT_KINDS, Tool
@@ -73,7 +74,12 @@ ANSWERS: dict[str, Any] = {
                                          media_type="text/plain; charset=utf-8",
                                          href=f"{PATH}/files/program.linuxcnc.ngc")]),
     "listTools": ToolList(items=[ToolEntry(**ABOUT, entry=TOOL)]), "getTool": ToolEntry(**ABOUT, entry=TOOL),
-    "putTool": ToolEntry(**ABOUT, entry=TOOL),
+    "importTools": LibraryImport(format="fusion", dry_run=True, taken=0, noted=1, left_out=1, entries=[
+        ImportedEntry(place="entry 1", verdict="noted", notes=["flutes is not stated; 2 teeth are taken"],
+                      library_id="T1", stated_kind="ball end mill", t_number=1, h_number=1, name="T1", tool=TOOL),
+        ImportedEntry(place="entry 2", verdict="left_out", reason="kind 'lollipop mill' is not available",
+                      library_id="T2", stated_kind="lollipop mill", t_number=2)]),
+    "exportTools": "id,number,kind,diameter_mm\nT1,1,ball,3.0\n", "putTool": ToolEntry(**ABOUT, entry=TOOL),
     "listMachines": MachineList(items=[MachineEntry(**ABOUT, entry=Machine(max_rpm=18000))]),
     "getMachine": MachineEntry(**ABOUT, entry=Machine(max_rpm=18000)),
     "putMachine": MachineEntry(**ABOUT, entry=Machine(max_rpm=18000)),

@@ -93,6 +93,34 @@ class LibraryStore:
             except IntegrityError:
                 continue  # another request wrote that version meanwhile
 
+    def put_all(self, owner: str, shelf: str, values: Mapping[str, Any]) -> dict[str, Entry]:
+        """Write several entries in one transaction, each as ``put`` does.
+
+        values : the entries by name
+
+        Returns the entries as they now are, by name.
+        """
+        texts = {name: json.dumps(value, sort_keys=True) for name, value in values.items()}
+        of_shelf = sa.and_(entries.c.owner == owner, entries.c.shelf == shelf)
+        while True:
+            with self.engine.connect() as c:
+                rows = c.execute(sa.select(entries).where(of_shelf).order_by(entries.c.version)).mappings()
+                newest = {row["name"]: row for row in rows if row["name"] in texts}
+            same = {n: row for n, row in newest.items() if row["deleted"] is None and row["entry_json"] == texts[n]}
+            fresh: list[dict[str, Any]] = [
+                {"owner": owner, "shelf": shelf, "name": n, "entry_json": text, "created": time.time(),
+                 "version": newest[n]["version"] + 1 if n in newest else 1}
+                for n, text in texts.items() if n not in same]
+            try:
+                with self.engine.begin() as c:
+                    if fresh:
+                        c.execute(entries.insert(), fresh)
+            except IntegrityError:
+                continue  # another request wrote one of the versions meanwhile
+            written = {r["name"]: Entry(shelf, r["name"], r["version"], owner == SHARED, r["created"],
+                                        values[r["name"]]) for r in fresh}
+            return {n: written[n] if n in written else _entry(same[n]) for n in texts}
+
     def delete(self, owner: str, shelf: str, name: str) -> None:
         """Delete a name from the library; jobs keep the versions that they used.
 

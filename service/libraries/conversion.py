@@ -16,11 +16,14 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from schemas.libraries import Verdict
 from schemas.tools import BUILT_KINDS, MAX_TAPER, VERIFIED_KINDS, Tool, ToolCuttingData
 from service.libraries.cone import end_diameter
 from service.libraries.entry import Entry, Preset, check_count, shown
 
-TAKEN, NOTED, LEFT_OUT = "taken", "noted", "left_out"
+TAKEN: Verdict = "taken"
+NOTED: Verdict = "noted"
+LEFT_OUT: Verdict = "left_out"
 MAX_ROUNDING = 0.005
 """Mm: how far rounded figures of a library may be apart and mean one value."""
 MAX_NUMBER = 99_999
@@ -37,7 +40,7 @@ class Converted:
     """What became of an entry. tool : None where it is left out; reason : why, else empty."""
 
     entry: Entry
-    verdict: str
+    verdict: Verdict
     tool: Tool | None
     notes: tuple[str, ...] = ()
     reason: str = ""

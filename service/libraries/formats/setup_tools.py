@@ -53,7 +53,7 @@ def read(data: bytes, source: Source) -> list[Entry]:
 
 def write(tools: Sequence[Tool]) -> bytes:
     """The tools as a setup takes them."""
-    return json_bytes([t.model_dump(mode="json", exclude_defaults=True) for t in tools])
+    return json_bytes([t.model_dump(mode="json", exclude_defaults=True, exclude_none=True) for t in tools])
 
 
 __all__ = ["items_of", "read", "write"]
