@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
@@ -382,12 +383,13 @@ def default_numbers(tools: list[Tool]) -> dict[str, int]:
         Two tools have the same number or the same id.
     """
     ids = [t.id for t in tools]
-    if doubled := sorted({i for i in ids if ids.count(i) > 1}):
+    if doubled := sorted(i for i, count in Counter(ids).items() if count > 1):
         raise ValueError(f"tool ids must be unique; {', '.join(doubled)} occurs more than once")
     digits = ["".join(c for c in t.id if c.isdigit()) for t in tools]
+    often = Counter(digits)
     numbers: dict[str, int] = {}
     for place, (tool, own) in enumerate(zip(tools, digits, strict=True), start=1):
-        usable = own != "" and digits.count(own) == 1 and 1 <= int(own) <= 99999
+        usable = own != "" and often[own] == 1 and 1 <= int(own) <= 99999
         numbers[tool.id] = tool.number if tool.number is not None else int(own) if usable else place
     taken: dict[int, str] = {}
     for tool_id, number in numbers.items():

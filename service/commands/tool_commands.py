@@ -49,6 +49,7 @@ def import_tools(
     with error_reporting(as_json):
         from service.libraries.containers import json_bytes
         from service.libraries.exchange import import_library
+        from service.libraries.formats import setup_tools
         from service.libraries.import_report import import_report
 
         library = import_library(_bytes_of(file), _source(file, unit, encoding), format_name)
@@ -58,7 +59,7 @@ def import_tools(
             return
         if data is not None:
             _store(data).put_all(OWNER, "tools", {t.id: t.model_dump(mode="json") for t in library.tools})
-        _write(json_bytes([t.model_dump(mode="json", exclude_defaults=True, exclude_none=True) for t in library.tools]), out)
+        _write(setup_tools.write(library.tools), out)
 
 
 @app.command("export")

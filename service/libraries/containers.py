@@ -70,7 +70,8 @@ def json_of(data: bytes, encoding: str | None = None) -> Any:
                            remedy="send the library as its program wrote it") from None
     except ValueError as error:
         where = _broken_json_entry(text)
-        cut = isinstance(error, json.JSONDecodeError) and error.pos >= len(text.rstrip()) - 1
+        ended = isinstance(error, json.JSONDecodeError) and error.pos >= len(text.rstrip()) - 1
+        cut = ended or text.rstrip()[-1:] not in ("]", "}")
         what = "ends in the middle of" if cut else "cannot be read at"
         raise LibraryError(f"the library {what} {where}: {error}", code="library_cut_off" if cut else
                            "library_not_json", subjects=(where,), remedy="export the library once more, and send the "

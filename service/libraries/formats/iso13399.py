@@ -61,7 +61,7 @@ def _entry(data: bytes, name: str, place: int, source: Source) -> Entry:
         texts = {n: file.records(n)[0][1] for n in file.of("STRING_WITH_LANGUAGE")}
         words = {n: file.records(n)[0][1] for n in file.of("MULTI_LANGUAGE_STRING")}
     except ProgramError as error:
-        cut = "END-ISO-10303-21" in error.message or "ends" in error.message
+        cut = b"END-ISO-10303-21" not in data[-200:]
         raise LibraryError(error.message, code="library_cut_off" if cut else "library_not_part21",
                            subjects=(shown(name), *error.subjects), measured=error.measured,
                            remedy="export the tool once more, and send the whole file") from None
