@@ -13,14 +13,14 @@ import re
 import warnings
 from collections.abc import Sequence
 from typing import Any
-from zipfile import BadZipFile
+from zipfile import BadZipFile, ZipFile
 
 from defusedxml.common import DefusedXmlException
 from openpyxl import Workbook, load_workbook
 from openpyxl.utils.exceptions import InvalidFileException
 
 from geometry.errors import LibraryError
-from service.libraries.containers import Archive, text_of
+from service.libraries.containers import Archive, text_of, zipped
 from service.libraries.entry import Entry, Preset, Source, Unit, check_count, shown, to_number
 from service.libraries.formats.kind_words import AUTODESK, kind_of_words
 
@@ -269,7 +269,12 @@ def write_xlsx(entries: Sequence[Entry]) -> bytes:
         sheet.append([_harmless(c) for c in row])
     out = io.BytesIO()
     book.save(out)
-    return out.getvalue()
+    with ZipFile(out) as archive:
+        files = {n: archive.read(n) for n in archive.namelist()}
+    # the same tools give the same bytes: the time of writing goes out of the properties and of the zip file
+    core = "docProps/core.xml"
+    files[core] = re.sub(rb"<dcterms:(created|modified)[^>]*>[^<]*</dcterms:\1>", b"", files[core])
+    return zipped(files)
 
 
 def _harmless(cell: Any) -> Any:
