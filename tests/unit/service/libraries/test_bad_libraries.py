@@ -93,7 +93,8 @@ class TestEncodings:
     def test_byte_order_marks_and_utf_16(self):
         for encoding in ("utf-8-sig", "utf-16"):
             assert import_library(self.ROW.encode(encoding), Source("x")).tools[0].description == "Schruppfräser"
-        assert import_library(hsm(), Source("x")).tools and import_library(hsm(encoding="iso-8859-1"), Source("x")).tools
+        for encoding in ("UTF-16", "iso-8859-1"):
+            assert import_library(hsm(encoding=encoding), Source("x")).tools
 
     def test_xml_whose_declaration_is_wrong(self):
         error = refused(hsm().decode("utf-16").replace("UTF-16", "UTF-8").encode("iso-8859-1"))

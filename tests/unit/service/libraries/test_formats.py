@@ -40,8 +40,8 @@ HSM = """<?xml version="1.0" encoding="{encoding}"?>
  <tool guid="g-1" type="{kind}" unit="{unit}" id="1">
   <description>Planfräser</description><product-id>P-7</product-id>
   <nc number="5" length-offset="15" diameter-offset="5"/><coolant mode="flood"/>
-  <body diameter="0.25" corner-radius="0" flute-length="0.75" shoulder-length="1" shaft-diameter="0.25" body-length="1.5"
-        overall-length="2.5" number-of-flutes="3" taper-angle="{taper}" tip-diameter="0"/>
+  <body diameter="0.25" corner-radius="0" flute-length="0.75" shoulder-length="1" shaft-diameter="0.25"
+        body-length="1.5" overall-length="2.5" number-of-flutes="3" taper-angle="{taper}" tip-diameter="0"/>
   <holder><section diameter="1" length="0"/><section diameter="1.2" length="0.5"/><section diameter="1.2" length="1"/>
    <section diameter="1.5" length="0"/><section diameter="1.5" length="0.25"/></holder>
   <motion spindle-rpm="8000" cutting-feedrate="40" plunge-feedrate="10" feed-mode="per-minute" clockwise="yes"/>
@@ -127,7 +127,8 @@ class TestHsm:
     def test_lengths_feeds_and_holder_of_a_library_in_inches(self):
         found = only(read(hsm()))
         tool = found.tool
-        assert (tool.diameter_mm, tool.flute_length_mm, tool.neck_length_mm, tool.stickout_mm) == (6.35, 19.05, 25.4, 38.1)
+        assert (tool.diameter_mm, tool.flute_length_mm) == (6.35, 19.05)
+        assert (tool.neck_length_mm, tool.stickout_mm) == (25.4, 38.1)
         assert [(s.diameter_mm, s.diameter_top_mm, s.length_mm) for s in tool.holder] == [
             (25.4, 30.48, 12.7), (30.48, 30.48, 25.4), (38.1, 38.1, 6.35)]
         assert (tool.cutting_data[0].spindle_rpm, tool.cutting_data[0].feed_mm_min) == (8000, 1016)
@@ -251,8 +252,8 @@ class TestNamedParameters:
         assert "tapered" in only(read(self.HYPER.format(more=tapered))).reason
 
     def test_solidcam(self):
-        text = """<Results><Tools><Tool Type="Milling" SubType="BallNoseMill" UserType="B6"><param name="unit" value="{unit}"/>
-          <param name="diameter" value="6"/><param name="cutting edge length" value="9"/>
+        text = """<Results><Tools><Tool Type="Milling" SubType="BallNoseMill" UserType="B6">
+          <param name="unit" value="{unit}"/><param name="diameter" value="6"/><param name="cutting edge length" value="9"/>
           <param name="shoulder length" value="20"/><param name="shoulder diameter" value="5.8"/>
           <param name="arbor diameter" value="6"/><param name="outside holder length" value="30"/>
           <param name="number of teeth" value="2"/><Spin/><Feed/></Tool></Tools></Results>"""
@@ -302,7 +303,8 @@ END-ISO-10303-21;
 
 class TestTables:
     def test_heads_in_words_and_units_in_heads(self):
-        text = "Nr;Werkzeugtyp;Durchmesser [mm];Zähne;Schneidenlänge [mm];Schaftdurchmesser [mm];Auskraglänge [mm];Preis\n"
+        text = ("Nr;Werkzeugtyp;Durchmesser [mm];Zähne;Schneidenlänge [mm];Schaftdurchmesser [mm];Auskraglänge [mm];"
+                "Preis\n")
         library = read(text + '3;Kugelfräser;6,0;2;12;6;40;"12,50"\n')
         tool = only(library).tool
         assert (library.format.name, tool.kind, tool.number, tool.stickout_mm) == ("csv", "ball", 3, 40)
