@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from service.commands.arguments import error_reporting
+from service.commands.library_files import check_one_origin, library_bytes, library_source, write_result
 
 if TYPE_CHECKING:
     from schemas.tools import Tool
@@ -52,14 +52,14 @@ def import_tools(
         from service.libraries.formats import setup_tools
         from service.libraries.import_report import import_report
 
-        library = import_library(_bytes_of(file), _source(file, unit, encoding), format_name)
+        library = import_library(library_bytes(file), library_source(file, unit, encoding), format_name)
         _tell(library)
         if dry_run:
-            _write(json_bytes(import_report(library, dry_run=True).model_dump(mode="json")), out)
+            write_result(json_bytes(import_report(library, dry_run=True).model_dump(mode="json")), out)
             return
         if data is not None:
             _store(data).put_all(OWNER, "tools", {t.id: t.model_dump(mode="json") for t in library.tools})
-        _write(setup_tools.write(library.tools), out)
+        write_result(setup_tools.write(library.tools), out)
 
 
 @app.command("export")
@@ -77,22 +77,14 @@ def export_tools(
     """Write tools as a library of another system, in mm.
 
     What the format has no place for goes to stderr.
-
-    Raises
-    ------
-    InputError
-        no_tools_named: neither FILE nor --data is given, or both are.
     """
     with error_reporting(as_json):
-        from geometry.errors import InputError
         from service.console import say
         from service.libraries.exchange import export_library, import_library
 
-        if (file is None) == (data is None):
-            raise InputError("give either FILE or --data", code="no_tools_named",
-                             remedy="zonemill tools export SETUP.json --format fusion -o tools.json")
+        check_one_origin(file, data)
         if file is not None:
-            library = import_library(_bytes_of(file), _source(file, unit, None))
+            library = import_library(library_bytes(file), library_source(file, unit, None))
             _tell(library)
             tools = library.tools
         else:
@@ -102,57 +94,12 @@ def export_tools(
             say(f"tool {name} is left out: {reason}")
         for name, fields in written.losses.items():
             say(f"tool {name}: {written.format.title} has no place for {', '.join(fields)}")
-        _write(written.data, out)
+        write_result(written.data, out)
 
 
 def library_of(data: Path | None) -> Library | None:
     """The stored tools, machines and materials of a data folder, for a setup; None without a folder."""
     return None if data is None else _store(data).view(OWNER)
-
-
-def _source(file: Path, unit: str | None, encoding: str | None) -> Any:
-    from geometry.errors import LibraryError
-    from service.libraries.entry import Source, Unit, shown
-
-    stated = None if unit is None else Unit.of(unit)
-    if unit is not None and stated is None:
-        raise LibraryError(f"the unit '{shown(unit)}' is neither mm nor in", code="unknown_unit", measured=shown(unit),
-                           limit=[u.value for u in Unit], remedy="state --unit mm or --unit in")
-
-    def beside(name: str) -> bytes | None:
-        # a FreeCAD library stands in Library/, its bits in Bit/ or in the same folder
-        for folder in (file.parent, file.parent / "Bit", file.parent.parent / "Bit"):
-            if (folder / name).is_file():
-                return (folder / name).read_bytes()
-        return None
-
-    return Source(file.name, stated, encoding, beside)
-
-
-def _bytes_of(file: Path) -> bytes:
-    from geometry.errors import LibraryError
-    from service.libraries.containers import MAX_LIBRARY_BYTES
-
-    try:
-        with file.open("rb") as opened:
-            return opened.read(MAX_LIBRARY_BYTES + 1)
-    except OSError as error:
-        raise LibraryError(f"the library {file.name} cannot be read: {error.strerror}", code="library_unreadable",
-                           remedy="check the path and the permissions") from None
-
-
-def _write(data: bytes, out: Path | None) -> None:
-    from geometry.errors import InputError
-
-    if out is None:
-        sys.stdout.buffer.write(data)
-        sys.stdout.buffer.flush()
-        return
-    try:
-        out.write_bytes(data)
-    except OSError as error:
-        raise InputError(f"{out} cannot be written: {error.strerror}", code="out_not_writable",
-                         remedy="give another --out") from None
 
 
 def _tell(library: ImportedLibrary) -> None:

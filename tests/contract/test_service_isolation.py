@@ -87,6 +87,14 @@ def test_another_principal_finds_nothing_and_changes_nothing(house):
             answer = client.post(path, files=files, headers={**keys["bob"], "Idempotency-Key": MARK})
             assert answer.status_code == 422 and answer.json()["code"] == "bad_setup"  # he has no such tool
             continue
+        if path.startswith("/v1/tools:"):  # a library of his own with that name, and nothing of others
+            table = f"id,kind,diameter_mm\n{MARK},flat,6\n".encode()
+            answer = (client.post(path, files={"library": ("x.csv", table)}, headers=keys["bob"]) if method == "POST"
+                      else client.get(f"{path}?format=csv", headers=keys["bob"]))
+            assert answer.status_code == 200 or answer.json()["code"] == "no_tools", (method, path, answer.text)
+            if method == "POST":
+                assert client.delete(f"/v1/tools/{MARK}", headers=keys["bob"]).status_code == 204
+            continue
         answer = client.request(method, filled(path, job, keys), headers=keys["bob"], json=body)
         if "/v1/keys" in path:
             assert answer.status_code == 403, (method, path)

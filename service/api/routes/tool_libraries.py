@@ -61,6 +61,13 @@ async def import_tools(
 
     Nothing is stored in a dry run. Entries that are left out have a reason, and defaults have a note.
     docs/libraries.md describes the formats. A tool that changed since the last import becomes the next version.
+
+    Raises
+    ------
+    LibraryError
+        The library cannot be read; the subject is the entry.
+    RequestError
+        not_multipart, bad_multipart, missing_part: the body is not a form with the file ``library``.
     """
     require(caller, ADMIN if shared else SUBMIT)
     name, data = await _uploaded(request)

@@ -253,7 +253,8 @@ class TestNamedParameters:
 
     def test_solidcam(self):
         text = """<Results><Tools><Tool Type="Milling" SubType="BallNoseMill" UserType="B6">
-          <param name="unit" value="{unit}"/><param name="diameter" value="6"/><param name="cutting edge length" value="9"/>
+          <param name="unit" value="{unit}"/><param name="diameter" value="6"/>
+          <param name="cutting edge length" value="9"/>
           <param name="shoulder length" value="20"/><param name="shoulder diameter" value="5.8"/>
           <param name="arbor diameter" value="6"/><param name="outside holder length" value="30"/>
           <param name="number of teeth" value="2"/><Spin/><Feed/></Tool></Tools></Results>"""
