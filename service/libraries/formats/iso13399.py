@@ -1,6 +1,6 @@
 """ISO 13399 and GTC: a Part 21 file of CUTTING_TOOL_SCHEMA_ARM for each tool, or a zip file of such files.
 
-NUMERICAL_VALUE and STRING_VALUE instances hold the properties by their symbols [ISO13399]. The file of an item names
+NUMERICAL_VALUE and STRING_VALUE instances hold the properties by the symbols of ISO 13399. The file of an item names
 its kind in its descriptions.
 """
 

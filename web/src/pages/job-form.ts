@@ -1,6 +1,7 @@
 // The form of a new job: fields for what most jobs need, a table of tools, and the complete setup as text.
 import { RequestError, ask, type Job, type Setup } from "../shared/api";
 import { add, el, field, fill } from "../shared/dom";
+import { LibraryImportPanel } from "./library-import";
 import { ToolTable } from "./tool-table";
 
 type AnySetup = Partial<Setup> & Record<string, unknown>;
@@ -25,6 +26,7 @@ export class JobForm {
   private readonly blankField = field("Blank (STEP file)", this.blank);
   private readonly control = el("select", { id: "control" }, ...CONTROLS.map((d) => el("option", { value: d }, d)));
   private readonly tools = new ToolTable("toolshead", () => this.show());
+  private readonly library = new LibraryImportPanel((tools, replace) => this.tools.take(tools, replace));
   private readonly setupFile = el("input", { type: "file", id: "setupfile", accept: ".json,application/json", onchange: () => void this.loadFile() });
   private readonly json = el("textarea", { id: "json", rows: 10, spellcheck: "false", class: "mono" });
   private readonly answer = el("div", { class: "answer", "aria-live": "polite" });
@@ -55,7 +57,8 @@ export class JobForm {
       el("div", { class: "fields" }, field("Part (STEP file)", this.part), field("Order", this.order),
         field("Material", this.material), field("Scallop height, mm", this.scallop), field("Blank", this.stock), this.blankField, field("Margin, mm", this.margin),
         field("Control", this.control)),
-      el("h3", { id: "toolshead" }, "Tools"), el("p", { class: "hint" }, "Lengths are in mm from the tip upwards. Each place is cut by the stoutest tool that reaches it."), this.tools.node,
+      el("h3", { id: "toolshead" }, "Tools"), el("p", { class: "hint" }, "Lengths are in mm from the tip upwards. Each place is cut by the stoutest tool that reaches it."),
+      this.tools.node, this.library.node,
       el("details", {}, el("summary", {}, "Setup as file or text"),
         field("Setup file (JSON)", this.setupFile), field("Complete setup (JSON)", this.json, "Edits here change the fields above. Settings without a field are kept.")),
       el("p", { class: "buttons" }, this.send, this.dry), this.answer);

@@ -51,6 +51,13 @@ export class ToolTable {
     this.draw();
   }
 
+  /** Adds tools of a library, or shows them instead of those of the table. */
+  take(tools: ToolRow[], replace: boolean): void {
+    this.tools = replace ? tools : [...this.tools, ...tools];
+    this.draw();
+    this.changed();
+  }
+
   private changed(): void {
     store("localStorage", STORED, JSON.stringify(this.tools));
     this.onChange();
@@ -80,7 +87,7 @@ export class ToolTable {
     const values = t as Record<string, unknown>;
     const value = values[key];
     const input = key === "kind"
-      ? el("select", { "aria-label": label }, ...KINDS.map((k) => el("option", { value: k, selected: k === t.kind }, spaced(k))))
+      ? el("select", { "aria-label": label }, ...(KINDS.includes(t.kind) ? KINDS : [...KINDS, t.kind]).map((k) => el("option", { value: k, selected: k === t.kind }, spaced(k))))
       : el("input", { type: "number", "aria-label": label, min: 0, step: "any", value: typeof value === "number" ? value : "" });
     input.addEventListener("change", () => {
       if (key === "kind") t.kind = input.value;

@@ -8,6 +8,7 @@ export type JobFiles = components["schemas"]["JobFiles"];
 export type JobEvent = components["schemas"]["JobEvent"];
 export type Problem = components["schemas"]["Problem"];
 export type Setup = components["schemas"]["Setup"];
+export type LibraryImport = components["schemas"]["LibraryImport"];
 export type Tool = components["schemas"]["Tool"];
 
 export const FINAL = new Set(["proved", "clean", "unproved", "done", "failed", "cancelled"]);
