@@ -117,6 +117,18 @@ def test_a_key_is_asked_for_and_kept_in_the_tab_alone(drive, tmp_path):
     assert said["session"] == ["zonemill-key"]
 
 
+def test_tools_of_a_library_come_into_the_form(drive, tmp_path):
+    table = tmp_path / "tools.csv"
+    table.write_text("id,kind,diameter,flutes,flute length,shank diameter,stickout,taper angle,corner radius\n"
+                     "EM-1,flat,0.25,3,0.75,0.25,1.5,,0\nEM-2,tapered_ball,0.125,2,0.5,0.25,1.5,3.8,\n"
+                     "EM-3,lollipop mill,0.25,2,0.5,0.25,1.5,,\n")
+    given = {"host": "127.0.0.1", "port": 0, "data_dir": tmp_path / "data", "poll_s": 0.05}
+    with background(settings_with(given)) as url:
+        said = drive("library", f"{url}/", table)
+    assert (said["kinds"], said["diameter"]) == (["flat", "tapered_ball"], 6.35)
+    assert len(said["rows"]) == 3 and "lollipop mill" in said["rows"][2] and "left out" in said["rows"][2]
+
+
 @pytest.mark.parametrize("size", [(1280, 800), (390, 844)], ids=["desk", "phone"])
 @pytest.mark.slow
 def test_a_finding_the_slider_and_a_section(drive, unproved, size):

@@ -1,6 +1,7 @@
 // Drives the page as a person would, and looks for what a person would complain about. Called by tests/e2e/test_page.py:
 //   node drive.mjs upload URL PART.step SETUP.json SHOTS      a job from the form to the picture
 //   node drive.mjs key URL KEY                                   a service that asks for a key
+//   node drive.mjs library URL LIBRARY SHOTS                     tools of a library, from the dry run to the table
 //   node drive.mjs look URL SHOTS WIDTH HEIGHT                  a finished job, on a screen of that size
 // Prints one line of JSON; exits with 1 and says why where something is not as it should be.
 import assert from "node:assert/strict";
@@ -188,4 +189,27 @@ async function key() {
   return kept;
 }
 
-await verdict({ upload, look, key }[what]);
+async function library() {
+  const [file, shots] = rest;
+  const { browser, page } = await open(1280, 800);
+  await page.goto(url);
+  await page.waitForSelector(".newjob");
+  await page.locator("details.library summary").click();
+  await page.setInputFiles("#libraryfile", file);
+  await page.getByText("are they mm or inches?").waitFor();
+  complaints.splice(0, complaints.length, ...complaints.filter((c) => !c.includes("422")));
+  await page.selectOption("#libraryunit", "in");
+  await page.getByText("left out.").waitFor();
+  const minor = await accessible(page, "library");
+  await page.screenshot({ path: join(shots, "library.png"), fullPage: true });
+  const rows = await page.locator("details.library tbody tr").allInnerTexts();
+  await page.getByRole("button", { name: "Replace the table by" }).click();
+  const kinds = await page.locator(".tools select").evaluateAll((all) => all.map((s) => s.value));
+  const diameter = await page.getByLabel("Diameter, mm, tool 1", { exact: true }).inputValue();
+  await page.setViewportSize({ width: 390, height: 844 });
+  await fits(page, 390);
+  await browser.close();
+  return { rows, kinds, diameter: Number(diameter), minor };
+}
+
+await verdict({ upload, look, key, library }[what]);

@@ -63,7 +63,7 @@ export class LibraryImportPanel {
     };
     label();
     fill(this.answer, el("p", {}, `Read as ${found.format}: ${found.taken} taken, ${found.noted} taken with notes, ${found.left_out} left out.`),
-      found.entries.length > SHOWN ? el("p", { class: "hint" }, `The table shows the first ${SHOWN} of ${found.entries.length} entries. Import all of them with zonemill tools import, and name them as lib:NAME.`) : null,
+      found.entries.length > SHOWN ? el("p", { class: "hint" }, `The table shows the first ${SHOWN} of ${found.entries.length} entries. zonemill tools import takes all of them.`) : null,
       el("div", { class: "wide", tabindex: 0, role: "group", "aria-label": "Entries of the library" }, el("table", { class: "rows2" },
         el("thead", {}, el("tr", {}, ...["Take", "Entry", "Tool", "T", "Result", "Notes"].map((h) => el("th", { scope: "col" }, h)))), el("tbody", {}, ...rows))),
       el("p", { class: "hint" }, `A setup has at most ${MOST_TOOLS} tools, each with its own T number.`),
