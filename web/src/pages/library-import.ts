@@ -5,7 +5,7 @@ import { counted } from "../shared/wording";
 import type { ToolRow } from "./tool-table";
 
 const SHOWN = 300; // entries in the table; a library may have thousands
-const MOST_TOOLS = 200; // of a setup
+const MAX_TOOLS = 200; // of a setup
 const ENDINGS = ".json,.tools,.hsmlib,.xml,.omtdx,.fctb,.fctl,.zip,.tbl,.p21,.stp,.csv,.xlsx";
 const VERDICTS: Record<string, string> = { taken: "taken", noted: "taken with notes", left_out: "left out" };
 
@@ -59,14 +59,14 @@ export class LibraryImportPanel {
       const count = chosen().length;
       fill(adding, `Add ${counted(count, "tool")}`);
       fill(replacing, `Replace the table by ${counted(count, "tool")}`);
-      for (const button of [adding, replacing]) button.disabled = count === 0 || count > MOST_TOOLS;
+      for (const button of [adding, replacing]) button.disabled = count === 0 || count > MAX_TOOLS;
     };
     label();
     fill(this.answer, el("p", {}, `Read as ${found.format}: ${found.taken} taken, ${found.noted} taken with notes, ${found.left_out} left out.`),
       found.entries.length > SHOWN ? el("p", { class: "hint" }, `The table shows the first ${SHOWN} of ${found.entries.length} entries. zonemill tools import takes all of them.`) : null,
       el("div", { class: "wide", tabindex: 0, role: "group", "aria-label": "Entries of the library" }, el("table", { class: "rows2" },
         el("thead", {}, el("tr", {}, ...["Take", "Entry", "Tool", "T", "Result", "Notes"].map((h) => el("th", { scope: "col" }, h)))), el("tbody", {}, ...rows))),
-      el("p", { class: "hint" }, `A setup has at most ${MOST_TOOLS} tools, each with its own T number.`),
+      el("p", { class: "hint" }, `A setup has at most ${MAX_TOOLS} tools, each with its own T number.`),
       el("p", { class: "buttons" }, adding, replacing));
   }
 }

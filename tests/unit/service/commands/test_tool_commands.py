@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 from service.cli import app
 from service.commands.tool_commands import library_of
 from service.from_wire import parse_setup
+from tests.unit.service.test_cli import chain, files  # noqa: F401
 
 TABLE = "id,kind,diameter,flutes,flute length,shank diameter,stickout\nEM-1,flat,0.25,3,0.75,0.25,1.5\n"
 
@@ -59,6 +60,16 @@ def test_stored_tools_serve_setups_and_exports(table, tmp_path):
     done = run("export", "--data", data, "--format", "fusion")
     assert json.loads(done.stdout)["data"][0]["geometry"]["DC"] == 6.35
     assert library_of(None) is None
+
+
+def test_commands_find_stored_tools_with_data(chain, files, table, tmp_path):  # noqa: F811
+    data = tmp_path / "data"
+    run("import", table, "--unit", "in", "--data", data, "-o", tmp_path / "x")
+    (files / "s.json").write_text(json.dumps({"tools": ["lib:EM-1"]}))
+    words = ["zones", str(files / "p.step"), "--setup", str(files / "s.json")]
+    without = CliRunner().invoke(app, words)
+    assert without.exit_code == 2 and "it has: none" in without.stderr
+    assert CliRunner().invoke(app, [*words, "--data", str(data)]).exit_code == 0
 
 
 def test_export_of_a_setup_says_what_is_lost(tmp_path):
