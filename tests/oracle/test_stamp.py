@@ -10,7 +10,6 @@ from geometry.kernels.tapered import tapered_of
 from toolpath.kernels.stock import HALF_DIAGONAL, stamp
 from zones.kernels.lattice import LatticeFrame
 
-
 WIDER = 1.6  # times that the side of a tapered mill is wider than its end
 
 
