@@ -151,6 +151,8 @@ def _preset(entry: Entry, item: dict[str, Any], unit: Unit) -> None:
     entry.presets.append(Preset(str(item.get("name") or ""), words or None, entry.read("n", item.get("n")),
                                 cutting_speed=speed, feed_per_tooth=None if tooth is None else unit.to_mm(tooth),
                                 **feeds))
+    if item.get("f_n") and feeds["feed"] is None and tooth is None:
+        entry.note(f"the feed per revolution of '{shown(item.get('name') or '', 40)}' is left out")
     if entry.coolant is None and isinstance(item.get("tool-coolant"), str):
         entry.coolant = item["tool-coolant"]
 

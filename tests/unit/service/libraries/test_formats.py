@@ -97,6 +97,11 @@ class TestFusion:
         assert found.tool.in_material("ti6al4v").feed_mm_min == 240
         assert found.tool.in_material("C45").spindle_rpm == pytest.approx(5305.165)
 
+    def test_a_feed_per_revolution_alone_gets_a_note(self):
+        found = only(read(fusion(**{"start-values": {"presets": [{"name": "A", "n": 3000, "f_n": 0.1}]}})))
+        assert found.tool.cutting_data[0].feed_mm_min is None
+        assert found.notes == ("the feed per revolution of 'A' is left out",)
+
     def test_inches_and_numbers_that_differ(self):
         found = fusion(unit="inches")
         found["data"][0]["post-process"] |= {"length-offset": 14}
