@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import io
 import json
+import lzma
 import re
 import zipfile
 import zlib
@@ -180,7 +181,7 @@ class Archive:
         except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError) as error:
             raise LibraryError(f"the zip file is damaged or cut off: {error}", code="library_cut_off",
                                remedy="export the library once more, and send the whole file") from None
-        members = [m for m in self._zip.infolist() if not m.is_dir()]
+        members = [m for m in self._zip.infolist() if m.filename and not m.filename.endswith("/")]
         if len(members) > MAX_ZIP_MEMBERS:
             raise _bomb(f"the zip file has {len(members)} files", len(members), MAX_ZIP_MEMBERS)
         total = sum(m.file_size for m in members)
@@ -209,7 +210,8 @@ class Archive:
         try:
             with self._zip.open(member) as file:
                 data = file.read(member.file_size + 1)
-        except (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError, RuntimeError) as error:
+        except (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, OSError, ValueError, NotImplementedError,
+                RuntimeError) as error:
             raise LibraryError(f"{shown(name)} in the zip file is damaged: {error}", code="library_cut_off",
                                subjects=(shown(name),), remedy="export the library once more, and send the whole "
                                "file") from None

@@ -93,3 +93,29 @@ def test_a_view_reads_what_is_asked_for_and_remembers_it(library):
     ("a@1@2", ("a@1", 2)), ("a@" + "9" * 20, ("a@" + "9" * 20, None))])
 def test_references_are_taken_apart(text, want):
     assert split_reference(text) == want
+
+
+def test_several_entries_at_once_are_written_as_one_by_one(library):
+    first = library.put_all("ada", "tools", {"a": {"x": 1}, "b": {"x": 1}})
+    assert {n: (e.version, e.shared, e.value) for n, e in first.items()} == {
+        "a": (1, False, {"x": 1}), "b": (1, False, {"x": 1})}
+    library.delete("ada", "tools", "b")
+    again = library.put_all("ada", "tools", {"a": {"x": 1}, "b": {"x": 1}, "c": {"x": 3}})
+    assert {n: e.version for n, e in again.items()} == {"a": 1, "b": 2, "c": 1}
+    assert library.all("ada", "tools") == [again["a"], again["b"], again["c"]]
+    assert library.put_all("ada", "tools", {}) == {}
+    assert library.put_all(SHARED, "tools", {"a": {"x": 9}})["a"].shared is True
+    assert library.get("bob", "tools", "a").value == {"x": 9} and library.get("ada", "tools", "a").value == {"x": 1}
+
+
+def test_writers_of_the_same_names_at_once_each_get_a_version(library):
+    def work(k):
+        library.put_all("ada", "tools", {f"t{n}": {"by": k} for n in range(20)})
+
+    threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
+    for t in threads:
+        t.start()
+    for t in threads:
+        t.join()
+    assert all(len({library.get("ada", "tools", f"t{n}", v).value["by"] for v in range(1, e.version + 1)}) == e.version
+               for n, e in enumerate(library.get("ada", "tools", f"t{n}") for n in range(20)))

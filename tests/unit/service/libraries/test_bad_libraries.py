@@ -6,6 +6,7 @@ import io
 import json
 import time
 import zipfile
+from random import Random
 
 import openpyxl
 import pytest
@@ -179,6 +180,45 @@ class TestHostile:
     def test_entries_that_state_nothing_are_left_out(self, text):
         library = import_library(text.encode(), Source("x"))
         assert library.tools == [] and all(e.reason for e in library.entries)
+
+
+def mutated(data: bytes, random: Random) -> bytes:
+    """A library with some bytes cut out, put in, changed or copied to another place."""
+    out = bytearray(data)
+    for _ in range(random.randint(1, 5)):
+        at, choice = random.randrange(len(out) or 1), random.random()
+        if choice < 0.3:
+            del out[at:at + random.randint(1, 30)]
+        elif choice < 0.6:
+            out[at:at] = random.choice([b"null", b"[]", b"-1", b"1e999", b"NaN", b'"x"', b"<a/>", b"\0", b"\xff", b";"])
+        elif choice < 0.8 and out:
+            out[at] = random.randrange(256)
+        else:
+            out[at:at] = out[random.randrange(len(out) or 1):][:random.randint(1, 200)]
+    return bytes(out)
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_damaged_libraries_give_tools_or_an_error_of_libraries(name):
+    data, random = export_library(TOOLS, name).data, Random(name)
+    refusals = 0
+    for _ in range(150):
+        try:
+            library = import_library(mutated(data, random), Source("x"))
+            assert all((e.tool is None) == bool(e.reason) for e in library.entries)
+        except LibraryError as error:
+            refusals += 1
+            assert error.remedy
+    assert refusals > 0
+
+
+def test_a_zip_file_whose_directory_is_damaged():
+    data = packed({"x.json": json.dumps(fusion()).encode()})
+    for at in range(0, len(data), 3):
+        try:
+            import_library(data[:at] + b"\0" + data[at + 1:], Source("x"))
+        except LibraryError:
+            continue
 
 
 class TestIdentity:
