@@ -25,12 +25,14 @@ MAX_ZIP_RATIO = 200
 """Unpacked size of a member over its packed size, where it unpacks to more than ``MIN_BOMB_BYTES``."""
 MIN_BOMB_BYTES = 1_000_000
 MAX_XML_DEPTH = 64
+MAX_SEARCHED = 4000
+"""Characters of a broken entry in which its name is searched."""
 ENCODINGS = ("utf-8", "utf-16", "windows-1252", "iso-8859-1")
 _MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 _ELEMENT = re.compile(r"<(?:\w+:)?(tool|Tool)[\s>/]")
 _FIRST_LIST = re.compile(r'"(?:data|tools|items)"\s*:\s*\[|^\s*\[')
 _NAMED = re.compile(r'"(?:description|name|guid|id)"\s*:\s*"([^"]{1,200})')
-_XML_NAMED = re.compile(r'(?:name|UserType|guid)="([^"]{1,200})"|<(?:description|PrimaryId|ID21002)[^>]*>([^<]{1,200})')
+_XML_NAMED = re.compile(r'(?:name|UserType|guid)="([^"]{1,200})"|<(?:description|PrimaryId|ID21002)[^>]{0,200}>([^<]{1,200})')
 
 
 def text_of(data: bytes, encoding: str | None = None) -> str:
@@ -94,7 +96,7 @@ def _broken_json_entry(text: str) -> str:
         try:
             at = decoder.raw_decode(text, at)[1]
         except (ValueError, RecursionError):
-            named = _NAMED.search(text, at)
+            named = _NAMED.search(text, at, at + MAX_SEARCHED)
             return f"entry {count + 1}" + (f" '{shown(named.group(1), 40)}'" if named else "")
         count += 1
 
@@ -159,7 +161,7 @@ def _broken_xml_entry(data: bytes, line: int, column: int) -> str:
     found = list(_ELEMENT.finditer(before))
     if not found:
         return f"line {line}"
-    named = _XML_NAMED.search(before, found[-1].start())
+    named = _XML_NAMED.search(before, found[-1].start(), found[-1].start() + MAX_SEARCHED)
     words = shown(next(g for g in named.groups() if g), 40) if named else ""
     return f"entry {len(found)}" + (f" '{words}'" if words else "") + f", line {line}"
 

@@ -72,7 +72,8 @@ def to_number(raw: Any) -> float:
 
 def shown(text: Any, most: int = 60) -> str:
     """A text of a library for a message: one line without control characters, shortened."""
-    line = " ".join("".join(c if c.isprintable() else " " for c in str(text)).split())
+    # a text of a library may have megabytes
+    line = " ".join("".join(c if c.isprintable() else " " for c in str(text)[:20 * most]).split())
     return line if len(line) <= most else line[:most - 3] + "..."
 
 

@@ -34,6 +34,8 @@ ALL_KINDS = frozenset((*BUILT_KINDS, *VERIFIED_KINDS))
 AUTODESK_VALUES = SHAPE | NECK | {"taper_angle_deg", "point_angle_deg", "tip_diameter_mm", "pitch_mm", "stickout_mm",
                                   "gauge_length_mm"}
 MAX_LINES_SEEN = 200
+MAX_LINE = 10_000
+"""Characters of a line by which a tool table is known."""
 
 
 @dataclass(frozen=True)
@@ -183,7 +185,7 @@ def _text_formats(text: str) -> list[str]:
     lines = [s for s in text.splitlines()[:MAX_LINES_SEEN] if s.strip() and not s.lstrip().startswith(";")]
     found = []
     heads = [re.split(r"[;,\t]", s) for s in lines[:table.MAX_HEAD_ROWS]]
-    if lines and linuxcnc.LINE.match(lines[0]):
+    if lines and linuxcnc.LINE.match(lines[0][:MAX_LINE]):
         found.append("linuxcnc")
     if heads and {"NSM", "BLD"} <= {c.strip() for c in heads[0]}:
         found.append("din4000")

@@ -25,6 +25,8 @@ from service.libraries.entry import Entry, Preset, Source, Unit, check_count, sh
 from service.libraries.formats.kind_words import AUTODESK, kind_of_words
 
 MAX_COLUMNS = 200
+MAX_HEAD = 200
+"""Characters of the head of a column."""
 MAX_HEAD_ROWS = 20
 """Rows that may stand before the heads."""
 LENGTHS = {
@@ -73,7 +75,7 @@ def head_of(text: Any) -> tuple[str, Unit | None]:
     >>> head_of("Diameter [in]"), head_of("flute_length_mm"), head_of("Price")
     (('diameter_mm', <Unit.INCH: 'in'>), ('flute_length_mm', <Unit.MM: 'mm'>), ('', None))
     """
-    words = str(text or "").strip()
+    words = str(text or "")[:MAX_HEAD].strip()
     stated = _UNIT.search(words)
     unit = (stated.group(1) or stated.group(2)).casefold() if stated else ""
     plain = re.sub(r"\(.*?\)|\[.*?\]", "", words[:stated.start()] if stated else words)

@@ -221,6 +221,20 @@ def test_a_zip_file_whose_directory_is_damaged():
             continue
 
 
+@pytest.mark.parametrize("text", [
+    "T1 " + "A1" * 1_000_000 + "!", "T1 D6 ;" + "kind" * 500_000,
+    "id,kind,diameter_mm" + " " * 2_000_000 + "(x\n",
+    "id,kind,diameter_mm," + "(" * 2_000_000 + "\n", "<omtdx>" + "<description " * 200_000,
+    '{"data": [{"guid": "' + "x" * 3_000_000, "id,kind,diameter_mm\n" + "x" * 100_000 + ",flat,6\n"])
+def test_texts_that_are_built_to_be_slow_to_read(text):
+    started = time.process_time()
+    try:
+        import_library(text.encode(), Source("x"))
+    except LibraryError as error:
+        assert len(error.message) < 1000
+    assert time.process_time() - started < 20.0
+
+
 class TestIdentity:
     def test_an_id_that_occurs_twice_is_left_out_the_second_time(self):
         library = import_library(json.dumps({"data": fusion()["data"] * 2}).encode(), Source("x"))
