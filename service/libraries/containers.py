@@ -32,7 +32,8 @@ _MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.B
 _ELEMENT = re.compile(r"<(?:\w+:)?(tool|Tool)[\s>/]")
 _FIRST_LIST = re.compile(r'"(?:data|tools|items)"\s*:\s*\[|^\s*\[')
 _NAMED = re.compile(r'"(?:description|name|guid|id)"\s*:\s*"([^"]{1,200})')
-_XML_NAMED = re.compile(r'(?:name|UserType|guid)="([^"]{1,200})"|<(?:description|PrimaryId|ID21002)[^>]{0,200}>([^<]{1,200})')
+_XML_NAMED = re.compile(r'(?:name|UserType|guid)="([^"]{1,200})"|'
+                        r"<(?:description|PrimaryId|ID21002)[^>]{0,200}>([^<]{1,200})")
 
 
 def text_of(data: bytes, encoding: str | None = None) -> str:
