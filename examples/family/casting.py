@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 from numba import njit
 
-import geometry.kernels.cache  # noqa: F401  names the folders of compiled kernels
+import geometry.kernel_cache.cache  # noqa: F401  names the folders of compiled kernels
 from examples.family.splines import F64
 from examples.family.walls import LEFT, RIGHT, WallSpec
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-import geometry.kernels.cache  # noqa: F401  names the folders of compiled kernels
+import geometry.kernel_cache.cache  # noqa: F401  names the folders of compiled kernels
 from examples.family.splines import F64
 
 STEP, CHORD = 0.12, 0.01

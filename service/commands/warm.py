@@ -88,7 +88,7 @@ def run_warm() -> None:
     """
     shown = Countdown()
     shown.say("compiling kernels on all cores, about a minute the first time")
-    from geometry.kernels.cache import remove_stale
+    from geometry.kernel_cache.cache import remove_stale
     from service.commands.kernel_compiling import compile_listed
 
     remove_stale()

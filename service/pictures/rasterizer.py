@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-import geometry.kernels.cache  # noqa: F401  names the folders of compiled kernels
+import geometry.kernel_cache.cache  # noqa: F401  names the folders of compiled kernels
 from geometry.mesh import F64, I32
 
 F32 = NDArray[np.float32]

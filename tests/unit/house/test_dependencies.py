@@ -9,7 +9,7 @@ import tomllib
 
 import pytest
 
-from geometry.kernels.sources import APART
+from geometry.kernel_cache.sources import APART
 from tests.source_tree import PACKAGES, ROOT, imports, modules
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())

@@ -64,6 +64,6 @@ def test_the_rule_notices_a_file_that_is_gone() -> None:
     text = "see `geometry/no_such.py: f` and zones/model.py."
     assert NAMED.findall(text) == ["geometry/no_such.py", "zones/model.py"]
     assert not exists("geometry/no_such.py", ROOT / "README.md") and exists("zones/model.py", ROOT / "README.md")
-    text = "| a route | `service/routes/` | in `verify/gcode/dialects/`, tests/golden/; geometry/kernels/cache.py"
+    text = "| a route | `service/routes/` | in `verify/gcode/dialects/`, tests/golden/; geometry/kernel_cache/cache.py"
     assert FOLDER.findall(text) == ["service/routes/", "verify/gcode/dialects/", "tests/golden/"]
     assert not exists("service/routes/", ROOT / "README.md") and exists("verify/gcode/", ROOT / "README.md")

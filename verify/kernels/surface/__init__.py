@@ -1,3 +1,3 @@
 """Compiled loops about the surface of the part: depths of gouges, what is left near it, flat places; no stock."""
 
-import geometry.kernels.cache  # noqa: F401  names the folders of compiled kernels
+import geometry.kernel_cache.cache  # noqa: F401  names the folders of compiled kernels

@@ -31,7 +31,7 @@ USED = """
 import json, sys, tempfile
 from pathlib import Path
 from examples.demo import write_small
-from geometry.kernels.cache import sources
+from geometry.kernel_cache.cache import sources
 from service.commands.kernel_compiling import compile_listed, text_of
 from service.from_wire import read_setup
 from service.pipeline import plan
@@ -49,7 +49,7 @@ print(json.dumps(used))
 
 TRIVIAL = """
 from numba import njit
-import geometry.kernels.cache
+import geometry.kernel_cache.cache
 
 @njit(cache=True)
 def inner(x):

@@ -2,7 +2,7 @@
 
 Numba checks for a compiled function only whether its own file has changed, not the files of other kernels it uses. So
 an update can leave old machine code inlined in a new kernel. Here the name of a module's folder holds the digest of
-``geometry.kernels.sources``: an edit recompiles all that depends on it, and nothing else. An edit of a docstring
+``geometry.kernel_cache.sources``: an edit recompiles all that depends on it, and nothing else. An edit of a docstring
 recompiles nothing. The digest contains no path and no time, so that every checkout with the same sources uses the same
 machine code.
 
@@ -27,7 +27,7 @@ from numba import config, types
 from numba.core import caching
 from numba.core.dispatcher import Dispatcher
 
-from geometry.kernels.sources import ROOT, Sources
+from geometry.kernel_cache.sources import ROOT, Sources
 
 WEEK_S = 7 * 86400.0
 

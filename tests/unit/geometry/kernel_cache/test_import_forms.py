@@ -1,4 +1,4 @@
-"""The sources of kernels use only the forms of import and of registering that ``geometry.kernels.sources`` finds.
+"""The sources of kernels use only the forms of import and of registering that ``geometry.kernel_cache.sources`` finds.
 
 A form that it overlooks would leave stale machine code after an edit, in silence. So would a string that it takes for a
 docstring.
@@ -11,8 +11,8 @@ import functools
 
 import pytest
 
-from geometry.kernels.sources import _DOCSTRING as DOCSTRING
-from geometry.kernels.sources import PACKAGES, REGISTERS, Sources, import_statements, without_docstrings
+from geometry.kernel_cache.sources import _DOCSTRING as DOCSTRING
+from geometry.kernel_cache.sources import PACKAGES, REGISTERS, Sources, import_statements, without_docstrings
 
 SOURCES = Sources()
 

@@ -27,7 +27,7 @@ PACKAGES = ("geometry", "zones", "toolpath", "output", "verify", "schemas", "ser
             "benchmarks")
 """Folders below the root whose modules belong to the project."""
 
-APART = ("geometry.kernels.cache", "geometry.kernels.sources")
+APART = ("geometry.kernel_cache.cache", "geometry.kernel_cache.sources")
 """Modules that every package of kernels imports and no machine code depends on."""
 
 REGISTERS = ("for_shape", "overload")

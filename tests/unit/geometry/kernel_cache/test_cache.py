@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from geometry.kernels.cache import bases, remove_stale, sources
-from geometry.kernels.sources import PACKAGES, REGISTERS, Sources, import_statements
+from geometry.kernel_cache.cache import bases, remove_stale, sources
+from geometry.kernel_cache.sources import PACKAGES, REGISTERS, Sources, import_statements
 from tests import source_tree
 from tests.source_tree import ROOT, imports, modules
 
@@ -29,7 +29,7 @@ print(outer(1.0), apart(1.0))
 for kernel in (outer, apart):
     print(sum(kernel.stats.cache_hits.values()), Path(kernel.stats.cache_path).parent)
 """
-COPIED = ("geometry/kernels/cache.py", "geometry/kernels/sources.py", "geometry/kernels/__init__.py",
+COPIED = ("geometry/kernel_cache/cache.py", "geometry/kernel_cache/sources.py", "geometry/kernels/__init__.py",
           "verify/kernels/__init__.py")
 
 
@@ -137,7 +137,7 @@ def test_without_a_home_the_folder_is_in_the_tree(tree, tmp_path):
 
 def test_a_kernel_run_as_a_script_has_a_folder_of_its_own(tree, tmp_path):
     script = tree / "verify" / "kernels" / "inner.py"
-    script.write_text(f"import geometry.kernels.cache\n{script.read_text()}\n"
+    script.write_text(f"import geometry.kernel_cache.cache\n{script.read_text()}\n"
                       "if __name__ == '__main__':\n    inner(1.0)\n    print(inner.stats.cache_path)\n")
     line, = _run(tree, tmp_path, code="import runpy; runpy.run_module('verify.kernels.inner', run_name='__main__')")
     name, _, digest = Path(line).name.rpartition("-")
@@ -256,7 +256,7 @@ def test_every_compiled_function_of_the_product_is_behind_the_locator():
     assert len(packages) == 4
     for name in packages | beside:
         first = [n for n in trees[name].body if isinstance(n, ast.Import)]
-        assert "geometry.kernels.cache" in {a.name for n in first for a in n.names}, name
+        assert "geometry.kernel_cache.cache" in {a.name for n in first for a in n.names}, name
     for name, tree in trees.items():
         calls = {n.func.id for n in ast.walk(tree) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)}
         assert ".kernels." in name or not calls & {*REGISTERS}, f"{name} registers a body where nobody looks for it"
@@ -272,7 +272,7 @@ def test_bases_are_the_one_given_the_users_and_the_tree(tmp_path):
 
 
 def test_folders_of_other_states_go_after_a_week_ours_never(tmp_path, monkeypatch):
-    monkeypatch.setattr("geometry.kernels.cache.bases", lambda given: [tmp_path / "missing", tmp_path])
+    monkeypatch.setattr("geometry.kernel_cache.cache.bases", lambda given: [tmp_path / "missing", tmp_path])
     kernel = "geometry.kernels.drop"
     digest = sources().digest(kernel)
     ours, as_script = tmp_path / f"{kernel}-{digest}", tmp_path / f"{kernel}.__main__-{digest}"
