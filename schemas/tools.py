@@ -357,12 +357,14 @@ class Tool(WireModel):
         elif self.core_diameter_mm is not None and (self.center_cutting or self.core_diameter_mm >= self.diameter_mm):
             raise ValueError(f"tool {self.id}: core_diameter_mm belongs to a tap, or to a tool with center_cutting "
                              f"false, and is less than diameter_mm {self.diameter_mm:g}")
-        if _given(self.flute_length_mm) < self.corner_height - LENGTH_EPSILON:
+        tapered = self.taper_angle_deg > 0
+        if tapered and _given(self.flute_length_mm) < 2.0 * self.corner_radius_mm - LENGTH_EPSILON:
+            raise ValueError(f"tool {self.id}: flute_length_mm {self.flute_length_mm:g} is less than twice the corner "
+                             f"radius, {2.0 * self.corner_radius_mm:g}, so there is next to no cone; give at least "
+                             "that, or use a kind without taper")
+        if not tapered and _given(self.flute_length_mm) < self.corner_radius_mm - LENGTH_EPSILON:
             raise ValueError(f"tool {self.id}: flute_length_mm {self.flute_length_mm:g} is shorter than the corner "
-                             f"radius {self.corner_height:g}, so the rounded end would not cut" if
-                             self.taper_angle_deg == 0 else
-                             f"tool {self.id}: flute_length_mm {self.flute_length_mm:g} ends below the cone, which "
-                             f"begins {self.corner_height:g} above the tip; give at least that")
+                             f"radius {self.corner_radius_mm:g}, so the rounded end would not cut")
         if _given(self.flute_length_mm) < self.cone_height - LENGTH_EPSILON:
             raise ValueError(f"tool {self.id}: flute_length_mm {self.flute_length_mm:g} is shorter than the cone at "
                              f"its end, {self.cone_height:g} high; flute_length_mm counts from the tip of the cone")

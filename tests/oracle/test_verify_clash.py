@@ -59,6 +59,21 @@ def cutter_depth(rho, h, tool, grow, slack, off):
     return out
 
 
+@pytest.mark.parametrize("off", [0.0, 0.06, 0.125, 0.19])
+@pytest.mark.parametrize("angle", [0.0, 3.0, 30.0, 45.0])
+def test_a_rim_over_a_thin_neck_is_met_between_the_rows_of_a_fixture(angle, off):
+    """The side of a fixture, rows of points 0.25 mm apart; the rim of a cone, or of a disc, goes along it 0.2 mm deep."""
+    deep, flutes = 0.2, 3.0 if angle else 0.1
+    mill = ToolBody("T1", 1, 6.0, 0.0, flutes, 4.0, 20.0, 4.0, 25.0, taper=np.tan(np.radians(angle)))
+    x, z = np.meshgrid(np.arange(-2.0, 2.1, FIXTURE_SPACING), np.arange(0.5, 3.1, FIXTURE_SPACING) + off)
+    points = np.column_stack([x.ravel(), np.full(x.size, -5.0), z.ravel()])
+    y, low = -5.0 + mill.widest_radius - deep, 1.6 - flutes
+    way = Moves(np.array([[-20.0, y, low]]), np.array([[20.0, y, low]]), np.array([True]), np.array([0]))
+    events, lost = run_clashes(points, np.ones(len(points), np.bool_), way, [mill], SETUP)
+    told = events[events[:, 1] == FIXTURE, 2].max()
+    assert lost == 0 and 0.9 * deep < told < deep + 1e-3
+
+
 def apart(rho, h, z0, z1, r0, r1):
     """Distance of points to a standing frustum, as the least of those to its three sides; 0 inside."""
     out = np.full(rho.shape, np.inf)

@@ -22,7 +22,7 @@ from verify.moves import BOW, Moves, Progress, cutter_table
 from verify.tool_axes import ToolAxes
 from verify.tool_bodies import Bodies
 
-FIXTURE_SPACING = 0.25
+FIXTURE_SPACING = 0.25  # mm, largest distance of the points of a fixture
 DIP = 0.005  # mm, largest unseen penetration of a ball between the points of a fixture
 MAX_FIXTURE_POINTS = 1_500_000
 
@@ -95,6 +95,19 @@ def _sheet(x: F64, y: F64, z: F64) -> F64:
     return np.stack(np.meshgrid(x, y, z, indexing="ij"), -1).reshape(-1, 3)
 
 
+def _over_the_rim(tools: Sequence[ToolBody]) -> F64:
+    """``cutter_table`` where thin rims have a side above them, (k, 6) float64, mm.
+
+    The upper rim of a cone, or of very short flutes, could pass between two rows of points where the neck over it is
+    thinner. So its side goes on for two distances of rows: a row meets it that is one of them below its end, or more.
+    """
+    out, high = cutter_table(tools), 2.0 * FIXTURE_SPACING
+    thin = [t.neck_diameter < 2.0 * t.widest_radius
+            and (t.taper > 0.0 or t.flute_length - max(t.corner_radius, t.cone_height) < high) for t in tools]
+    out[thin, 2] += high
+    return out
+
+
 def run_clashes(points: F64, fixed: NDArray[np.bool_], moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *,
                 threads: int = 2, progress: Progress | None = None, bow: float = BOW,
                 rapids: RapidArrays | None = None) -> tuple[F64, int]:
@@ -111,7 +124,7 @@ def run_clashes(points: F64, fixed: NDArray[np.bool_], moves: Moves, tools: Sequ
         return np.zeros((0, 7)), 0
     tree, axes = PointTree.build(points), moves.axes or ToolAxes.upright(len(moves))
     cloud = PointArrays(np.ascontiguousarray(points[tree.order]), np.ascontiguousarray(fixed[tree.order]), tree.balls)
-    sizes = Bodies.of(tools, setup).arrays(cutter_table(tools), end_radii(tools, setup.tap_holes))
+    sizes = Bodies.of(tools, setup).arrays(_over_the_rim(tools), end_radii(tools, setup.tap_holes))
     known = rapid_arrays(moves, setup) if rapids is None else rapids
     steps, turns, limits = moves.arrays, axes.arrays(bow), contact_limits(setup)
 

@@ -81,7 +81,7 @@ def test_a_ball_needs_no_corner_radius_and_a_neck_may_be_as_wide_as_the_cone():
     (job(BALL, neck_diameter_mm=2.3, neck_length_mm=20),
      ("tool T1", "neck_diameter_mm 2.3", "the end of the cone, 2.20675", "at most that")),
     (job(BALL, neck_diameter_mm=2), ("tool T1", "neck_diameter_mm is given without neck_length_mm")),
-    (job(BALL, flute_length_mm=0.4), ("tool T1", "flute_length_mm 0.4 ends below the cone", "0.473832", "at least")),
+    (job(BALL, flute_length_mm=0.4), ("tool T1", "flute_length_mm 0.4 is less than twice the", "radius, 1,", "at least")),
     (job(FLAT, taper_angle_deg=45, flute_length_mm=1500), ("tool T1", "3002 wide", "more than 2000",
                                                            "reduce taper_angle_deg")),
     (job(FLAT, kind="flat"), ("tool T1", "taper_angle_deg 3", "is 0 for kind flat",
