@@ -151,7 +151,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     stretches, of = in_parts(moves, tools)
     known = counted(framed, np.unique(source.tool).tolist())
     took = np.concatenate([np.zeros(0), *(minutes_of(p.program, setup) for p in framed)])
-    in_cut = cut_sequence(framed, known, run, moves, source, tools, stretches, of, took[known], met.spacing)
+    in_cut = cut_sequence(framed, known, run, moves, source, tools, stretches, of, took[known], met.spacing,
+                          float(part.mesh.bounds[0, 2]))
     slack = setup.scallop_height + setup.gouge_tolerance + setup.stock_allowance
     backwards = _joined([p.program.reversed_by for p in framed], known)
     tapped = taps_in_holes(moves, tools, tree, slack)

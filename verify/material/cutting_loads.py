@@ -72,6 +72,7 @@ class CutSequence:
     cutter  : (m,) int64, count of tool changes and stops before each move: a fresh cutter may be in the spindle
     dwells  : line, program, move before and s of each dwell, inf where the operator ends it
     spacing : mm, of the stock
+    underside : mm, least Z of the part
     """
 
     moves: Moves
@@ -88,6 +89,7 @@ class CutSequence:
     cutter: NDArray[np.int64]
     dwells: tuple[tuple[int, int, int, float], ...]
     spacing: float
+    underside: float
 
     def place(self, m: int) -> tuple[str, int]:
         """Program and line of a move."""
@@ -96,12 +98,13 @@ class CutSequence:
 
 def cut_sequence(read: Sequence[FramedProgram], known: NDArray[np.bool_], run: StockPass, moves: Moves, source: Source,
                  tools: Sequence[ToolBody], stretches: Moves, of: NDArray[np.int64], took: F64,
-                 spacing: float) -> CutSequence:
+                 spacing: float, underside: float) -> CutSequence:
     """The moves of a proof with their feeds, speeds and times.
 
     known     : (n,) bool, which moves of the programs the proof counts
     stretches : (p,) parts of moves, as ``verify.material.engagement.in_parts``; of : (p,) int64, index, move of each
     took  : (m,) float64, min, time of each counted move; spacing : mm, of the stock
+    underside : mm, least Z of the part
     """
     programs = [r.program for r in read]
     fast, middle = _lengths(moves, run.ways.of_moves(parts(moves, tools)).depth, tools)
@@ -123,7 +126,7 @@ def cut_sequence(read: Sequence[FramedProgram], known: NDArray[np.bool_], run: S
                       if before > 0 and row[begun + before - 1] >= 0)
         begun += len(p)
     return CutSequence(moves, source, run, parts(moves, tools), stretches, of, feed, half, speed, coolant,
-                       took, np.concatenate(changed)[known], tuple(dwells), spacing)
+                       took, np.concatenate(changed)[known], tuple(dwells), spacing, underside)
 
 
 def _lengths(moves: Moves, depth: F64, tools: Sequence[ToolBody]) -> tuple[F64, F64]:
@@ -244,9 +247,16 @@ class _Judge:
         return ", where its edge is fastest as it swings" if axes is not None and axes.angle[m] > 0.0 else ""
 
     def speeds(self, depth: F64) -> Judged:
-        """Cutting speed at the largest diameter in the cut; depth : (m,) mm."""
-        rows = self.rows[self.cuts.speed[self.rows] > 0.0]
-        speed = math.pi * diameters_in_cut(self.tool, depth[rows]) * self.cuts.speed[rows] / 1000.0
+        """Cutting speed at the largest diameter in the cut; depth : (m,) mm.
+
+        Where an upright cone hangs below the part, it cuts as much higher over its tip.
+        """
+        rows, moves = self.rows[self.cuts.speed[self.rows] > 0.0], self.cuts.moves
+        high = depth[rows]
+        if self.tool.taper > 0.0 and moves.axes is None:
+            low = np.minimum(moves.start[rows, 2], moves.end[rows, 2])
+            high = high + np.maximum(self.cuts.underside - low, 0.0) * (high > 0.0)
+        speed = math.pi * diameters_in_cut(self.tool, high) * self.cuts.speed[rows] / 1000.0
         bound, wanted = SPEED_TIMES * self.said.speed, RECOMMENDED_TIMES * self.said.speed
         kind, advised = "cutter", f"recommended are {self.said.speed:g} m/min"
         if self.tool.named == "tap":

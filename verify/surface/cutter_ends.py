@@ -128,12 +128,24 @@ def _seen(tool: ToolBody, least: float, tolerance: float) -> bool:
 
 
 def _corners(moves: Moves, k: int) -> tuple[INT, F64]:
-    """Moves of a tool that end, or begin, at a corner of the path, and the share of the move that is: 1 or 0."""
+    """Moves of a tool that end, or begin, at a corner of the path, and the share of the move that is: 1 or 0.
+
+    A corner is where the way of the tip turns, or the turn of the axis begins, ends or changes.
+    """
     way = moves.end - moves.start
     length = np.linalg.norm(way, axis=1)
     way = way / np.maximum(length, 1e-12)[:, None]
     feed = moves.feed & (moves.tool == k) & (length > 0.0)
-    joined = feed[:-1] & feed[1:] & (np.einsum("ij,ij->i", way[:-1], way[1:]) > CORNER)
+    joined = np.einsum("ij,ij->i", way[:-1], way[1:]) > CORNER
+    if moves.axes is not None:
+        # a rim goes where the axis turns it, too: a path that goes straight on has a corner where the axis turns back
+        turn = moves.axes.angle[:, None] * moves.axes.about
+        size = np.linalg.norm(turn, axis=1)
+        feed |= moves.feed & (moves.tool == k) & (size > 0.0)
+        still = (size[:-1] == 0.0) & (size[1:] == 0.0)
+        joined = (joined | (length[:-1] == 0.0) & (length[1:] == 0.0)) & (
+            still | (np.einsum("ij,ij->i", turn[:-1], turn[1:]) > CORNER * size[:-1] * size[1:]))
+    joined = feed[:-1] & feed[1:] & joined
     ends = np.flatnonzero(feed & ~np.append(joined, False))
     starts = np.flatnonzero(feed & ~np.append(False, feed[:-1]))
     return np.concatenate([ends, starts]), np.concatenate([np.ones(len(ends)), np.zeros(len(starts))])
@@ -146,6 +158,8 @@ def _ways(moves: Moves, k: int, tool: ToolBody, bounds: F64) -> tuple[INT, F64, 
     near = ((low < bounds[1] + far) & (high > bounds[0] - far)).all(axis=1)
     rows = np.flatnonzero(moves.feed & (moves.tool == k) & near)
     length = np.linalg.norm(moves.end[rows] - moves.start[rows], axis=1)
+    if moves.axes is not None:
+        length = length + far * moves.axes.angle[rows]  # the way of a rim that the axis swings
     past = np.cumsum(length)
     most = MAX_BALLS if tool.kind == "ball" else MAX_RINGS
     if not len(rows) or past[-1] <= 0.0:
