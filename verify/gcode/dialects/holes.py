@@ -25,6 +25,7 @@ class DrilledHole:
     outs    : of each peck, whether it retracts to ``clear`` all the same; empty: none
     feed    : F word of the way down, '' to keep the one in force; out: of the way up to ``clear``, None for a rapid
     dwell   : s at the bottom
+    first   : F word of the first peck, '' for ``feed``
     """
 
     clear: float
@@ -38,6 +39,7 @@ class DrilledHole:
     dwell: float = 0.0
     leads: tuple[float, ...] = ()
     outs: tuple[bool, ...] = ()
+    first: str = ""
 
 
 def even_pecks(depth: float, first: float, step: float, least: float, machine: Machine) -> tuple[float, ...]:
@@ -62,6 +64,27 @@ def even_pecks(depth: float, first: float, step: float, least: float, machine: M
         at += peck
         out.append(at)
         peck = max(peck - step, least, 1e-9) if step > 0 else peck
+    return tuple(out)
+
+
+def scaled_pecks(depth: float, first: float, share: float, least: float, machine: Machine) -> tuple[float, ...]:
+    """Depths of pecks, mm, of which each is a share of the one before.
+
+    depth : of the hole; first : of the first peck; share : above 0 and below 1; least : the shortest peck, above 0
+
+    Raises
+    ------
+    ProgramError
+        More pecks than a block may make.
+    """
+    if first <= 0 or first >= depth:
+        return ()
+    machine.log.room(4.0 * (depth / min(least, first) + 2))
+    out, at, peck = [], 0.0, first
+    while at + peck < depth - 1e-9:
+        at += peck
+        out.append(at)
+        peck = max(peck * share, min(least, first))
     return tuple(out)
 
 
@@ -119,18 +142,19 @@ def hole_blocks(hole: DrilledHole, here: Sequence[float], axis: int, unit: float
         at = height
 
     go("G0", hole.clear)
-    gone = 0
+    gone, feed = 0, hole.first or hole.feed
     for n, depth in enumerate(hole.pecks):
         height = max(hole.surface - depth, hole.bottom)
         if height >= hole.clear:
             continue
-        go("G1", height, hole.feed)
+        go("G1", height, feed)
+        feed = hole.feed
         lift = math.inf if hole.outs and hole.outs[n] else hole.lift
         go("G0", min(height + lift, hole.clear))
         if math.isinf(lift):
             go("G0", min(height + (hole.leads[gone] if hole.leads else LEAD), hole.clear))
             gone += 1
-    go("G1", hole.bottom, hole.feed)
+    go("G1", hole.bottom, feed)
     if hole.dwell > 0:
         out.append(f"G4 P{digits(hole.dwell)}")
     if hole.out is not None:
@@ -139,4 +163,4 @@ def hole_blocks(hole: DrilledHole, here: Sequence[float], axis: int, unit: float
     return out
 
 
-__all__ = ["DrilledHole", "broken_pecks", "even_leads", "even_pecks", "hole_blocks"]
+__all__ = ["DrilledHole", "broken_pecks", "even_leads", "even_pecks", "hole_blocks", "scaled_pecks"]

@@ -17,8 +17,8 @@ from collections.abc import Iterator, Sequence
 
 from verify.gcode.dialects.base import ZEROS, BlockError, Machine
 from verify.gcode.dialects.orientation import needed
+from verify.gcode.dialects.siemens.siemens_arguments import DRILLS, PATTERNS
 from verify.gcode.dialects.siemens.siemens_calls import SiemensCalls
-from verify.gcode.dialects.siemens.siemens_cycles import DrillingCall
 from verify.gcode.dialects.siemens.siemens_expressions import MAX_ELEMENTS, Value, ValueReader, Variables, arguments
 from verify.gcode.dialects.siemens.siemens_flow import SiemensFlow
 from verify.gcode.dialects.siemens.siemens_moves import CURVES, Line
@@ -26,7 +26,6 @@ from verify.gcode.dialects.siemens.siemens_sections import LABEL, NUMBERED, PLAI
 from verify.gcode.dialects.siemens.siemens_words import (
     COMPRESSORS,
     CONTOUR_FEED,
-    ENVELOPES,
     FEEDS,
     IDLE,
     IDLE_CALLS,
@@ -500,8 +499,8 @@ class SiemensReader(SiemensCalls):
             return self._name("TRAORI", line)
         if name == "CYCLE800":
             line.after += self.swivelled(parts, self._number)
-        elif name in ENVELOPES:
-            self._drill(DrillingCall(name, tuple(self._values(name, parts))), line)
+        elif name in DRILLS:
+            self._drill(self._called(name, parts), line)
         elif name == "FGROUP" and parts != [""] and not {"X", "Y", "Z"} <= {p.strip() for p in parts}:
             raise BlockError("FGROUP( ) without X, Y and Z: F does not count along the whole path",
                              "name X, Y and Z in it")
@@ -510,8 +509,8 @@ class SiemensReader(SiemensCalls):
                              "that one")
         elif name == "SETAL":
             raise BlockError(f"SETAL({','.join(parts)[:20]}): the program stops here with an alarm")
-        elif name in ("HOLES1", "HOLES2"):
-            self._row(name, self._values(name, parts), line)
+        elif name in PATTERNS:
+            self._row(self._called(name, parts), line)
         elif name == "CYCLE832":
             line.out += self._tolerant(parts)
         elif name in NOT_FOLLOWED:

@@ -9,7 +9,8 @@ from dataclasses import replace
 
 from verify.gcode.dialects.base import BlockError
 from verify.gcode.dialects.orientation import needed
-from verify.gcode.dialects.siemens.siemens_cycles import TEXTS, DrillingCall, drilling_blocks, row_of_holes
+from verify.gcode.dialects.siemens.siemens_arguments import CYCLES, CycleCall, called
+from verify.gcode.dialects.siemens.siemens_cycles import drilling_blocks, row_of_holes
 from verify.gcode.dialects.siemens.siemens_expressions import ValueReader, Variables
 from verify.gcode.dialects.siemens.siemens_moves import Line, SiemensMoves
 from verify.gcode.dialects.stated_places import digits, level
@@ -18,6 +19,8 @@ from verify.program.arc_chords import PLANE_AXES
 _TEXT = re.compile(r'"([^"]*)"')
 SMALL = 0.01
 """deg, deviation of a tool axis that needs no note: 0.01 mm at 57 mm above the tip."""
+MAX_MODE = 999
+"""Largest mode of CYCLE832 that says nothing but the kind of the work; those of older controls have six digits."""
 
 
 class SiemensCalls(SiemensMoves):
@@ -41,17 +44,16 @@ class SiemensCalls(SiemensMoves):
             raise BlockError(f"cannot read the value '{text[:40]}'")
         return number
 
-    def _values(self, name: str, parts: Sequence[str]) -> list[float | None]:
-        """The values of a call, None where one is left out or is a text that changes no move."""
-        out: list[float | None] = []
+    def _called(self, name: str, parts: Sequence[str]) -> CycleCall:
+        """The call of a cycle with the values of its arguments, given as text."""
+        known = CYCLES[name]
+        values: list[float | str | None] = []
         for k, part in enumerate(parts):
-            text = k in TEXTS.get(name, ()) and _TEXT.fullmatch(part.strip())
-            if text and text[1] and name.startswith("HOLES"):
-                raise BlockError(f"{name} with hidden holes is not followed")
-            out.append(self._number(part) if part and not text else None)
-        return out
+            text = _TEXT.fullmatch(part.strip()) if k < len(known) and known[k].text else None
+            values.append(text[1] if text else self._number(part) if part else None)
+        return called(name, values)
 
-    def _drill(self, call: DrillingCall, line: Line) -> None:
+    def _drill(self, call: CycleCall, line: Line) -> None:
         self.uncompensated(call.name)
         if line.modal:
             self.cycle = call
@@ -60,16 +62,16 @@ class SiemensCalls(SiemensMoves):
             raise BlockError(f"{call.name} and coordinates in one block")
         line.after += self._restored(drilling_blocks(call, self.here(), self.machine))
 
-    def _row(self, name: str, values: Sequence[float | None], line: Line) -> None:
+    def _row(self, call: CycleCall, line: Line) -> None:
         if self.cycle is None:
-            raise BlockError(f"{name} without a cycle of MCALL")
+            raise BlockError(f"{call.name} without a cycle of MCALL")
         i, j, k = PLANE_AXES[self.machine.s.plane]
         place = self.here()
-        for u, v in row_of_holes(name, values):
+        for u, v in row_of_holes(call, self.machine):
             target = list(place)
             target[i], target[j] = u * self.unit, v * self.unit
             if self.relative:
-                raise BlockError(f"{name} in incremental coordinates")
+                raise BlockError(f"{call.name} in incremental coordinates")
             line.after.append(f"G0 {'XYZ'[i]}{digits(u)} {'XYZ'[j]}{digits(v)}")
             blocks = drilling_blocks(self.cycle, target, self.machine)
             line.after += blocks
@@ -85,6 +87,11 @@ class SiemensCalls(SiemensMoves):
             self.bound(False)
             self.cycle_lean = 0.0
             return []
+        if any(part.strip() not in ("", "0") for part in parts[3:]):
+            raise BlockError(f"CYCLE832 with {len(parts)} arguments: the proof knows 3", "leave out those behind them")
+        if len(parts) > 1 and parts[1].isdigit() and int(parts[1]) > MAX_MODE and self.machine.machine is not None:
+            raise BlockError(f"CYCLE832 with the mode {parts[1]}, which may switch TRAORI on or off, is not followed",
+                             "write a mode of two digits, and TRAORI or TRAFOOF in a block of its own")
         tolerance = self._number(parts[0])
         self._oriented_within(parts)
         self.bound(True)

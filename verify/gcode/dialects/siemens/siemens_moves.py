@@ -8,8 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from verify.gcode.dialects.base import BlockError
+from verify.gcode.dialects.siemens.siemens_arguments import CycleCall, check_override
 from verify.gcode.dialects.siemens.siemens_corners import SiemensCorners
-from verify.gcode.dialects.siemens.siemens_cycles import DrillingCall, drilling_blocks
+from verify.gcode.dialects.siemens.siemens_cycles import drilling_blocks
 from verify.gcode.dialects.siemens.siemens_words import UNBOUNDED
 from verify.gcode.dialects.stated_places import digits
 from verify.gcode.flow.input_increment import counted, is_fine
@@ -65,7 +66,7 @@ class SiemensMoves(SiemensCorners):
         self.smooths: set[str] = set()
         self.follows, self.by_data = "", False
         self.least_speed, self.top_speed = 0.0, math.inf  # 1/min, of G25 S and G26 S
-        self.cycle: DrillingCall | None = None
+        self.cycle: CycleCall | None = None
         self.end = [math.nan] * 3
 
     def count(self, line: Line) -> None:
@@ -331,6 +332,7 @@ class SiemensMoves(SiemensCorners):
                 raise BlockError(f"G74 or G75 {turned[0]}: the machine has no such rotary axis")
             return self._restored([*head, way])
         if codes & {63, 331, 332}:
+            check_override("tapping (G63, G331, G332)", self.machine)
             return self._tapped(line, places, 63 in codes)
         return None
 

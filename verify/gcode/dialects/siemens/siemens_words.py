@@ -72,10 +72,6 @@ VALUES = frozenset("""
     Z1""".split())
 """Names with a value that belong to the move of their block."""
 
-ENVELOPES = ("CYCLE81", "CYCLE82", "CYCLE83", "CYCLE84", "CYCLE840", "CYCLE85", "CYCLE86", "CYCLE87", "CYCLE88",
-             "CYCLE89")
-"""Drilling cycles that are followed as rapids and feeds."""
-
 NOT_FOLLOWED = {
     **_named("a pocket", "POCKET1 POCKET2 POCKET3 POCKET4 CYCLE73"), **_named("slots on a circle", "SLOT1 SLOT2"),
     **_named("elongated holes", "LONGHOLE"), **_named("engraving", "CYCLE60"), **_named("face milling",
@@ -154,6 +150,6 @@ def factor_of_feeds(percent: float) -> float:
     return percent / 100.0
 
 
-__all__ = ["COMPRESSORS", "CONTOUR_FEED", "ENVELOPES", "FEEDS", "IDLE", "IDLE_CALLS", "IDLE_CODES", "IDLE_VALUES",
+__all__ = ["COMPRESSORS", "CONTOUR_FEED", "FEEDS", "IDLE", "IDLE_CALLS", "IDLE_CODES", "IDLE_VALUES",
            "LENGTH_BY_PLANE", "MOVES", "NOT_FOLLOWED", "REFUSED", "SAME", "SHARP_STYLE", "SIEMENS_STYLE", "SMOOTHS",
            "UNBOUNDED", "UNITS", "VALUES", "check_limit", "factor_of_feeds"]

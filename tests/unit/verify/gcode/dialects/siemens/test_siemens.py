@@ -553,7 +553,7 @@ def test_values_that_the_editor_of_the_control_adds_change_no_move(edited, plain
 @pytest.mark.parametrize(("call", "said"), [
     ("HOLES2(0,0,10,0,45,4,1010,0,,,1)", "along an arc"), ('HOLES2(0,0,10,0,0,4,1000,0,"0100",,1)', "hidden holes"),
     ("HOLES2(0,0,10,0,0,4,2000)", "kind 2000"), ("HOLES1(0,0,0,5,10,3,1000)", "kind 1000"),
-    ("HOLES1(0,0,0,5,10,3,0,1)", "eighth value")])
+    ("HOLES1(0,0,0,5,10,3,0,1)", "_UMODE=1")])
 def test_rows_of_holes_in_other_ways_are_refused(call, said):
     with pytest.raises(ProgramError, match=said):
         read(f"S900 M3\nMCALL CYCLE81(5,0,2,-4)\n{call}\nMCALL", "siemens")
