@@ -16,13 +16,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from verify.gcode.dialects.base import NUMBER, BlockError, Machine
+from verify.gcode.dialects.heidenhain.heidenhain_arguments import CycleCall
 from verify.gcode.dialects.heidenhain.heidenhain_cycles import (
     AT_ONCE,
     DRILLS,
     NOT_FOLLOWED,
     OLD,
     TOUCHES,
-    CycleCall,
     cycle_blocks,
     defined,
     old_cycle,

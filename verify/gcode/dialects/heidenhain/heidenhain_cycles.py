@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 from verify.gcode.dialects.base import BlockError, Machine
+from verify.gcode.dialects.heidenhain.heidenhain_arguments import CYCLES, CycleCall, single_lip
 from verify.gcode.dialects.heidenhain.heidenhain_q import NUM, VALUE
 from verify.gcode.dialects.holes import DrilledHole, broken_pecks, even_leads, even_pecks, hole_blocks
 from verify.gcode.dialects.stated_places import digits
 
 _HEAD = re.compile(r"CYCL DEF ([0-9]+)(?![0-9.])\s*(.*)")
 _ITEM = re.compile(rf"(Q[0-9]+)\s*=\s*({VALUE}|FMAX|FAUTO|AUTO|[+-]?\s*MAX)")
-DRILLS = frozenset({200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241})
+DRILLS = frozenset(CYCLES)
 NOT_FOLLOWED = {
     204: "back boring", 210: "a slot", 211: "a circular slot", 212: "a pocket", 213: "a stud", 214: "a circular pocket",
     215: "a circular stud", 220: "a circle of points", 221: "rows of points", 224: "a pattern of points",
@@ -31,27 +31,6 @@ AT_ONCE = frozenset({220, 221, 224, 239, 291})
 """Cycles that work when they are defined: they move, or couple the spindle to the path."""
 TOUCHES = range(400, 500)
 """Cycles of touch probes, which move when they are defined."""
-
-
-@dataclass(frozen=True)
-class CycleCall:
-    """A cycle in force: its number and its parameters by name."""
-
-    number: int
-    values: Mapping[str, float]
-
-    def get(self, name: str, otherwise: float | None = None) -> float:
-        """Value of a parameter.
-
-        Raises
-        ------
-        BlockError
-            The definition lacks it.
-        """
-        found = self.values.get(name, otherwise)
-        if found is None:
-            raise BlockError(f"cycle {self.number} without {name}")
-        return found
 
 
 def defined(text: str, value: Callable[[str], float]) -> CycleCall | None:
@@ -94,8 +73,9 @@ def cycle_blocks(call: CycleCall, here: Sequence[float], machine: Machine, over:
     if n not in DRILLS:
         raise BlockError(f"cycle {n} ({NOT_FOLLOWED.get(n, 'another cycle')}) is not followed",
                          "let the post write its moves (L, C) instead of the cycle")
+    call.check()
     surface = call.get("Q203") * unit + over
-    clear = surface + abs(call.get("Q200")) * unit
+    clear = surface + call.get("Q200") * unit
     depth = -call.get("Q201") * unit
     if depth < 0:
         raise BlockError(f"cycle {n} with a depth above the surface (Q201={call.get('Q201'):g}), which is negative in "
@@ -103,9 +83,6 @@ def cycle_blocks(call: CycleCall, here: Sequence[float], machine: Machine, over:
                          "program")
     if depth == 0:
         return []
-    if n in (205, 241) and call.get("Q379", 0.0):
-        raise BlockError(f"cycle {n} that begins within the hole (Q379={call.get('Q379'):g}) is not followed: what "
-                         "stands above is passed at the feed Q253", "drill from the surface (Q379=+0)")
     if n == 202 and call.get("Q214", 0.0):
         machine.log.note("cycle 202 is read without its shift at the bottom (Q214): the edge of the tool decides")
     back = max(surface + call.get("Q204", 0.0) * unit, clear)
@@ -114,13 +91,12 @@ def cycle_blocks(call: CycleCall, here: Sequence[float], machine: Machine, over:
     ways = _ways(call, machine, surface, depth, feed, down)
     if n == 208:
         return _bore_mill(call, here, machine, (clear, surface - depth, back), down, radius)
-    if n == 240 and call.get("Q343", 0.0) == 1.0:
-        raise BlockError("cycle 240 by the diameter of a centring is not followed: give its depth (Q343=0)")
-    if call.get("Q395", 0.0) == 1.0:
-        raise BlockError(f"cycle {n} whose depth counts to the edge of the drill (Q395=1) is not followed: give that "
-                         f"of its tip")
     hole = DrilledHole(clear, surface - depth, back, dwell=dwell, surface=surface, **ways)  # type: ignore[arg-type]
     blocks = hole_blocks(hole, here, 2, unit, False)
+    if n == 241:
+        machine.log.turns(machine.s.tool, max(call.get("Q427", 0.0), call.get("Q428", 0.0)))
+        before, behind = single_lip(call, machine.s.speed, machine.s.turning)
+        return [*before, *blocks, *behind]
     if n not in (207, 209):
         return blocks
     # rigid tapping turns the spindle itself, and controls differ in whether it stands at its end
@@ -155,7 +131,7 @@ def _ways(call: CycleCall, machine: Machine, surface: float, depth: float, feed:
     pecks = even_pecks(depth, first, shrink, min(least, first) if first > 0 else least, machine)
     leads: tuple[float, ...] = ()
     if n == 205 and "Q258" in call.values:
-        leads = even_leads(len(pecks), abs(call.get("Q258")) * unit, abs(call.get("Q259", call.get("Q258"))) * unit)
+        leads = even_leads(len(pecks), call.get("Q258") * unit, call.get("Q259", call.get("Q258")) * unit)
     outs: tuple[bool, ...] = (True,) * len(pecks)
     if n == 203 and call.get("Q213", 0.0) > 0:
         outs = tuple((k + 1) % (int(call.get("Q213")) + 1) == 0 for k in range(len(pecks)))
@@ -165,7 +141,7 @@ def _ways(call: CycleCall, machine: Machine, surface: float, depth: float, feed:
                              "(Q202); older controls may not go out before its end")
         pecks, outs = broken_pecks(depth, pecks, call.get("Q257") * unit, machine)
     lift = max(call.get("Q256", 0.2) * unit, 0.0)
-    out = feed(call.get("Q208")) if n == 203 and 0 < call.get("Q208", 0.0) < 99999 else None
+    out = feed(call.get("Q208")) if n != 200 and 0 < call.get("Q208", 0.0) < 99999 else None
     return {"feed": down, "pecks": pecks, "lift": lift, "leads": leads, "outs": outs, "out": out}
 
 
@@ -184,7 +160,7 @@ def _bore_mill(call: CycleCall, here: Sequence[float], machine: Machine, heights
                          f"larger")
     if r < 1e-6:
         return hole_blocks(DrilledHole(clear, bottom, back, feed=feed), here, 2, unit, False)
-    pitch = abs(call.get("Q334")) * unit
+    pitch = call.get("Q334") * unit
     if not pitch > 0:
         raise BlockError("cycle 208 needs the infeed of a turn (Q334)")
     word = "G3" if call.get("Q351", 1.0) >= 0 else "G2"
@@ -222,7 +198,7 @@ def old_cycle(number: int, items: Mapping[int, str], surface: float, value: Call
     clear = abs(get(1, "SET UP|DIST|ABST|SET-UP|"))
     given = {"Q200": clear, "Q201": get(2, "DEPTH|TIEFE|"), "Q203": surface - clear, "Q204": 0.0}
     if number == 1:
-        given |= {"Q202": get(3, "PECKG|ZUSTLG|"), "Q211": get(4, "DWELL|V.ZEIT|", 0.0), "Q206": get(5, "F")}
+        given |= {"Q202": abs(get(3, "PECKG|ZUSTLG|")), "Q211": get(4, "DWELL|V.ZEIT|", 0.0), "Q206": get(5, "F")}
         return CycleCall(200, given)
     if number == 2:
         return CycleCall(206, given | {"Q211": 0.0, "Q206": get(4, "F")})

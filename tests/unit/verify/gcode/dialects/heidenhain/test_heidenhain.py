@@ -313,7 +313,7 @@ def test_a_stop_ends_the_spindle_too(word, line):
     ("TOOL CALL DL-1", "with DL or DR and without a tool"),
     ("TOOL CALL S900 DR+0.2", "with DL or DR and without a tool"),
     ("CYCL DEF 205 Q200=+2 Q201=-8 Q206=+200 Q202=+3 Q203=+0 Q204=+20 Q379=+6 Q253=+8000\nCYCL CALL",
-     "begins within the hole .Q379=6.")])
+     "cycle 205 with Q379=6 .a start within the hole.")])
 def test_lengths_and_depths_that_would_be_passed_over_are_refused(line, said):
     with pytest.raises(ProgramError, match=said):
         read(line, "heidenhain")
