@@ -224,12 +224,13 @@ def _check_groups(letter: str, codes: list[float] | list[int], groups: tuple[fro
             raise BlockError(f"{names} in one block are of one modal group, and controls differ in which one counts")
 
 
-def used_letters(block: Block, motion: float | None, moves: bool, pecks: str = "") -> str:
+def used_letters(block: Block, motion: float | None, moves: bool, pecks: str = "", repeats: str = "LK") -> str:
     """Letters whose number some code of the block uses.
 
     motion : G number in force
     moves  : whether the block makes a move of that motion
     pecks  : further letters of peck cycles
+    repeats : letters that give the number of holes of a cycle, the first one present counts
     """
     used = "XYZABCFST" + ("PQRLE" if block.idle else "") + ("Q" if 61 in block.ms else "")
     if 10 in block.codes:
@@ -250,7 +251,7 @@ def used_letters(block: Block, motion: float | None, moves: bool, pecks: str = "
     if motion in (2, 3):
         return used + ("RP" if "R" in block.values else "IJKP")
     if motion in CYCLES:
-        used += "R" + ("L" if "L" in block.values else "K")
+        used += "R" + next((c for c in repeats if c in block.values), "")
         used += pecks if motion in (73, 83) else ""
         return used + {81: "", 85: "", 82: "P", 86: "P", 89: "P", 76: "PQIJ"}.get(int(motion or 0), "PQ")
     return used

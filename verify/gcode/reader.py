@@ -395,7 +395,8 @@ class Reader(BlockMotion):
         moves = {28, 30, 53}.isdisjoint(block.codes) and not block.values.keys().isdisjoint(
             "XYZABCIJK@^" if motion in (2, 3) else "XYZABC@^")
         shrinks = self.control is not None and self.control.shrinking_pecks
-        used = used_letters(block, motion, moves, "IJK" if shrinks else "")
+        repeats = "LK" if self.control is None else self.control.repeats
+        used = used_letters(block, motion, moves, "IJK" if shrinks else "", repeats)
         idle = [f"{letter}{number:g}" for letter, number in block.values.items() if letter not in used]
         if idle:
             self.log.remark("unused", f"no code of this block uses {', '.join(idle)}", self.log.line)

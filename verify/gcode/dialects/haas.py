@@ -63,12 +63,12 @@ class HaasReader(FanucReader):
     def _word(self, letter: str, digits: str, codes: list[float], values: dict[str, str]) -> list[str]:
         if letter == "M" and float(digits) == 16:
             return ["M6"]
-        if self.hole and letter in "IJK" and self._pecks(codes):
+        if self.hole and letter in "IJK" and self._cycles(codes) & {73.0, 83.0}:
             if "." not in digits and float(digits) != 0:
                 raise BlockError(f"{letter}{digits} of a peck cycle without a decimal point counts thousandths or not, "
                                  "depending on a setting", f"write {letter}{digits}.")
             return [letter + digits]
-        if self.hole and letter == "J":
+        if letter == "J" and self._cycles(codes) & {74.0, 84.0}:
             speed = float(values.get("S", self.machine.s.speed))
             self.machine.log.turns(self.machine.s.tool, float(digits) * speed)  # on the way out of a tapped hole
             return []
@@ -76,10 +76,10 @@ class HaasReader(FanucReader):
             return []
         return super()._word(letter, digits, codes, values)
 
-    def _pecks(self, codes: list[float]) -> bool:
-        """Whether the cycle in force in a block of these G words pecks."""
-        stated = [c for c in codes if 73 <= c <= 89]
-        return not {73.0, 83.0}.isdisjoint(stated or [self.machine.s.motion or 0.0])
+    def _cycles(self, codes: list[float]) -> set[float]:
+        """G words of the drilling cycle that a block of these G words runs; none without one."""
+        stated = {c for c in codes if 73 <= c <= 89}
+        return stated or ({self.machine.s.motion or 0.0} if self.hole else set())
 
     def _code(self, code: float, values: dict[str, str]) -> list[str]:
         if code == 234:
