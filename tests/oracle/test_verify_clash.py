@@ -62,7 +62,7 @@ def cutter_depth(rho, h, tool, grow, slack, off):
 @pytest.mark.parametrize("off", [0.0, 0.06, 0.125, 0.19])
 @pytest.mark.parametrize("angle", [0.0, 3.0, 30.0, 45.0])
 def test_a_rim_over_a_thin_neck_is_met_between_the_rows_of_a_fixture(angle, off):
-    """The side of a fixture, rows of points 0.25 mm apart; the rim of a cone, or of a disc, goes along it 0.2 mm deep."""
+    """The side of a fixture, points 0.25 mm apart; the rim of a cone or a disc goes along it 0.2 mm deep."""
     deep, flutes = 0.2, 3.0 if angle else 0.1
     mill = ToolBody("T1", 1, 6.0, 0.0, flutes, 4.0, 20.0, 4.0, 25.0, taper=np.tan(np.radians(angle)))
     x, z = np.meshgrid(np.arange(-2.0, 2.1, FIXTURE_SPACING), np.arange(0.5, 3.1, FIXTURE_SPACING) + off)

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
-from tests.hand_parts import prism, terraces, tool
+from geometry.tool_body import ToolBody
+from tests.hand_parts import box_mesh, prism, terraces, tool
 from verify.moves import Moves
 from verify.surface.cutter_ends import turning_feet
+from verify.tool_axes import ToolAxes
 
 DEG = 20.0
 WIDE = 30.0
@@ -103,3 +105,18 @@ def test_the_upper_end_of_a_cone_that_bites_into_a_wall(corner):
     k = int(np.argmax(feet.depth))
     assert feet.depth[k] == pytest.approx(deep, abs=1e-3)
     assert feet.points[k] == pytest.approx([20.0, 10.0, 5.5], abs=0.02)
+
+
+@pytest.mark.parametrize("kind", ["straight on", "in place"])
+def test_a_rim_is_looked_at_where_its_axis_turns_back(kind):
+    """A cone beside an upright wall leans towards it and back: its upper rim is deepest where the turn ends."""
+    over, lean = 0.02, math.radians(15.0)
+    mill = ToolBody("T1", 1, 1.0, 0.0, 2.0, 0.7, 20.0, 0.7, 20.0, taper=math.tan(math.radians(20.0)))
+    reach = 2.0 * math.sin(lean) + mill.widest_radius * math.cos(lean)
+    way = 0.05 + 0.5 * np.arange(3) if kind == "straight on" else np.full(3, 0.05)
+    tips = np.column_stack([way, np.full(3, 1.0 - reach + over), np.full(3, -3.5)])
+    axes = np.array([[0.0, 0.0, 1.0], [0.0, math.sin(lean), math.cos(lean)], [0.0, 0.0, 1.0]])
+    moves = Moves(tips[:2], tips[1:], np.ones(2, np.bool_), np.zeros(2, np.int64), ToolAxes.between(axes[:2], axes[1:]))
+    wall = box_mesh([-10.0, 1.0, -4.0], [10.0, 3.0, 0.0])
+    feet, _ = turning_feet(TriangleTree(wall), moves, [mill], 0.01)
+    assert len(feet.depth) and feet.depth.max() == pytest.approx(over, abs=1e-3)
