@@ -198,8 +198,8 @@ class ProposedTool(ReportModel):
     kind: str
     diameter_mm: float
     corner_radius_mm: float
-    taper_angle_deg: Annotated[float, Field(description="Angle between side and axis of a tapered mill, deg; 0 for all "
-                                                        "other kinds.")] = 0.0
+    taper_angle_deg: Annotated[float | None, Field(description="Angle between side and axis of a tapered mill, deg; "
+                                                               "null for all other kinds.")] = None
     flute_length_mm: float
     neck_diameter_mm: float
     neck_length_mm: float

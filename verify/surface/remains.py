@@ -166,7 +166,7 @@ def vanished(left: Remains, rays: Rays, even: int, tolerance: float) -> NDArray[
     if not len(found):
         return found
     rest = np.setdiff1d(np.arange(even), found)
-    over = _over_from_behind(left.tree, rays, rest, found, tolerance)
+    over = _over_from_behind(left.tree, rays, rest, found, found, tolerance)
     rest, over = rest[over >= 0.0], over[over >= 0.0]
     return np.union1d(found, rest[_gone_by_cell(left, rays.points[rest], over, tolerance)])
 
@@ -294,23 +294,25 @@ def _in_cells(points: F64, others: F64) -> NDArray[np.bool_]:
 
 
 def _over_from_behind(tree: TriangleTree, rays: Rays, rows: NDArray[np.int64], deep: NDArray[np.int64],
-                      tolerance: float) -> F64:
+                      cut: NDArray[np.int64], least: float) -> F64:
     """How far a cut from the far side may reach over the ends of rays, (k,) float64, mm; -inf where it does not.
 
-    rows : (k,) int64, index, the rays
-    deep : (d,) int64, index, those where nothing is left
+    rows  : (k,) int64, index, the rays
+    deep  : (d,) int64, index, those where nothing is left; only rays near them are looked at
+    cut   : (m,) int64, index, those that tell how deep the far side is cut
+    least : mm, that the far side is cut everywhere at least
 
-    From 0 on the ends may be gone. It is said of some that stand, too: a cut of the tolerance counts everywhere.
+    From 0 on the ends may be gone. Where ``least`` is above 0 it is said of some that stand, too.
     """
     out = np.full(len(rows), -np.inf)
-    most = max(tolerance, -float(rays.residual[deep].min(initial=0.0)))
+    most = max(least, -float(rays.residual[deep].min(initial=0.0)))
     box = rays.points[deep].min(axis=0) - most - BESIDE, rays.points[deep].max(axis=0) + most + BESIDE
     near = np.flatnonzero(((rays.points[rows] >= box[0]) & (rays.points[rows] <= box[1])).all(axis=1))
     own = np.maximum(-rays.residual[rows[near]], 0.0)
     thick = _thickness(tree, rays, rows[near], own + most)
     thin = np.isfinite(thick)
     near, own, thick = near[thin], own[thin], thick[thin]
-    there = np.maximum(_cut_at(rays, rows[near], thick, deep), tolerance)
+    there = np.maximum(_cut_at(rays, rows[near], thick, cut), least)
     out[near] = own + there + STARTS - thick
     return out
 
@@ -340,7 +342,8 @@ def depths_both_ways(left: Remains, rays: Rays, deep: NDArray[np.int64], thin: N
     size = float(np.linalg.norm(np.diff(left.tree.mesh.bounds, axis=0)))
     rows = np.flatnonzero(ends)
     if thin.any():
-        rows = rows[_over_from_behind(left.tree, rays, rows, deep[thin], tolerance) < 0.0]
+        cut = np.flatnonzero(-rays.residual > CLOSE)
+        rows = rows[_over_from_behind(left.tree, rays, rows, deep[thin], cut, 0.0) < 0.0]
     there = LeftOnRays(left.tree, rays, rows, size)
 
     def second(rows: NDArray[np.int64], first: float, last: float) -> NDArray[np.int64]:
