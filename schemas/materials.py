@@ -1,9 +1,9 @@
 """Workpiece materials and their default cutting data.
 
-The figures are shop practice, deliberately low, for slender coated carbide tools with coolant. docs/theory/feeds.md
-says
-which of them have been checked against a source. A shop with its own figures writes a material into the library
-(``/v1/materials``) or into the setup, or gives a tool its speed and feed.
+Seven materials have figures of their own: shop practice, deliberately low, for slender coated carbide tools with
+coolant. Others get those of their group (``schemas.material_groups``). docs/theory/feeds.md says which figures have
+been checked against a source. A shop with its own figures writes a material into the library (``/v1/materials``) or
+into the setup, or gives a tool its speed and feed.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from schemas.base import Number, WireModel, library_entry
+from schemas.material_groups import GROUPS, MILLING, built_in_name, group_of, key, similar
 
 SOURCE = "shop practice, deliberately low"
+OF_GROUP = "typical of the group, deliberately low"
 
 
 class FeedPoint(WireModel):
@@ -46,6 +48,9 @@ class Material(WireModel):
                                   "none.")
     ] = None
     source: Annotated[str, Field(max_length=200, description="Where the figures come from.")] = "user"
+    group: Annotated[str | None, Field(
+        max_length=200, description="Group of materials whose figures these are, if the material has none of its own; "
+                                    "null: they are figures of the material.")] = None
 
     @model_validator(mode="after")
     def _both_or_none(self) -> Material:
@@ -80,50 +85,67 @@ MATERIALS: dict[str, Material] = {m.name: m for m in (
 )}
 """The built-in materials by name."""
 
-ALIASES: dict[str, str] = {
-    "ti6al4v": "Ti-6Al-4V", "titaniumgrade5": "Ti-6Al-4V", "3.7165": "Ti-6Al-4V",
-    "in718": "Inconel 718", "2.4668": "Inconel 718",
-    "6082": "AlMgSi1 6082", "almgsi1": "AlMgSi1 6082", "enaw6082": "AlMgSi1 6082", "al6082": "AlMgSi1 6082",
-    "7075": "AlZnMgCu1.5 7075", "enaw7075": "AlZnMgCu1.5 7075", "al7075": "AlZnMgCu1.5 7075",
-    "304": "1.4301", "aisi304": "1.4301", "x5crni1810": "1.4301",
-    "1.4404": "316L", "aisi316l": "316L",
-    "1.0503": "C45", "1045": "C45", "aisi1045": "C45",
-}
-
-
-def _key(name: str) -> str:
-    return name.casefold().replace(" ", "").replace("-", "").replace("_", "")
-
-
-_BY_KEY = {_key(n): n for n in MATERIALS} | {_key(a): n for a, n in ALIASES.items()}
+def known_material(name: str) -> Material | None:
+    """The material of that name, as ``find_material``; None where there is none."""
+    if (own := built_in_name(name)) is not None:
+        return MATERIALS[own]
+    found = group_of(name)
+    return None if found is None else _of_group(*found)
 
 
 def find_material(name: str) -> Material:
-    """The built-in material of that name; case, spaces and hyphens do not matter.
+    """The material of that name: EN, DIN, material number, AISI, UNS or trade name, or a group of materials.
+
+    Case, spaces, hyphens, a standard before the name, and a temper or delivery condition behind it do not matter.
 
     Raises
     ------
     ValueError
-        There is no such material; the message lists those that exist.
+        There is no such material; the message lists similar ones.
 
-    >>> find_material("ti6al4v").name
-    'Ti-6Al-4V'
+    >>> find_material("ti6al4v").name, find_material("AISI D2").name
+    ('Ti-6Al-4V', 'X153CrMoV12')
+    >>> find_material("AISI D2").group
+    'VDI 3323 no. 10, ISO P: high-alloy steel and tool steel, annealed'
     """
-    found = _BY_KEY.get(_key(name))
-    if found is None:
-        raise ValueError(f"unknown material '{name}' (known: {', '.join(MATERIALS)}); "
-                         "give one of these, an object with its cutting data, or 'lib:NAME'")
-    return MATERIALS[found]
+    if (found := known_material(name)) is not None:
+        return found
+    near = similar(name)
+    listed = f"similar: {', '.join(near)}" if near else f"with figures of their own: {', '.join(MATERIALS)}"
+    raise ValueError(f"unknown material '{name}' ({listed}); give the EN, DIN, AISI or UNS name or the material "
+                     "number, a group as 'ISO P' (or M, K, N, S, H), an object with its cutting data, or 'lib:NAME'")
+
+
+def _of_group(name: str, number: int) -> Material:
+    """A material with the figures of a group."""
+    g = GROUPS[number]
+    small, large = g.feeds
+    points = [FeedPoint(diameter_mm=d, feed_per_tooth_mm=round(share * d, 6))
+              for d, share in ((3.0, small), (20.0, large))]
+    return Material(name=name, cutting_speed_m_min=g.speed, feed_per_tooth=points,
+                    specific_cutting_force_n_mm2=round(MILLING * g.force), chip_thickness_exponent=g.exponent,
+                    source=OF_GROUP, group=f"VDI 3323 no. {number}, ISO {g.iso}: {g.what}")
+
+
+def has_own_speed(material: Material) -> bool:
+    """Whether the speed is one of those of this module, which hold for slots: a finish may be faster."""
+    return material in MATERIALS.values() or material.source == OF_GROUP
 
 
 def same_material(name: str, other: str) -> bool:
-    """Whether two names mean one material: equal but for case, spaces and hyphens, or names of one built-in material.
+    """Whether two names mean one material: equal but for case, spaces and hyphens, or names of one known material.
 
     >>> same_material("ti6al4v", "Ti-6Al-4V"), same_material("AISI 304", "1.4301"), same_material("C45", "316L")
     (True, True, False)
+    >>> same_material("D2", "1.2379"), same_material("D2", "1.2080")
+    (True, False)
     """
-    keys = _key(name), _key(other)
-    return keys[0] == keys[1] or (keys[0] in _BY_KEY and _BY_KEY[keys[0]] == _BY_KEY.get(keys[1]))
+    if key(name) == key(other):
+        return True
+    for known in (built_in_name, group_of):
+        if (found := known(name)) is not None:
+            return found == known(other)
+    return False
 
 
 def _resolve(value: Any, info: ValidationInfo) -> Any:

@@ -272,7 +272,9 @@ class Setup(WireModel):
     quality: Annotated[Quality, Field(description="Requirements on the surface.")] = Quality()
     operations: Annotated[Operations, Field(description="Which faces to machine, and how.")] = Operations()
     material: Annotated[MaterialField, Field(
-        description=f"Built-in material ({', '.join(MATERIALS)}), 'lib:NAME', or an object.")] = MATERIALS["Ti-6Al-4V"]
+        description="Name of a material (EN, DIN, material number, AISI, UNS or trade name) or of a group (ISO P, M, "
+                    f"K, N, S or H), 'lib:NAME', or an object. {', '.join(MATERIALS)} have figures of their own; "
+                    "other materials get those of their group, and proof.assumed says so.")] = MATERIALS["Ti-6Al-4V"]
     labels: Labels = {}
 
     @model_validator(mode="after")

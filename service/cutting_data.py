@@ -13,7 +13,7 @@ from geometry.cutting_mechanics import CHIP_SHARE, compliance, diameter_in_cut, 
 from geometry.machine_rates import RATES, Rates
 from geometry.tool_body import ToolBody
 from schemas.machine import Machine
-from schemas.materials import MATERIALS, FeedPoint, Material, find_material
+from schemas.materials import MATERIALS, FeedPoint, Material, find_material, has_own_speed
 from schemas.setup import Setup
 from schemas.tools import Tool
 from toolpath.scallop_budget import ScallopBudget
@@ -149,7 +149,7 @@ def cutting_data(material: Material, tool: Tool, machine: Machine, depth: float 
     if tool.spindle_rpm is not None:
         limited_by, rpm = "setup", given("spindle_rpm", tool.spindle_rpm, tool.max_rpm, machine.max_rpm)
     else:
-        speed = material.cutting_speed_m_min * (FINISHING_SPEED if light and material in MATERIALS.values() else 1.0)
+        speed = material.cutting_speed_m_min * (FINISHING_SPEED if light and has_own_speed(material) else 1.0)
         limits = [("material", 1000.0 * speed / (math.pi * wide))]
         if tool.max_rpm is not None:
             limits.append(("tool", tool.max_rpm))

@@ -21,6 +21,10 @@ def setup_assumptions(inputs: JobInputs) -> tuple[Assumed, ...]:
         out.append(Assumed(AssumedKind.CUTTING_FORCE, "small enough", "a tool may break or bend in a deep cut: the "
                            f"proof knows no cutting force of {inputs.material.name}",
                            "state specific_cutting_force_n_mm2 and chip_thickness_exponent of the material"))
+    if inputs.material.group is not None:
+        out.append(Assumed(AssumedKind.CUTTING_FORCE, f"typical of {inputs.material.group}",
+                           f"{inputs.material.name} has no figures of its own: it may need more force, or a lower "
+                           "speed or feed, than its group", "give material as an object with its cutting data"))
     return tuple(out)
 
 

@@ -19,6 +19,7 @@ from verify.kernels.stock import FIXTURE, HOLDER, NECK, PLUNGE, SHANK
 from verify.kernels.tables import RapidArrays
 from verify.material.collision import fixture_points, run_clashes
 from verify.material.dogleg_rapids import spread
+from verify.material.fixture_contact import fixture_contacts
 from verify.material.loose_stock import LoosePiece, loose_lines, loose_nodes
 from verify.material.stock_field import DistanceField, run_field, stock_field
 from verify.material.stock_lines import blank, run_bodies, run_stock
@@ -88,6 +89,7 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
         known = (run.events[:, 1] == PLUNGE) & np.isin(run.events[:, 0], dug[:, 0])
         run = replace(run, events=np.concatenate([run.events[~known], dug]))
         spacing = field.step
+    met = np.concatenate([met, fixture_contacts(moves, tools, setup, mesh.bounds, rapid_arrays(moves, setup))])
     return MaterialContacts(_of_origin(_merge(run.events, met), run, lost, origin, moves, given, tools),
                     spacing, upright, dip, loose)
 

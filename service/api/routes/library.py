@@ -13,7 +13,7 @@ from fastapi import APIRouter, Path, Query, Request, Response, status
 from schemas.base import NAME_PATTERN
 from schemas.jobs import MachineEntry, MachineList, MaterialEntry, MaterialList, ToolEntry, ToolList
 from schemas.machine import Machine
-from schemas.materials import MATERIALS, Material
+from schemas.materials import MATERIALS, Material, known_material
 from schemas.tools import Tool
 from service.api.principals import Caller, Principal, require
 from service.api.problems import responses
@@ -139,13 +139,17 @@ def list_materials(request: Request, principal: Principal) -> MaterialList:
 @router.get("/materials/{name}", operation_id="getMaterial", summary="One material",
             response_description="The material.", responses=ONE)
 def get_material(request: Request, principal: Principal, name: MaterialName, version: Version = None) -> MaterialEntry:
-    """One material: your own with that name, otherwise the shared one, otherwise the built-in one."""
+    """One material: your own with that name, otherwise the shared one, otherwise the built-in one.
+
+    A built-in material has any of its usual names: EN, DIN, material number, AISI, UNS or trade name. If it has no
+    figures of its own, `group` names the group of materials whose figures it has.
+    """
     try:
         return _material(_library(request).get(principal, "materials", name, version))
     except NotFoundError:
-        if name not in MATERIALS or version is not None:
+        if version is not None or (found := known_material(name)) is None:
             raise
-    return MaterialEntry(name=name, entry=MATERIALS[name], built_in=True)
+    return MaterialEntry(name=found.name, entry=found, built_in=True)
 
 
 @router.put("/materials/{name}", operation_id="putMaterial", summary="Write a material",
