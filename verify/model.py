@@ -207,6 +207,17 @@ class Touch(Protocol):
         """
         ...
 
+    def on_ways(self, samples: SurfaceSamples, tools: Sequence[ToolBody], axes: F64, lift: float) -> NDArray[np.bool_]:
+        """Samples that a mill touches where its own feed moves take it, as low as part and fixtures let it go.
+
+        samples : SurfaceSamples, frame of the proof
+        axes    : (k, 3) float64, unit, tip to spindle, frame of the proof
+        lift    : mm, distance from the sample within which a touch counts, over the allowance
+
+        Returns (n,) bool.
+        """
+        ...
+
     def reasons(self, samples: SurfaceSamples, tools: Sequence[ToolBody], axes: F64) -> NDArray[np.object_]:
         """Why no tool touches samples: words of the remainder.
 

@@ -17,7 +17,7 @@ from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.part import Part
 from geometry.tool_body import ToolBody
-from verify.assumptions import Assumed, AssumedKind, in_order
+from verify.assumptions import in_order
 from verify.checks.body_assumptions import body_assumptions
 from verify.checks.changed_tools import as_collisions
 from verify.checks.empty_spindle import with_nose
@@ -45,7 +45,6 @@ from verify.findings import (
     residual_findings,
 )
 from verify.kernels.stock import PLUNGE
-from verify.material.collision import DIP
 from verify.material.cutting_loads import cut_sequence, loads
 from verify.material.dogleg_rapids import box_findings
 from verify.material.drill_loads import drill_loads
@@ -74,6 +73,7 @@ from verify.program.program import Program
 from verify.progress import Report, StageProgress
 from verify.surface.asked_faces import Cutting, Measured
 from verify.surface.between_samples import settled_samples
+from verify.surface.cutter_ends import rapid_presses
 from verify.surface.sample_scores import RAY_ERROR, face_proofs, proved_samples, zone_proofs
 from verify.surface.surface_cuts import SurfaceCuts, reach_of, surface_cuts
 from verify.surface.unread_work import unread_work
@@ -163,7 +163,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     dug = fine_plunges(moves, tools, fine, part.mesh.bounds, setup, threads,
                        unseen_cores(used, setup, met.spacing, met.upright))
     dug = dug[~np.isin(dug[:, 0], run.events[run.events[:, 1] == PLUNGE, 0])]
-    met_by = contact_findings(np.concatenate([run.events, dug]), moves, source, skins, tools, setup.tap_holes)
+    pressed = rapid_presses(tree, moves, tools, setup)
+    met_by = contact_findings(np.concatenate([run.events, dug, pressed]), moves, source, skins, tools, setup.tap_holes)
     turned, starts = untold_axes(framed, known, run.cut)
     findings = [*as_collisions(met_by, [p.program for p in framed]),
                 *cuts.gouges, *cuts.excluded, *loaded, *drills.findings, *turned, *_program_findings(framed),
@@ -194,10 +195,8 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
                      *deep_findings(scored.samples, cuts.residual, cuts.mover, cutting, source),
                      *slot_findings(scored.samples, cuts.residual, cutting, source)]
     notes = [*cuts.notes, *springs, *(note for p in framed for note in p.notes())]
-    dips = [Assumed(AssumedKind.BETWEEN_SAMPLES, round(met.dip, 3), "the fixtures are so large that a ball may enter "
-                    f"one by {met.dip:.3f} mm unseen", "give smaller boxes where tools go")] * (met.dip > DIP + 1e-9)
     tapping = {tools[k].number for k in np.unique(moves.tool[run.cut])}
-    taken = [*setup.assumed, *program_assumptions(framed, tools, setup, stated), *cuts.assumed, *dips, *drills.assumed,
+    taken = [*setup.assumed, *program_assumptions(framed, tools, setup, stated), *cuts.assumed, *drills.assumed,
              *starts, *(a for number, a in threads_taken.items() if number in tapping),
              *loose_assumptions(met.loose, moves, run.cut, source, tools),
              *body_assumptions(framed, part, moves, source, tools, setup, threads)]

@@ -13,6 +13,7 @@ from service.stages.preparation import machinable_triangles, table_height
 from service.stages.proof_samples import proof_samples
 from service.stages.sample_spacing import coarse_spacing
 from service.verification.named_touch import axis_lines
+from service.verification.own_ways import mill_ways
 from service.verification.tool_touch import ToolTouch
 from verify.model import Asked
 from verify.program.move_kinds import FEED
@@ -51,8 +52,9 @@ def asked_work(job: JobPart, frame: ProofFrame, program: Program,
         samples = joined([samples, proof_samples(frame.part, triangles[~np.isin(triangles, fine)], wide)])
     table = table_height(inputs, job.blank) if inputs.turns else None
     asked = frozenset[int]() if not ops.finishing else None if ops.faces is None else frozenset(face_numbers(ops.faces))
-    return samples, Asked(asked, ToolTouch(job.part, inputs, frame.rotation, table, axis_lines(program, inputs.bodies)),
-                          max(job.part.chord, job.part.deviation), whole)
+    touch = ToolTouch(job.part, inputs, frame.rotation, table, axis_lines(program, inputs.bodies),
+                      mill_ways(program, inputs.bodies))
+    return samples, Asked(asked, touch, max(job.part.chord, job.part.deviation), whole)
 
 
 def _axes(program: Program) -> F64:

@@ -22,6 +22,7 @@ from geometry.tool_body import ToolBody
 from service.stages.job_inputs import JobInputs
 from service.stages.preparation import obstacle_mesh
 from service.verification.named_touch import AxisLines, NamedTouch
+from service.verification.own_ways import MillWays, touched_on_ways
 from zones.machinable_area import SEEN
 from zones.reach.approach_cones import approach
 from zones.reach.index_orientations import AxisCoverage
@@ -40,13 +41,14 @@ class ToolTouch:
     turn   : (3, 3) float64, dimensionless, from the setup frame to that of the proof
     table  : mm, setup frame, height of the machine table, which a tilted tool must avoid; None: no table
     lines  : of drills and taps, frame of the proof, as ``service.verification.named_touch.axis_lines``
+    ways   : of mills, frame of the proof, as ``service.verification.own_ways.mill_ways``
     """
 
     def __init__(self, part: Part, inputs: JobInputs, turn: F64, table: float | None,
-                 lines: Mapping[int, AxisLines]) -> None:
+                 lines: Mapping[int, AxisLines], ways: Mapping[int, MillWays]) -> None:
         matrix = np.eye(4)
         matrix[:3, :3] = turn
-        self.inputs = inputs
+        self.inputs, self.ways = inputs, ways
         self.bare = TriangleTree(part.mesh.transformed(matrix))
         self.clamped = bool(inputs.fixtures) or table is not None
         self.obstacles = TriangleTree(obstacle_mesh(part, inputs, table=table).transformed(matrix)) \
@@ -92,6 +94,22 @@ class ToolTouch:
             out[rows] = approach(self.obstacles, tool, self.inputs.clearances, samples.points[rows],
                                  samples.normals[rows], axes, lift,
                                  self.inputs.quality.stock_allowance_mm).any(axis=1)
+        return out
+
+    def on_ways(self, samples: SurfaceSamples, tools: Sequence[ToolBody], axes: F64, lift: float) -> BOOL:
+        """Samples that a mill touches where its own feed moves take it, as low as part and fixtures let it go.
+
+        samples : SurfaceSamples, frame of the proof
+        axes    : (k, 3) float64, unit, tip to spindle, frame of the proof
+        lift    : mm, distance from the sample within which a touch counts, over the allowance
+
+        Returns (n,) bool.
+        """
+        out = np.zeros(len(samples), np.bool_)
+        for tool in (t for t in tools if t.number in self.ways):
+            rows = np.flatnonzero(~out)
+            out[rows] = touched_on_ways(self.obstacles, samples.points[rows], tool, self.ways[tool.number], axes,
+                                        self.inputs.clearances, lift, self.inputs.quality.stock_allowance_mm)
         return out
 
     def reasons(self, samples: SurfaceSamples, tools: Sequence[ToolBody], axes: F64) -> NDArray[np.object_]:

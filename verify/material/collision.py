@@ -27,8 +27,10 @@ DIP = 0.005  # mm, largest unseen penetration of a ball between the points of a 
 MAX_FIXTURE_POINTS = 1_500_000
 
 
-def fixture_points(setup: ProofSetup, bounds: F64, moves: Moves, tools: Sequence[ToolBody]) -> tuple[F64, float]:
-    """Points on the faces of the fixtures near the moves.
+def fixture_points(setup: ProofSetup, bounds: F64, moves: Moves, tools: Sequence[ToolBody]) -> F64:
+    """Points on the faces of the fixtures near the moves, for the clearances of bodies and rapids.
+
+    Contacts are exact (``verify.material.fixture_contact``).
 
     They are at most 0.25 mm apart, and closer for thin tools: half a radius, and close enough that no ball enters a
     face by 0.005 mm between them.
@@ -36,11 +38,8 @@ def fixture_points(setup: ProofSetup, bounds: F64, moves: Moves, tools: Sequence
     bounds : (2, 3) float64, mm, setup frame, of the part; a fixture reaches down to its underside, or lower
     moves, tools : places that no tool can reach are left out
 
-    Returns
-    -------
-    points : (n, 3) float64, mm, setup frame: tops, sides and undersides, edges and corners included
-    dip    : mm, largest unseen penetration of a ball of any of the tool radii; more than 0.005 only where that would
-             need over 1.5 million points
+    Returns (n, 3) float64, mm, setup frame: tops, sides and undersides, edges and corners included. The points are
+    wider apart where that would need over 1.5 million.
     """
     boxes = _near_boxes(setup, bounds, moves, tools)
     radii = [t.radius for t in tools]
@@ -52,7 +51,7 @@ def fixture_points(setup: ProofSetup, bounds: F64, moves: Moves, tools: Sequence
         out.extend(_sheet(x, y, np.array([v])) for v in (high[2], under))
         out.extend(_sheet(x, np.array([v]), z) for v in (low[1], high[1]))
         out.extend(_sheet(np.array([v]), y, z) for v in (low[0], high[0]))
-    return np.concatenate(out), max((_dip(r, spacing) for r in radii), default=0.0) if boxes else 0.0
+    return np.concatenate(out)
 
 
 def _fixture_spacing(boxes: Sequence[tuple[F64, F64, float]], radii: Sequence[float]) -> float:
@@ -61,11 +60,6 @@ def _fixture_spacing(boxes: Sequence[tuple[F64, F64, float]], radii: Sequence[fl
     finest = min((min(0.5 * r, (4.0 * DIP * r - 2.0 * DIP**2) ** 0.5) for r in radii if r > DIP),
                 default=FIXTURE_SPACING)
     return max(min(FIXTURE_SPACING, finest), (area / MAX_FIXTURE_POINTS) ** 0.5)
-
-
-def _dip(radius: float, spacing: float) -> float:
-    """Penetration of a ball, mm, when it meets the corners of a square of points above whose middle it comes down."""
-    return radius - float(max(radius * radius - 0.5 * spacing * spacing, 0.0)) ** 0.5
 
 
 def _near_boxes(setup: ProofSetup, bounds: F64, moves: Moves,
@@ -95,19 +89,6 @@ def _sheet(x: F64, y: F64, z: F64) -> F64:
     return np.stack(np.meshgrid(x, y, z, indexing="ij"), -1).reshape(-1, 3)
 
 
-def _over_the_rim(tools: Sequence[ToolBody]) -> F64:
-    """``cutter_table`` where thin rims have a side above them, (k, 6) float64, mm.
-
-    The upper rim of a cone, or of very short flutes, could pass between two rows of points where the neck over it is
-    thinner. So its side goes on for two distances of rows: a row meets it that is one of them below its end, or more.
-    """
-    out, high = cutter_table(tools), 2.0 * FIXTURE_SPACING
-    thin = [t.neck_diameter < 2.0 * t.widest_radius
-            and (t.taper > 0.0 or t.flute_length - max(t.corner_radius, t.cone_height) < high) for t in tools]
-    out[thin, 2] += high
-    return out
-
-
 def run_clashes(points: F64, fixed: NDArray[np.bool_], moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, *,
                 threads: int = 2, progress: Progress | None = None, bow: float = BOW,
                 rapids: RapidArrays | None = None) -> tuple[F64, int]:
@@ -124,7 +105,7 @@ def run_clashes(points: F64, fixed: NDArray[np.bool_], moves: Moves, tools: Sequ
         return np.zeros((0, 7)), 0
     tree, axes = PointTree.build(points), moves.axes or ToolAxes.upright(len(moves))
     cloud = PointArrays(np.ascontiguousarray(points[tree.order]), np.ascontiguousarray(fixed[tree.order]), tree.balls)
-    sizes = Bodies.of(tools, setup).arrays(_over_the_rim(tools), end_radii(tools, setup.tap_holes))
+    sizes = Bodies.of(tools, setup).arrays(cutter_table(tools), end_radii(tools, setup.tap_holes))
     known = rapid_arrays(moves, setup) if rapids is None else rapids
     steps, turns, limits = moves.arrays, axes.arrays(bow), contact_limits(setup)
 

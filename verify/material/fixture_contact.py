@@ -127,7 +127,8 @@ def _bodies(tool: ToolBody, setup: ProofSetup) -> Iterator[TurnedOutline]:
         yield TurnedOutline(np.array([[r0 - clear, z0], [r1 - clear, z1]]), int(part), clear)
 
 
-def _within_reach(moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup, boxes: Sequence[F64]) -> NDArray[np.bool_]:
+def _within_reach(moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,
+                  boxes: Sequence[F64]) -> NDArray[np.bool_]:
     """(m,) bool: moves whose whole tool comes as near to a fixture as its reach."""
     reach = Bodies.of(tools, setup).reach(cutter_table(tools))[moves.tool][:, None]
     low, high = np.minimum(moves.start, moves.end) - reach, np.maximum(moves.start, moves.end) + reach
@@ -217,7 +218,7 @@ def _support_point(one: _Sweep, body: TurnedOutline, n: F64) -> F64:
 
 
 def _least_overlap(one: _Sweep, body: TurnedOutline, box: F64) -> tuple[float, F64]:
-    """The least of h_A(-n) + h_B(n) that a search finds, mm, and its direction n, (3,), the way of the body out of the box.
+    """The least of h_A(-n) + h_B(n) that a search finds, mm, and its direction n, (3,): the way of the body out.
 
     Every direction tells of a way out, so the least is never too small.
 

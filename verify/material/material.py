@@ -39,14 +39,12 @@ class MaterialContacts:
     run     : StockPass; its events include those of the part, the deeper first
     spacing : mm between the lines or nodes of the stock
     upright : whether the stock was a field of vertical lines
-    dip     : mm, largest unseen penetration of a ball into a fixture
     loose   : pieces of the stock that the moves cut off from what is held
     """
 
     run: StockPass
     spacing: float
     upright: bool
-    dip: float
     loose: Sequence[LoosePiece]
 
 
@@ -72,7 +70,7 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
         upright = not _undercuts(run, moves, setup)
         dug = dug if upright else run.events[run.events[:, 1] == PLUNGE]  # lines know plunges better than the field
         moves = moves if upright else replace(moves, axes=ToolAxes.upright(len(moves)))
-    held, dip = fixture_points(setup, mesh.bounds, moves, tools)
+    held = fixture_points(setup, mesh.bounds, moves, tools)
     if upright:
         met, lost = run_bodies(points, moves, tools, setup, threads=threads, progress=stages.span(0.6, 0.8))
         met, lost = _with_points(met, lost, points, ~moves.feed, False, moves, tools, setup, threads)
@@ -91,7 +89,7 @@ def contacts(mesh: TriangleMesh, points: F64, moves: Moves, tools: Sequence[Tool
         spacing = field.step
     met = np.concatenate([met, fixture_contacts(moves, tools, setup, mesh.bounds, rapid_arrays(moves, setup))])
     return MaterialContacts(_of_origin(_merge(run.events, met), run, lost, origin, moves, given, tools),
-                    spacing, upright, dip, loose)
+                    spacing, upright, loose)
 
 
 def _lines(mesh: TriangleMesh, spacing: float, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup,

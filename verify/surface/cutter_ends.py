@@ -1,16 +1,16 @@
 """Where ends of cutters press deepest into the part: rays there see pits and lenses that lie between the guard points.
 
 A cut that is narrow to all sides mostly ends where the path turns: down and up, in and out. So the end of a tool is
-looked at wherever a feed move ends at a corner of the path, and at even distances along all feed moves. Of a tapered
-mill that is its end, and the rim where its flutes end: no other place of it is farther out. The points of
-drills and pointed chamfer mills have findings of their own. Coordinates are float64, mm, in the setup frame.
+looked at wherever a feed move ends at a corner of the path, and at even distances along all feed moves. So is the rim
+where the flutes end, if the tool is thinner over it. The points of drills and pointed chamfer mills have findings of
+their own. Coordinates are float64, mm, in the setup frame.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.nearest import nearest
-from geometry.mesh_queries.rays import first_hits
 from geometry.tool_body import ToolBody
 from verify.assumptions import Assumed, AssumedKind
 from verify.findings import Source, gouge_findings
-from verify.model import Finding
+from verify.kernels.stock import CUTTER
+from verify.model import Finding, ProofSetup
 from verify.moves import Moves
 from verify.surface.guard_points import CLOSER_SHARE, GUARD_SPACING, PATH_BATCH, inside_part, path_places
 from verify.tool_axes import square_to
@@ -34,6 +34,8 @@ ENDS_AROUND = 8  # places of each ring of ``end_depths``
 TILTS = (0.0, 0.25 * math.pi, 0.5 * math.pi)  # of rings on a corner, from its lowest place to its side
 AROUND = 16  # places round the rim of an end
 ROUNDS = 4  # of the search round the deepest of them
+RELIEF = 1e-6  # mm by which a neck is thinner than the rim below it, in radius
+OVERHANG = -0.02  # normal along the axis: the side of a cylinder meets a steeper surface before its upper rim does
 LIFT, LIFT_SHARE = 0.05, 0.25  # mm, and of the radius: a second rim over the sharp one, for walls
 TOLD = 0.5  # mm: a wider step along the ways is a note
 THIN = 0.05  # mm
@@ -97,14 +99,15 @@ def turning_feet(tree: TriangleTree, moves: Moves, tools: Sequence[ToolBody],
     """
     found, notes = list[Feet](), list[Assumed]()
     least = CLOSER_SHARE * tolerance
+    hanging = _overhangs(tree.mesh) if moves.axes is None else None
     for k, tool in enumerate(tools):
-        if tool.cone_height <= 0.0:
-            rows, share = _corners(moves, k)
-            found += [_pressed(tree, *_placed(moves, rows, share, tool, tree.mesh.bounds), ring, least)
-                      for ring in (_end(tool), *_rims(tool))]
-        along = [] if tool.cone_height > 0.0 else [*([] if _seen(tool, least, tolerance) else [_end(tool)]),
-                                                   *(_rims(tool) if tool.taper > 0.0 else [])]
-        if along:
+        upper, cone = _upper_rims(tool), max(tool.taper, tool.cone_height) > 0.0
+        over = hanging if not cone else None  # an upright side meets all else before the rim over it does
+        at = _placed(moves, *_corners(moves, k), tool, tree.mesh.bounds)
+        found += [_pressed(tree, *at, ring, least) for ring in (*_ends(tool), *_rims(tool))]
+        found += [_pressed(tree, *_beside(over, at, ring), ring, least) for ring in upper]
+        along = [*([] if _seen(tool, least, tolerance) else _ends(tool)), *(_rims(tool) if cone else [])]
+        if along or upper and (over is None or len(over)):
             rows, share, step = _ways(moves, k, tool, tree.mesh.bounds)
             if step > TOLD:
                 notes.append(Assumed(AssumedKind.BETWEEN_SAMPLES, round(step, 2), f"the paths of {tool.id} are long: a "
@@ -112,6 +115,7 @@ def turning_feet(tree: TriangleTree, moves: Moves, tools: Sequence[ToolBody],
                                      "end", "verify a part of the program at a time"))
             at = _placed(moves, rows, share, tool, tree.mesh.bounds)
             found += [_pressed(tree, *at, ring, least) for ring in along]
+            found += [_pressed(tree, *_beside(over, at, ring), ring, least) for ring in upper]
     return _joined(found).thinned(), notes
 
 
@@ -172,12 +176,7 @@ def _ways(moves: Moves, k: int, tool: ToolBody, bounds: F64) -> tuple[INT, F64, 
 
 def _placed(moves: Moves, row: INT, share: F64, tool: ToolBody, bounds: F64) -> tuple[F64, F64]:
     """Tips and axes, (n, 3) mm and unit, at shares of moves, where the end of the tool can reach the part."""
-    tip = moves.start[row] + share[:, None] * (moves.end - moves.start)[row]
-    axis = np.tile([0.0, 0.0, 1.0], (len(row), 1))
-    if moves.axes is not None:
-        turn = (share * moves.axes.angle[row])[:, None]
-        axis = np.cos(turn) * moves.axes.axis[row] + np.sin(turn) * np.cross(moves.axes.about[row],
-                                                                              moves.axes.axis[row])
+    tip, axis = _posed(moves, row, share)
     far = 2.0 * _far(tool)
     near = ((tip > bounds[0] - far) & (tip < bounds[1] + far)).all(axis=1)
     both = np.round(np.column_stack([tip, axis])[near], 7)
@@ -186,13 +185,30 @@ def _placed(moves: Moves, row: INT, share: F64, tool: ToolBody, bounds: F64) -> 
     return both[:, :3], both[:, 3:]
 
 
+def _posed(moves: Moves, row: INT, share: F64) -> tuple[F64, F64]:
+    """Tips and axes, (n, 3) mm and unit, at shares of moves."""
+    tip = moves.start[row] + share[:, None] * (moves.end - moves.start)[row]
+    axis = np.tile([0.0, 0.0, 1.0], (len(row), 1))
+    if moves.axes is not None:
+        turn = (share * moves.axes.angle[row])[:, None]
+        axis = np.cos(turn) * moves.axes.axis[row] + np.sin(turn) * np.cross(moves.axes.about[row],
+                                                                              moves.axes.axis[row])
+    return tip, axis
+
+
 def _far(tool: ToolBody) -> float:
     """How far from its tip a tool is looked at, mm."""
-    return tool.radius if tool.taper <= 0.0 else math.hypot(tool.widest_radius, tool.flute_length)
+    whole = max(tool.taper, tool.cone_height) > 0.0 or len(_upper_rims(tool)) > 0
+    return math.hypot(tool.widest_radius, tool.flute_length) if whole else tool.radius
 
 
 def _pressed(tree: TriangleTree, tip: F64, axis: F64, ring: _Ring, least: float) -> Feet:
-    """The deepest place of each pose (n, 3) that presses in by more than ``least`` mm, on a ring.
+    """As ``_pressed_poses``, without the poses."""
+    return _pressed_poses(tree, tip, axis, ring, least)[0]
+
+
+def _pressed_poses(tree: TriangleTree, tip: F64, axis: F64, ring: _Ring, least: float) -> tuple[Feet, INT]:
+    """The deepest place of each pose (n, 3) that presses in by more than ``least`` mm, on a ring, and the poses.
 
     An end presses in nowhere by ``least`` where its middle is in air and no surface comes nearer to it than its rim is
     by as much: the way from the middle to a place so deep in the part goes through the surface before.
@@ -201,9 +217,11 @@ def _pressed(tree: TriangleTree, tip: F64, axis: F64, ring: _Ring, least: float)
     alone = np.flatnonzero(nearest(tree, middle, reach)[1] < 0) if reach > 0.0 else np.arange(len(tip))
     may = np.ones(len(tip), np.bool_)
     may[alone] = _inside_alone(tree, middle[alone], max(reach, SPARE))
-    tip, axis = tip[may], axis[may]
-    return _joined([_deepest(tree, tip[i:i + BATCH], axis[i:i + BATCH], ring, least)
-                    for i in range(0, len(tip), BATCH)])
+    poses = np.flatnonzero(may)
+    found = [_deepest(tree, tip[poses[i:i + BATCH]], axis[poses[i:i + BATCH]], ring, least)
+             for i in range(0, len(poses), BATCH)]
+    rows = [poses[i * BATCH + row] for i, (_, row) in enumerate(found)]
+    return _joined([feet for feet, _ in found]), np.concatenate([np.zeros(0, np.int64), *rows])
 
 
 def _inside_alone(tree: TriangleTree, points: F64, radius: float) -> NDArray[np.bool_]:
@@ -226,17 +244,42 @@ def _inside_alone(tree: TriangleTree, points: F64, radius: float) -> NDArray[np.
     return out
 
 
-def _end(tool: ToolBody) -> _Ring:
-    return _Ring(tool.radius - tool.corner_radius, tool.corner_radius, tool.corner_radius)
+def _ends(tool: ToolBody) -> list[_Ring]:
+    """The end of a mill, or the rim of the flat at the tip of a cone."""
+    if tool.cone_height > 0.0:
+        return [_Ring(0.5 * tool.tip_diameter, 0.0, 0.0)] if tool.tip_diameter > 0.0 else []
+    return [_Ring(tool.radius - tool.corner_radius, tool.corner_radius, tool.corner_radius)]
 
 
 def _rims(tool: ToolBody) -> list[_Ring]:
-    """Of a sharp end a rim over it, and of a tapered mill the upper end of its side."""
-    out = [] if tool.corner_radius > 0.0 else [_Ring(tool.radius, min(LIFT, LIFT_SHARE * tool.radius), 0.0)]
-    return [*out, _Ring(tool.widest_radius, tool.flute_length, 0.0)] if tool.taper > 0.0 else out
+    """Of a sharp end a rim over it, and of a cone the edge where its side begins."""
+    if tool.along_axis_only or tool.corner_radius > 0.0:
+        return []
+    return [_Ring(tool.radius, max(tool.cone_height, min(LIFT, LIFT_SHARE * tool.radius)), 0.0)]
 
 
-def _deepest(tree: TriangleTree, tip: F64, axis: F64, on: _Ring, least: float) -> Feet:
+def _upper_rims(tool: ToolBody) -> list[_Ring]:
+    """The upper end of the flutes, where the tool over them is thinner."""
+    if tool.along_axis_only or tool.taper <= 0.0 and 0.5 * tool.neck_diameter > tool.widest_radius - RELIEF:
+        return []
+    return [_Ring(tool.widest_radius, tool.flute_length, 0.0)]
+
+
+def _overhangs(mesh: TriangleMesh) -> TriangleTree:
+    """The triangles of a mesh that face down."""
+    rows = mesh.normals[:, 2] < OVERHANG
+    return TriangleTree(TriangleMesh(mesh.vertices, mesh.faces[rows]))
+
+
+def _beside(over: TriangleTree | None, at: tuple[F64, F64], ring: _Ring) -> tuple[F64, F64]:
+    """Those of tips and axes, (n, 3) mm and unit, whose ring comes near to triangles; all where None."""
+    if over is None or not len(over):
+        return at if over is None else (at[0][:0], at[1][:0])
+    near = nearest(over, at[0] + ring.high * at[1], ring.reach + SPARE)[1] >= 0
+    return at[0][near], at[1][near]
+
+
+def _deepest(tree: TriangleTree, tip: F64, axis: F64, on: _Ring, least: float) -> tuple[Feet, INT]:
     x = square_to(axis)
     y = np.cross(axis, x)
     ring, ball = on.radius, on.grown
@@ -275,29 +318,82 @@ def _deepest(tree: TriangleTree, tip: F64, axis: F64, on: _Ring, least: float) -
             angle[at] = turned[better]
         span *= 0.5
     rows = rows[deep[rows] > least]
-    return Feet(foot[rows], way[rows], triangle[rows], deep[rows])
+    return Feet(foot[rows], way[rows], triangle[rows], deep[rows]), rows
 
 
-def tip_gouges(mesh: TriangleMesh, moves: Moves, tools: Sequence[ToolBody], source: Source,
+def tip_gouges(tree: TriangleTree, moves: Moves, tools: Sequence[ToolBody], source: Source,
                tolerance: float) -> list[Finding]:
-    """Findings where feed moves of pointed tools end with the tip more than ``tolerance`` mm inside the part.
+    """Findings where feed moves take the tip of a pointed tool more than ``tolerance`` mm into the part.
 
     The surface below a point is the farthest from it where a hole ends in a cone: no normal of the cone leads there. So
     the depth of a tip is its own distance from the part.
     """
     pointed = np.array([t.cone_height > 0.0 and t.tip_diameter <= 0.0 for t in tools], np.bool_)
-    if not pointed.any() or not len(moves):
+    if not len(moves) or not pointed[moves.tool].any():
         return []
-    rows, tree = np.flatnonzero(moves.feed & pointed[moves.tool]), TriangleTree(mesh)
-    tips, which = np.unique(np.round(moves.end[rows], 6), axis=0, return_index=True)
+    tips, row, depth, triangle = _sunk_tips(tree, moves, moves.feed & pointed[moves.tool], tolerance)
+    return gouge_findings(tips, tree.mesh.face_ids[triangle], depth, np.zeros(len(tips)), row.astype(np.int32), source,
+                          tolerance)
+
+
+def _sunk_tips(tree: TriangleTree, moves: Moves, chosen: NDArray[np.bool_],
+               tolerance: float) -> tuple[F64, INT, F64, INT]:
+    """Tips of moves, at both ends and along them, that are more than ``tolerance`` mm in the part.
+
+    chosen : (m,) bool, the moves
+
+    Returns tips (n, 3) mm, moves (n,), depths (n,) mm, and nearest triangles (n,).
+    """
+    rows = np.flatnonzero(chosen)
+    low, high = np.minimum(moves.start, moves.end)[rows], np.maximum(moves.start, moves.end)[rows]
+    rows = rows[((low < tree.mesh.bounds[1]) & (high > tree.mesh.bounds[0])).all(axis=1)]
+    length = np.linalg.norm((moves.end - moves.start)[rows], axis=1)
+    step = max(STEP, float(length.sum()) / MAX_BALLS)
+    count = np.ceil(length / step).astype(np.int64) + 1
+    of = np.repeat(np.arange(len(rows)), count)
+    nth = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
+    share = np.clip(nth / np.maximum(count - 1, 1)[of], 0.0, 1.0)[:, None]
+    tips = np.round(moves.start[rows[of]] + share * (moves.end - moves.start)[rows[of]], 6)
+    tips, which = np.unique(tips, axis=0, return_index=True)
     depth, triangle, _ = nearest(tree, tips)
     deep = np.flatnonzero(depth > tolerance)
-    up = np.tile([0.0, 0.0, 1.0], (len(deep), 1))
-    _, met = first_hits(tree, tips[deep], up)
-    # a tip is inside where the surface over it is met from inside
-    inside = deep[(met >= 0) & (mesh.normals[met, 2] > 0.0)]
-    return gouge_findings(tips[inside], mesh.face_ids[triangle[inside]], depth[inside], np.zeros(len(inside)),
-                          rows[which[inside]].astype(np.int32), source, tolerance)
+    deep = deep[inside_part(tree, tips[deep])]
+    return tips[deep], rows[of[which[deep]]], depth[deep], triangle[deep]
+
+
+def rapid_presses(tree: TriangleTree, moves: Moves, tools: Sequence[ToolBody], setup: ProofSetup) -> F64:
+    """Contacts of ends of cutters with the part in rapids, where the rapid clearance is below ``GUARD_SPACING``.
+
+    With more clearance the points of the part tell of every rapid that comes as near.
+
+    Returns (e, 7) float64, mm, setup frame, rows of events as in ``verify.kernels.stock``.
+    """
+    out = [np.zeros((0, 7))]
+    if setup.clearance_rapid >= GUARD_SPACING or moves.feed.all():
+        return out[0]
+    clear, tolerance = setup.clearance_rapid, setup.gouge_tolerance
+    for k, tool in enumerate(tools):
+        mine = ~moves.feed & (moves.tool == k)
+        if tool.cone_height > 0.0 and tool.tip_diameter <= 0.0:
+            tips, row, depth, _ = _sunk_tips(tree, moves, mine, tolerance)
+            out.append(_contacts(row, depth, clear, tips))
+        fed = replace(moves, feed=mine)
+        rows, share, _ = _ways(fed, k, tool, tree.mesh.bounds)
+        row = np.concatenate([rows, np.flatnonzero(mine)])
+        share = np.concatenate([share, np.ones(int(mine.sum()))])
+        tip, axis = _posed(moves, row, share)
+        for ring in (*_ends(tool), *_rims(tool), *_upper_rims(tool)):
+            feet, pose = _pressed_poses(tree, tip, axis, ring, tolerance)
+            out.append(_contacts(row[pose], feet.depth, clear, feet.points))
+    return np.concatenate(out)
+
+
+def _contacts(row: INT, depth: F64, clear: float, at: F64) -> F64:
+    """Events of the cutting part in moves, (n, 7), the deepest of each move."""
+    order = np.lexsort((-depth, row))
+    order = order[np.unique(row[order], return_index=True)[1]]
+    return np.column_stack([row[order], np.full(len(order), float(CUTTER)), clear + depth[order],
+                            np.full(len(order), clear), at[order]])
 
 
 def end_depths(tree: TriangleTree, moves: Moves, rows: INT, tools: Sequence[ToolBody],

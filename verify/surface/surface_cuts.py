@@ -172,7 +172,7 @@ def surface_cuts(part: Part, tools: Sequence[ToolBody], setup: ProofSetup, score
     table = _at_ends(parts, tree, shot)
     gouged = np.flatnonzero((table.residual < -setup.gouge_tolerance - RAY_ERROR) & (table.mover >= 0))
     by = _by_own_tool(table, gouged, tree, shot)
-    tips = tip_gouges(part.mesh, moves, tools, source, setup.gouge_tolerance + RAY_ERROR)
+    tips = tip_gouges(tree, moves, tools, source, setup.gouge_tolerance + RAY_ERROR)
     watch = np.arange(len(s), first)
     sunk = np.clip(table.residual[watch], -setup.gouge_tolerance, 0.0)
     left = table.points[watch] + sunk[:, None] * table.normals[watch]

@@ -97,8 +97,9 @@ def work_done(asked: Asked, measured: Measured, cutting: Cutting, cut: BOOL, sou
 
     1. A tool touches it with room of h + e to everything else, and more than h + e stands on it. That room keeps away
        from stock that other faces may keep.
-    2. A tool without such room comes within h / 2 of it, and more than 1.5 h + e stands on it, along the normal and
-       along the shortest way out. Of stock that a drill or tap left, the depth that it must still go counts instead.
+    2. A tool without such room comes within h / 2 of it, anywhere or on its own ways, and more than 1.5 h + e stands on
+       it, along the normal and along the shortest way out. Of stock that a drill or tap left, the depth that it must
+       still go counts instead.
        The sharp edge of a flat end comes near a slope in this sense where moves have left stock that is even to h, as
        the fine steps do that finish a slope.
 
@@ -209,6 +210,8 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     left[high] = reached(high, limits.lift, limits.face)
     tight = high[~left[high]]
     touched = tight[reached(tight, limits.near, 0.0)]
+    beyond = np.setdiff1d(tight, touched)
+    touched = np.union1d(touched, beyond[asked.touch.on_ways(few.subset(beyond), tools, axes, limits.near)])
     beyond = np.setdiff1d(tight, touched)
     stepped = beyond[(mover[beyond] >= 0) & _in_fine_steps(few, height, beyond, limits)]
     touched = np.union1d(touched, stepped[asked.touch.edges(few.subset(stepped), tools, axes, limits.near)])

@@ -9,8 +9,10 @@ import pytest
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.tool_body import ToolBody
 from tests.hand_parts import box_mesh, prism, terraces, tool
+from verify.findings import Source
+from verify.model import ProofSetup
 from verify.moves import Moves
-from verify.surface.cutter_ends import turning_feet
+from verify.surface.cutter_ends import rapid_presses, tip_gouges, turning_feet
 from verify.tool_axes import ToolAxes
 
 DEG = 20.0
@@ -120,3 +122,45 @@ def test_a_rim_is_looked_at_where_its_axis_turns_back(kind):
     wall = box_mesh([-10.0, 1.0, -4.0], [10.0, 3.0, 0.0])
     feet, _ = turning_feet(TriangleTree(wall), moves, [mill], 0.01)
     assert len(feet.depth) and feet.depth.max() == pytest.approx(over, abs=1e-3)
+
+
+OVERHANG = prism([(6.0, 8.0), (10.0, 4.0), (10.0, 0.0), (16.0, 0.0), (16.0, 10.0), (6.0, 10.0)],
+                 [(0, 1, 5), (1, 4, 5), (1, 2, 3), (1, 3, 4)], 12.0)  # x + z = 14 faces down
+
+
+@pytest.mark.parametrize("depth", [0.03, 0.08, -0.01])
+@pytest.mark.parametrize("y", [4.513, 3.07])
+def test_the_upper_rim_of_a_slot_cutter_under_an_overhang_is_found(depth, y):
+    body = replace(tool(2.0, 0.0, neck=18.0, stickout=30.0), flute_length=0.5, neck_diameter=0.7)
+    x = 14.0 - 7.511 - 1.0 + depth * math.sqrt(2.0)
+    at = [(x - 4.0, y, 7.011), (x, y, 7.011), (x - 4.0, y, 7.011)]
+    feet, _ = turning_feet(TriangleTree(OVERHANG.mesh), moves(*at), [body], 0.01)
+    assert (len(feet.points) > 0) == (depth > 0)
+    assert not len(feet.depth) or feet.depth.max() == pytest.approx(depth, rel=0.02)
+    thick = replace(body, neck_diameter=2.0)  # a side that goes on up meets the overhang with all its length
+    assert len(turning_feet(TriangleTree(OVERHANG.mesh), moves(*at), [thick], 0.01)[0].points) == 0
+
+
+@pytest.mark.parametrize("angle, diameter, depth", [(150.0, 4.0, 0.03), (90.0, 3.0, 0.02), (120.0, 2.0, 0.03)])
+def test_the_rim_of_a_chamfer_mill_pressed_aside_into_a_wall_is_found(angle, diameter, depth):
+    high = 0.5 * diameter / math.tan(math.radians(0.5 * angle))
+    body = ToolBody("T1", 1, diameter, 0.0, high, 0.8, 18.0, 0.8, 30.0, (), "chamfer", 0.0, high)
+    wall = TriangleTree(box_mesh((8.0, 0.0, 0.0), (16.0, 12.0, 9.0)))
+    at = (8.0 - 0.5 * diameter + depth, 4.513, 3.0)
+    feet, _ = turning_feet(wall, moves((2.0, 4.513, 3.0), at, (2.0, 4.513, 3.0)), [body], 0.01)
+    assert feet.depth.max() == pytest.approx(depth, rel=1e-6)
+
+
+def test_the_point_of_a_chamfer_mill_is_found_along_its_way_and_in_rapids_without_clearance():
+    plate, half = TriangleTree(box_mesh((0.0, 0.0, 0.0), (16.0, 12.0, 3.0))), math.radians(10.0)
+    body = ToolBody("T1", 1, 3.0, 0.0, 8.6, 3.0, 8.6, 3.0, 30.0, (), "chamfer", 0.0, 1.5 / math.tan(half))
+    across = moves((-5.0, 6.03, 2.95), (21.0, 6.03, 2.95))
+    none = np.zeros(1, np.int32)
+    gouges = tip_gouges(plate, across, [body], Source(("p",), none, none + 7, none + 1), 0.01)
+    assert [(f.line, round(f.depth, 6)) for f in gouges] == [(7, 0.05)]
+    setup = ProofSetup(clearance_rapid=0.0, gouge_tolerance=0.01)
+    rapid = replace(across, feed=np.zeros(1, bool))
+    found = rapid_presses(plate, rapid, [body], setup)
+    assert found[:, 2].max() == pytest.approx(0.05) and set(found[:, 0]) == {0.0}
+    assert not len(rapid_presses(plate, across, [body], setup))
+    assert not len(rapid_presses(plate, rapid, [body], replace(setup, clearance_rapid=1.0)))

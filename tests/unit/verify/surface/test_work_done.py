@@ -35,6 +35,9 @@ class Everything:
     def edges(self, samples, tools, axes, lift):
         return np.zeros(len(samples), dtype=bool)
 
+    def on_ways(self, samples, tools, axes, lift):
+        return np.zeros(len(samples), dtype=bool)
+
     def reasons(self, samples, tools, axes):
         return np.full(len(samples), "corner", dtype=object)
 
