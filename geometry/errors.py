@@ -6,7 +6,8 @@
     │   ├── PartError             a readable shape that cannot be planned (open, several, size)
     │   ├── SetupError            tools, machine or tolerances contradict each other
     │   ├── ProgramError          an NC program cannot be read
-    │   └── LibraryError          a tool library cannot be read
+    │   ├── LibraryError          a tool library cannot be read
+    │   └── CapacityError         the job needs more than this machine has
     ├── GeometryError         a computation on valid input did not converge or overflowed
     ├── ResourceError         a child ran out of time or memory, or died of a signal
     ├── PlanningError         a plan could not be made although the input is valid
@@ -107,6 +108,12 @@ class LibraryError(InputError):
     default_code = "bad_library"
 
 
+class CapacityError(InputError):
+    """A job that needs more than this machine has in all, by its estimate."""
+
+    default_code = "machine_too_small"
+
+
 class GeometryError(CamError):
     """A computation on valid input did not converge."""
 
@@ -152,8 +159,8 @@ class InternalError(CamError):
 ERROR_CLASSES: dict[str, type[CamError]] = {
     c.__name__: c
     for c in (
-        CamError, InputError, StepError, PartError, SetupError, ProgramError, LibraryError, GeometryError,
-        ResourceError, PlanningError, VerificationError, OutputError, CancelledError, InternalError,
+        CamError, InputError, StepError, PartError, SetupError, ProgramError, LibraryError, CapacityError,
+        GeometryError, ResourceError, PlanningError, VerificationError, OutputError, CancelledError, InternalError,
     )
 }
 

@@ -8,6 +8,7 @@ from pydantic import Field
 from pydantic.json_schema import SkipJsonSchema
 
 from schemas.base import ReportModel
+from schemas.estimate import JobEstimate
 from schemas.machine import Machine
 from schemas.materials import Material
 from schemas.problem import Problem
@@ -86,6 +87,8 @@ class Job(ReportModel):
     attempt: Annotated[int, Field(ge=0, description="Number of starts of the job so far.")]
     resumed: Annotated[JobResumed | None, Field(
         description="Results that the newest attempt took over from earlier attempts; null: none.")] = None
+    estimate: Annotated[JobEstimate | None, Field(
+        description="What the job is expected to take; null until its part is read.")] = None
     content_sha256: Annotated[str, Field(
         description="Hash of part and canonical setup. If there are a blank, a program and spindle_tool, it covers "
                     "them too.")]
@@ -143,6 +146,9 @@ class JobEvent(ReportModel):
     state: JobState
     stage: str
     progress: Annotated[float, Field(ge=0, le=1)]
+    estimate: Annotated[JobEstimate | SkipJsonSchema[None], Field(
+        description="As in the job; absent until the part is read.",
+        json_schema_extra=lambda schema: schema.pop("default"))] = None
     resumed: Annotated[JobResumed | SkipJsonSchema[None], Field(
         description="As in the job; absent if the attempt took nothing "
                     "over.", json_schema_extra=lambda schema: schema.pop("default"))] = None

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from schemas.base import ReportModel
+from schemas.estimate import JobEstimate
 from schemas.zones import Remainder, Share, ZoneFacts, Zones
 
 Findings = Annotated[list[Any], Field(
@@ -207,6 +208,9 @@ class Report(Zones):
     complete: Annotated[bool, Field(description="true: the remainder is empty.")]
     labels: dict[str, str] = {}
     inputs: Inputs
+    estimate: Annotated[JobEstimate | None, Field(
+        description="What the job was expected to take, before it was planned. Reports of older releases have "
+                    "none.")] = None
     zones: list[PlannedZone]  # type: ignore[assignment]
     steps: Annotated[list[Any], Field(description="The workingsteps in machining order.")]
     findings: Findings
@@ -251,6 +255,8 @@ class Verification(ReportModel):
                     "not_in_program: the program does not work on the face. pass: places within the error of the "
                     "proof.")] = []
     proof: ProofFacts | None = None
+    estimate: Annotated[JobEstimate | None, Field(
+        description="What the verification was expected to take. Reports of older releases have none.")] = None
     warnings: Annotated[list[Caution], Field(
         description="Warnings: the program exceeds what tools and material recommend. They change no state.")] = []
     deviation: Annotated[list[FaceDeviation], Field(description="Figures by face number.")] = []

@@ -74,11 +74,13 @@ def plan(part: Part, setup: SetupPath,
     """Plan and prove a part; write report, zones, programs and STEP-NC into DIR, and the report to stdout."""
 
     def run(given: Setup, progress: Progress, blank: Path | None, reading: PartReading) -> tuple[Any, int]:
+        from service.commands.admission import admitted
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
         from service.pipeline import plan as plan_job
 
-        report = plan_job(part, given, out, progress, requested_mesh(mesh_step, mesh_box), blank_path=blank,
-                          reading=reading)
+        with admitted(progress) as admit:
+            report = plan_job(part, given, out, progress, requested_mesh(mesh_step, mesh_box), blank_path=blank,
+                              reading=reading, admit=admit)
         return report, EXIT_PROVED if report["state"] == "proved" else EXIT_UNPROVED
 
     with error_reporting(as_json):
@@ -91,9 +93,11 @@ def zones(part: Part, setup: SetupPath, data: Data = None, as_json: AsJson = Fal
     """Print zones.json: walls, connections, channels, zones, remainder."""
 
     def run(given: Setup, progress: Progress, blank: Path | None, reading: PartReading) -> tuple[Any, int]:
+        from service.commands.admission import admitted
         from service.pipeline import zones_only
 
-        return zones_only(part, given, progress, blank_path=blank, reading=reading), 0
+        with admitted(progress) as admit:
+            return zones_only(part, given, progress, blank_path=blank, reading=reading, admit=admit), 0
 
     _exit(part, setup, run, as_json, data)
 
@@ -127,13 +131,15 @@ def verify(part: Part, setup: SetupPath,
         first = read_first(given, text, access=access, spindle_tool=spindle_tool, dialect=known_dialect(dialect),
                            ending=program.suffix)
         # only now what takes seconds to import: a program that cannot be read is refused at once
+        from service.commands.admission import admitted
         from service.console import say, verification_summary
         from service.errors import EXIT_PROVED, EXIT_UNPROVED
         from service.pipeline import verify_program
 
         wish = requested_mesh(mesh_step or None, mesh_box) if out is not None else None
-        result = verify_program(part, given, text, progress, access, out, wish, spindle_tool, blank,
-                                known_dialect(dialect), program.suffix, first, reading)
+        with admitted(progress) as admit:
+            result = verify_program(part, given, text, progress, access, out, wish, spindle_tool, blank,
+                                    known_dialect(dialect), program.suffix, first, reading, admit)
         progress.close()
         say(verification_summary(result, time.monotonic() - started))
         return result, EXIT_PROVED if result["state"] == "proved" else EXIT_UNPROVED

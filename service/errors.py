@@ -134,6 +134,8 @@ ERROR_TABLE: dict[type[CamError], ErrorMapping] = {
     cam.SetupError: ErrorMapping(_S.UNPROCESSABLE_ENTITY, "bad-setup", "The setup is wrong", 2),
     cam.ProgramError: ErrorMapping(_S.UNPROCESSABLE_ENTITY, "bad-program", "The NC program cannot be read", 2),
     cam.LibraryError: ErrorMapping(_S.UNPROCESSABLE_ENTITY, "bad-library", "The tool library cannot be read", 2),
+    cam.CapacityError: ErrorMapping(_S.UNPROCESSABLE_ENTITY, "too-large-job", "The job is too large for this machine",
+                                    2),
     cam.GeometryError: ErrorMapping(_S.INTERNAL_SERVER_ERROR, "geometry-failed", "A computation did not converge", 1),
     cam.ResourceError: ErrorMapping(_S.SERVICE_UNAVAILABLE, "out-of-resources", "A limit was reached", 1),
     cam.PlanningError: ErrorMapping(_S.INTERNAL_SERVER_ERROR, "planning-failed", "No plan could be made", 1),

@@ -6,7 +6,7 @@ proves a program of any origin, without zones. No program is written before the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,8 @@ from service.delivery.machined_mesh import MESH_NAME, MeshWish, machined_part
 from service.delivery.result_files import Files, clear_results, deliver
 from service.delivery.stepnc_files import StepncUnderWay
 from service.delivery.written_program import WrittenProgram
+from service.estimate.estimate import Estimate
+from service.estimate.job_estimate import estimate_of
 from service.from_wire import check_plannable
 from service.part_reading import PartReading
 from service.pictures.proof_picture import MAP_NAME
@@ -29,7 +31,7 @@ from service.report import report as reporting
 from service.report.computed_ahead import ComputedAhead
 from service.stages.access_settings import FirstAccess, planning_stock, proof_setup
 from service.stages.cautions import sentences
-from service.stages.job_part import read_job_part
+from service.stages.job_part import JobPart, read_job_part
 from service.stages.plan_prove_loop import Planner, Progress, ProvedPlan, plan_and_prove
 from service.stages.preparation import Prepared, prepare
 from service.stages.programs import proof_frame
@@ -45,10 +47,13 @@ from toolpath.stock.stock_map import StockMap
 from verify.model import Proof
 from zones.reach.access_view import View
 
+Admit = Callable[[Estimate], None]
+"""Lets a job begin: it waits for room, or raises where the machine is too small."""
+
 
 def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: MeshWish | None = None,
          planner: Planner = plan_job, blank_path: Path | None = None, kept: Kept | None = None,
-         reading: PartReading | None = None) -> dict[str, Any]:
+         reading: PartReading | None = None, admit: Admit | None = None) -> dict[str, Any]:
     """Plan and prove a job and write its files into ``out``, from which those of an earlier job are removed.
 
     mesh       : also write the machined part as a mesh, in the frame of the proof
@@ -58,6 +63,7 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     kept       : plans and proofs that an earlier attempt at this job kept, and where this attempt keeps its own
                  (``service.stages.resume``); None: nothing is kept
     reading    : the reading of this part, where it has begun already
+    admit      : called with the estimate of the job once the part is read; it returns when the job may begin
 
     Returns
     -------
@@ -68,12 +74,13 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     Raises
     ------
     CamError
-        Wrong input, limits exceeded, or a bug.
+        Wrong input, limits exceeded, or a bug; or what ``admit`` raises.
     """
     check_plannable(setup)
     out.mkdir(parents=True, exist_ok=True)
     clear_results(out)
-    ready = prepare(part_path, setup, progress, blank_path=blank_path, reading=reading)
+    ready = prepare(part_path, setup, progress, blank_path=blank_path, reading=reading,
+                    begin=_admission(admit, "plan"))
     cautions = cautions_before_planning(ready)
     with StepncUnderWay(out) as stepnc, reporting.known_before_planning(ready) as known:
         job = _proved_plan(part_path, warned(ready, sentences(cautions)), kept or Kept(), planner, progress, stepnc,
@@ -82,6 +89,11 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
         report = deliver_job(job, cautions, out, mesh, progress, stepnc, known)
     progress("done", 1.0)
     return report
+
+
+def _admission(admit: Admit | None, kind: str) -> Callable[[JobPart], None] | None:
+    """What is called with a part that is read: it estimates the job of a kind and asks ``admit`` to let it begin."""
+    return None if admit is None else lambda job: admit(estimate_of(job, kind))
 
 
 def prove_plan(part_path: Path, setup: Setup, progress: Progress) -> Proof:
@@ -141,10 +153,10 @@ def _begun(part_path: Path, ready: Prepared) -> tuple[Prepared, Mapping[str, Seq
 
 
 def zones_only(part_path: Path, setup: Setup, progress: Progress, blank_path: Path | None = None,
-               reading: PartReading | None = None) -> dict[str, Any]:
+               reading: PartReading | None = None, admit: Admit | None = None) -> dict[str, Any]:
     """The dry check: walls, connections, channels, zones with their tools, and the remainder.
 
-    blank_path, reading : as in ``plan``
+    blank_path, reading, admit : as in ``plan``
 
     Raises
     ------
@@ -152,7 +164,8 @@ def zones_only(part_path: Path, setup: Setup, progress: Progress, blank_path: Pa
         As ``plan``.
     """
     check_plannable(setup)
-    ready = prepare(part_path, setup, progress, blank_path=blank_path, reading=reading)
+    ready = prepare(part_path, setup, progress, blank_path=blank_path, reading=reading,
+                    begin=_admission(admit, "zones"))
     ready = warned(ready, sentences(cautions_before_planning(ready)))
     out = reporting.dry_report(ready)
     progress("done", 1.0)
@@ -163,7 +176,7 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
                    access: str | None = None, out: Path | None = None, mesh: MeshWish | None = None,
                    spindle_tool: int = 0, blank_path: Path | None = None, dialect: str | None = None,
                    ending: str = "", program: ProgramFirst | None = None,
-                   reading: PartReading | None = None) -> dict[str, Any]:
+                   reading: PartReading | None = None, admit: Admit | None = None) -> dict[str, Any]:
     """Prove any program, NC code or STEP-NC, against the part: harm that it does, and work that it leaves undone.
 
     The program is read before the part. The part is not decomposed: no zone answers for a sample here. Stock that is
@@ -180,6 +193,7 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
                    of the machine (``verify.gcode.dialects.dialect_of``)
     program      : the same program, already read by ``service.verification.program_first.read_first``
     reading      : as in ``plan``
+    admit        : as in ``plan``
 
     Returns
     -------
@@ -195,6 +209,8 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
     first = program or read_first(setup, program_text, access=access, spindle_tool=spindle_tool, dialect=dialect,
                                   ending=ending)
     job = read_job_part(part_path, setup, progress, blank_path, reading)
+    if admit is not None:
+        admit(estimate_of(job, "verify"))
     made = proved_program(job, first, lambda f: progress("prove", 0.2 + 0.6 * f))
     frame, report, conditions, tools = made.frame, made.report, made.conditions, job.inputs.bodies
     if out is not None:

@@ -8,20 +8,32 @@ from __future__ import annotations
 import ipaddress
 import os
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import Field, SecretStr, field_validator
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic import Field, SecretStr, ValidationError, field_validator
+from pydantic_settings import BaseSettings, SettingsConfigDict, SettingsError
+
+from geometry.errors import SetupError
 
 
 def _cores() -> int:
     return max(1, len(os.sched_getaffinity(0)))
 
 
-class Settings(BaseSettings):
-    """Settings with their defaults."""
+class MemorySettings(BaseSettings):
+    """The settings that the command line takes from the environment too."""
 
     model_config = SettingsConfigDict(env_prefix="ZONEMILL_", env_ignore_empty=True, extra="ignore")
+
+    memory_mb: Annotated[int | None, Field(
+        ge=64, description="Memory that the jobs of one machine may take together, MB; unset: all that the machine or "
+                           "its container has.")] = None
+    memory_wait_s: Annotated[float, Field(
+        ge=0, description="How long a job waits for memory that other jobs of the machine take, s.")] = 3600.0
+
+
+class Settings(MemorySettings):
+    """Settings with their defaults."""
 
     host: Annotated[str, Field(description="Address to listen on.")] = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535, description="Port to listen on; 0: any free port.")] = 8000
@@ -128,6 +140,31 @@ class Settings(BaseSettings):
     def max_body_bytes(self) -> int:
         """Largest request body, bytes."""
         return int(self.max_body_mb * 1_000_000)
+
+
+AnySettings = TypeVar("AnySettings", bound=MemorySettings)
+
+
+def settings_of(kind: type[AnySettings], given: dict[str, Any]) -> AnySettings:
+    """Settings from the environment, overridden by those given in code; None is not given.
+
+    Raises
+    ------
+    SetupError
+        bad_setting: a setting has an invalid value.
+    """
+    from service.from_wire import problems_of
+
+    try:
+        return kind(**{k: v for k, v in given.items() if v is not None})
+    except SettingsError as error:
+        raise SetupError(f"the environment: {error}; the value must be JSON", code="bad_setting",
+                         remedy="docs/settings.md lists every setting") from None
+    except ValidationError as error:
+        problems = problems_of(error, "settings")
+        raise SetupError(f"setting {problems[0]['at']}: {problems[0]['problem']}", code="bad_setting",
+                         subjects=tuple(p["at"] for p in problems), measured=problems,
+                         remedy="docs/settings.md lists every setting") from None
 
 
 def is_loopback(host: str) -> bool:

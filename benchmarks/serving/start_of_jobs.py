@@ -45,7 +45,7 @@ def timed(kind: str, step: Path, setup: str, folder: Path, preloaded: bool) -> t
     try:
         supervise(request, ProcessLimits(600.0, 8_000_000_000, 1, 0.02, preloaded), folder / "scratch",
                   on_progress=lambda *_: seen.append(time.perf_counter()), on_resumed=lambda _: None,
-                  keep=lambda: True)
+                  on_estimate=lambda _: None, keep=lambda: True)
     except CamError as refusal:
         if kind == "small":
             raise

@@ -14,15 +14,12 @@ from typing import Any
 
 import structlog
 import uvicorn
-from pydantic import ValidationError
-from pydantic_settings import SettingsError
 
 from geometry.errors import CamError, SetupError
 from service.api.app import create_app
 from service.errors import UnavailableError
-from service.from_wire import problems_of
 from service.logs import configure
-from service.settings import Settings
+from service.settings import Settings, settings_of
 
 log = structlog.get_logger(__name__)
 
@@ -35,16 +32,7 @@ def settings_with(given: dict[str, Any]) -> Settings:
     SetupError
         A setting has an invalid value.
     """
-    try:
-        return Settings(**{k: v for k, v in given.items() if v is not None})
-    except SettingsError as error:
-        raise SetupError(f"the environment: {error}; the value must be JSON", code="bad_setting",
-                         remedy="docs/settings.md lists every setting") from None
-    except ValidationError as error:
-        problems = problems_of(error, "settings")
-        raise SetupError(f"setting {problems[0]['at']}: {problems[0]['problem']}", code="bad_setting",
-                         subjects=tuple(p["at"] for p in problems), measured=problems,
-                         remedy="docs/settings.md lists every setting") from None
+    return settings_of(Settings, given)
 
 
 def _listen(host: str, port: int) -> socket.socket:

@@ -46,6 +46,8 @@ class WorkConfig:
     url, data_dir : database and data folder, as the worker sees them
     chain         : module with ``plan``, ``zones_only`` and ``verify_program``
     max_attempts  : number of attempts after which a job fails that found the disk full
+    memory_mb     : MB that the jobs of one machine may take together; None: all that it has
+    memory_wait_s : s for which a job waits for memory that others take
     log_level, log_format : logging of a worker that is not configured otherwise
     """
 
@@ -55,6 +57,8 @@ class WorkConfig:
     lease_s: float
     chain: str = "service.pipeline"
     max_attempts: int = 3
+    memory_mb: int | None = None
+    memory_wait_s: float = 3600.0
     log_level: str = "info"
     log_format: str = "console"
 
@@ -200,6 +204,8 @@ class _Attempt:
             "stock": str(self.artifacts.blob(stock)) if stock else None,
             "spindle_tool": self.row["spindle_tool"], "out": str(workspace), "kept": str(self.artifacts.kept(key)),
             "chain": self.config.chain,
+            "room": {"cap_mb": self.config.memory_mb, "limit_mb": self.config.limits.memory_bytes // 1_000_000,
+                     "wait_s": self.config.memory_wait_s},
         }
         try:
             state = self._supervised(request)
@@ -215,7 +221,7 @@ class _Attempt:
         while True:
             try:
                 return supervise(request, self.config.limits, self.artifacts.tmp, on_progress=self._progress,
-                                 on_resumed=self._resumed, keep=self._keep)
+                                 on_resumed=self._resumed, on_estimate=self._estimated, keep=self._keep)
             except OSError as error:
                 if error.errno not in OUT_OF_RESOURCES:
                     raise
@@ -241,6 +247,13 @@ class _Attempt:
             self.store.resumed(self.row["id"], self.owner, taken)
         except AWAY as error:
             log.warning("what was taken over is not recorded", job=self.row["id"], error=type(error).__name__)
+
+    def _estimated(self, estimate: Mapping[str, Any]) -> None:
+        log.info("estimate", job=self.row["id"], memory_mb=estimate["memory_mb"], seconds=estimate["seconds"])
+        try:
+            self.store.estimated(self.row["id"], self.owner, estimate)
+        except AWAY as error:
+            log.warning("the estimate is not recorded", job=self.row["id"], error=type(error).__name__)
 
     def _keep(self) -> bool:
         """Whether to continue; renews the lease in time. A database that does not answer is no reason to stop."""

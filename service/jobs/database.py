@@ -65,6 +65,7 @@ jobs = sa.Table(
     Column("expired", Float, nullable=True),
     Column("library_json", Text, nullable=True),
     Column("resumed_json", Text, nullable=True),
+    Column("estimate_json", Text, nullable=True),
     sa.UniqueConstraint("principal", "idempotency_key", name="uq_jobs_key"),
     sa.Index("ix_jobs_state", "state", "lease_until"),
     sa.Index("ix_jobs_principal", "principal", "id"),

@@ -57,7 +57,8 @@ class Engine:
             settings.url, str(settings.data_dir.resolve()),
             ProcessLimits(settings.job_time_limit_s, settings.job_memory_limit_mb * 1_000_000, settings.threads,
                           settings.poll_s, settings.preload),
-            settings.lease_s, chain, settings.max_attempts, settings.log_level, settings.log_format)
+            settings.lease_s, chain, settings.max_attempts, settings.memory_mb, settings.memory_wait_s,
+            settings.log_level, settings.log_format)
         self.room = Room(settings.max_queued, settings.max_queued_each)
         self._wake, self._stop = threading.Event(), threading.Event()
         self._lock: IO[str] | None = None

@@ -3,9 +3,11 @@
 
 PARENT is the number of the process that starts it, with which it ends.
 
-The request is {"kind", "part", "setup", "program", "stock", "spindle_tool", "out", "kept", "chain", "address_bytes"}.
-Lines on the pipe are JSON: {"stage", "progress"} while it runs, {"resumed"} when it uses a checkpoint of an earlier
-attempt (``service.checkpoint_store``), then {"state"} or {"error"} once. Exit code 0 with a state, 3 with an error.
+The request is {"kind", "part", "setup", "program", "stock", "spindle_tool", "out", "kept", "chain", "room",
+"address_bytes"}; "room" holds arguments of ``service.estimate.memory_room.MemoryRoom``. Lines on the pipe are JSON:
+{"stage", "progress"} while it runs, {"estimate"} once the part is read, {"resumed"} when it uses a checkpoint of an
+earlier attempt (``service.checkpoint_store``), then {"state"} or {"error"} once. Exit code 0 with a state, 3 with an
+error.
 """
 
 
@@ -45,16 +47,18 @@ def reporter(send, interval=0.2):
     return progress
 
 
-def compute(request, progress, resumed):
+def compute(request, progress, resumed, estimated):
     """Run the requested pipeline, leave its files in the out folder, and return the final state.
 
-    resumed : called with the number of checkpoints used, by kind
+    resumed   : called with the number of checkpoints used, by kind
+    estimated : called with what the job is expected to take, as plain data
     """
     import contextlib
     import importlib
     from pathlib import Path
 
     from geometry.child_process import collect_rarely
+    from service.estimate.memory_room import MemoryRoom
     from service.from_wire import parse_setup
     from service.part_reading import PartReading
 
@@ -62,7 +66,15 @@ def compute(request, progress, resumed):
     part, out = Path(request["part"]), Path(request["out"])
     setup = parse_setup(request["setup"])
     more: dict[str, object] = {"blank_path": Path(request["stock"])} if request.get("stock") else {}
+    room = MemoryRoom(**request.get("room", {}))
+
+    def admit(estimate):
+        estimated(estimate.as_dict())
+        room.enter(estimate, progress)
+
+    more["admit"] = admit
     with contextlib.ExitStack() as stack:
+        stack.callback(room.leave)
         if request["chain"] == "service.pipeline":  # the part is read while the chain is imported
             more["reading"] = stack.enter_context(PartReading(part, setup))
         return _computed(importlib.import_module(request["chain"]), request, part, setup, out, progress, resumed, more)
@@ -111,7 +123,8 @@ def main(argv):
         os.write(pipe, (json.dumps(message, default=str) + "\n").encode())
 
     try:
-        send({"state": compute(request, reporter(send), lambda taken: send({"resumed": taken}))})
+        send({"state": compute(request, reporter(send), lambda taken: send({"resumed": taken}),
+                               lambda estimate: send({"estimate": estimate}))})
         return 0
     except CamError as error:
         send({"error": error.as_dict()})

@@ -270,6 +270,11 @@ class JobStore:
         return self._change(self._held(job_id, owner), resumed_json=json.dumps(dict(taken)),
                             event_seq=jobs.c.event_seq + 1)
 
+    def estimated(self, job_id: str, owner: str, estimate: Mapping[str, Any]) -> bool:
+        """Record what the job is expected to take; the next event contains it."""
+        return self._change(self._held(job_id, owner), estimate_json=json.dumps(dict(estimate)),
+                            event_seq=jobs.c.event_seq + 1)
+
     def finish(self, job_id: str, owner: str, state: str, *, artifact: str | None = None,
                error: CamError | None = None, summary: dict[str, Any] | None = None) -> bool:
         """End a job that ``owner`` holds; False when it was cancelled or taken over meanwhile."""

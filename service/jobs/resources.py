@@ -14,6 +14,7 @@ from typing import Any
 from sqlalchemy.engine import RowMapping
 
 from geometry.errors import error_from_dict
+from schemas.estimate import JobEstimate
 from schemas.jobs import FINAL_STATES, Job, JobEvent, JobFile, JobFiles, JobLinks, JobResumed, JobSummary, JobWebhook
 from schemas.keys import Key
 from schemas.problem import Problem
@@ -47,8 +48,9 @@ def job_resource(row: RowMapping) -> Job:
     if row["error_json"]:
         error = Problem(**problem_document(error_from_dict(json.loads(row["error_json"])), path))
     return Job(id=row["id"], kind=kind, state=row["state"], stage=row["stage"], progress=row["progress"],
-               attempt=row["attempt"], resumed=_resumed(row), content_sha256=row["content_sha256"],
-               part_sha256=row["part_sha256"], setup_sha256=row["setup_sha256"], stock_sha256=row["stock_sha256"],
+               attempt=row["attempt"], resumed=_resumed(row), estimate=_estimate(row),
+               content_sha256=row["content_sha256"], part_sha256=row["part_sha256"],
+               setup_sha256=row["setup_sha256"], stock_sha256=row["stock_sha256"],
                labels=json.loads(row["labels_json"]), created_at=time_text(row["created"]) or "",
                started_at=time_text(row["started"]), deadline_at=time_text(row["deadline"]),
                finished_at=time_text(row["finished"]), expired_at=time_text(row["expired"]), error=error,
@@ -78,10 +80,14 @@ def _resumed(row: RowMapping) -> JobResumed | None:
     return JobResumed(plans=taken.get("plan", 0), steps=taken.get("acts", 0), proofs=taken.get("proof", 0))
 
 
+def _estimate(row: RowMapping) -> JobEstimate | None:
+    return JobEstimate(**json.loads(row["estimate_json"])) if row["estimate_json"] else None
+
+
 def event_data(row: RowMapping) -> str:
     """Data of one event, JSON."""
     return JobEvent(id=row["id"], state=row["state"], stage=row["stage"], progress=row["progress"],
-                    resumed=_resumed(row)).model_dump_json(exclude_none=True)
+                    resumed=_resumed(row), estimate=_estimate(row)).model_dump_json(exclude_none=True)
 
 
 def encode_cursor(job_id: str) -> str:

@@ -22,6 +22,7 @@ import psutil  # type: ignore[import-untyped]
 
 from geometry.child_process import Family
 from geometry.errors import CancelledError, ResourceError, error_from_dict
+from service.estimate.estimate import WAITING
 from service.jobs.job_child import JobChild, start_child
 
 # Address space includes mapped but unused memory (libraries, thread arenas), so its limit is larger.
@@ -48,14 +49,17 @@ class ProcessLimits:
 
 def supervise(request: dict[str, Any], limits: ProcessLimits, scratch: Path, *,
               on_progress: Callable[[str, float], None], on_resumed: Callable[[Mapping[str, int]], None],
-              keep: Callable[[], bool]) -> str:
+              on_estimate: Callable[[Mapping[str, Any]], None], keep: Callable[[], bool]) -> str:
     """Run a job in a child process.
 
     request     : see ``service.jobs.job_process``; 'address_bytes' is filled in here
     scratch     : folder for temporary files of the child
     on_progress : called with stage and fraction, at most once per check
     on_resumed  : called with the number of checkpoints used, by kind
+    on_estimate : called with what the job is expected to take, as ``service.estimate.job_estimate.Estimate.as_dict``
     keep        : called at every check; False kills the child
+
+    The time for which the child waits for memory does not count for its limit of time.
 
     Returns the final state from the child.
 
@@ -77,7 +81,7 @@ def supervise(request: dict[str, Any], limits: ProcessLimits, scratch: Path, *,
             with log.open("wb") as out, closing_fd(writing):
                 child = start_child(path, writing, out, limits.threads, limits.preload)
             try:
-                final = _watch(child, _Lines(reading, on_progress, on_resumed), limits, keep)
+                final = _watch(child, _Lines(reading, on_progress, on_resumed, on_estimate), limits, keep)
             finally:
                 kill_tree(child)
         finally:
@@ -115,7 +119,8 @@ def kill_tree(child: JobChild) -> None:
 def _watch(child: JobChild, lines: _Lines, limits: ProcessLimits,
            keep: Callable[[], bool]) -> dict[str, Any]:
     """Monitor the child until it ends; returns its last message, {} when there was none."""
-    deadline = time.monotonic() + limits.time_s
+    looked = time.monotonic()
+    deadline = looked + limits.time_s
     family = Family(child.pid)
     next_look = 0.0
     with selectors.DefaultSelector() as selector:
@@ -129,17 +134,25 @@ def _watch(child: JobChild, lines: _Lines, limits: ProcessLimits,
                     open_still = lines.feed()
                 _await_exit(child)
                 return lines.final
-            if time.monotonic() >= next_look:
-                next_look = time.monotonic() + limits.poll_s
+            now = time.monotonic()
+            deadline, looked = deadline + (now - looked if lines.waits else 0.0), now
+            if now >= next_look:
+                next_look = now + limits.poll_s
                 _check(family, limits, deadline, keep)
 
 
 class _Lines:
-    """Messages of the child, line by line, from the pipe ``reading``; ``final`` is its last message."""
+    """Messages of the child, line by line, from the pipe ``reading``.
+
+    final : its last message
+    waits : whether it waits for memory
+    """
 
     def __init__(self, reading: int, on_progress: Callable[[str, float], None],
-                 on_resumed: Callable[[Mapping[str, int]], None]) -> None:
+                 on_resumed: Callable[[Mapping[str, int]], None],
+                 on_estimate: Callable[[Mapping[str, Any]], None]) -> None:
         self.reading, self.on_progress, self.on_resumed, self.buffer = reading, on_progress, on_resumed, b""
+        self.on_estimate, self.waits = on_estimate, False
         self.final: dict[str, Any] = {}
         os.set_blocking(reading, False)
 
@@ -154,10 +167,14 @@ class _Lines:
                 progress = message
             elif "resumed" in message:
                 resumed = message
+            elif "estimate" in message:
+                self.on_estimate(message["estimate"])
             else:
                 self.final = message
         if resumed is not None:
             self.on_resumed(resumed["resumed"])
+        if progress is not None:
+            self.waits = progress["stage"] == WAITING
         if progress is not None and not self.final:
             self.on_progress(progress["stage"], progress["progress"])
         return chunk != b""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
+from service.estimate.job_estimate import estimate_of
 from service.report import approach_cones, tool_offers
 from service.report.computed_ahead import ComputedAhead
 from service.stages.cautions import MAX_TIMES, JobCaution
@@ -216,7 +217,7 @@ def job_report(ready: Prepared, known: ComputedAhead[dict[str, Any]], made: Plan
     report = {
         **_shape(ready), **_areas(ready), "state": "unproved" if findings else "proved", "complete": not remainder,
         "labels": dict(ready.inputs.labels),
-        "inputs": inputs_of(ready),
+        "inputs": inputs_of(ready), "estimate": estimate_of(ready).as_dict(),
         "zones": [_planned(ready, z, known.value(z.id), plans.get(z.id), steps, proof) for z in ready.zones],
         "steps": [_step(s) for s in made.steps], "remainder": remainder,
         "proposal": known.value(PROPOSAL), "findings": findings,

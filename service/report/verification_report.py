@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.sampling import SurfaceSamples
+from service.estimate.job_estimate import estimate_of
 from service.report.report import (
     REMAINDER_FLOOR_MM2,
     counted,
@@ -50,6 +51,7 @@ def verification_report(job: JobPart, proof: Proof, dense: SurfaceSamples) -> tu
     findings, counts = [*(f.as_dict() for f in proof.findings), *unmet], counted(proof, unmet)
     remainder, entry = _remainder(dense, proof.work)
     return {"state": state_of(counts), "findings": findings, "finding_counts": counts, "inputs": inputs_of(job),
+            "estimate": estimate_of(job, "verify").as_dict(),
             "asked": _asked(job, proof.work), "remainder": remainder,
             "coverage": r(coverage, 6), "gouge_max_mm": r(proof.gouge_max, 5),
             "machining_time_s": r(proof.spent.seconds, 1), "time": time_of(proof),

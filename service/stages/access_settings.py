@@ -40,9 +40,16 @@ ABOVE = 1.0  # mm between the height rapids may go down to and the clearance pla
 
 def planning_stock(ready: Prepared, view: View) -> StockMap:
     """The stock that the planner of an access starts from: the largest that the setup allows."""
-    lo, hi = ready.blank.corners(view.rotation)
-    step = max(min(STOCK_STEP, ready.inputs.engagement_spacing), float(np.sqrt(np.prod(hi[:2] - lo[:2]) / STOCK_CELLS)))
-    return ready.blank.planned(view, step)
+    return ready.blank.planned(view, stock_step(ready.inputs, ready.blank.corners(view.rotation)))
+
+
+def stock_step(inputs: JobInputs, corners: F64) -> float:
+    """Distance between the nodes of the planner's stock, mm.
+
+    corners : (2, 3) float64, mm, of the blank in the frame of the access
+    """
+    lo, hi = corners
+    return max(min(STOCK_STEP, inputs.engagement_spacing), float(np.sqrt(np.prod(hi[:2] - lo[:2]) / STOCK_CELLS)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,4 +186,4 @@ def left_alone(job: JobPart) -> dict[int, str]:
     return unasked | dict.fromkeys(face_numbers(ops.exclude_faces), "operations.exclude_faces names it")
 
 
-__all__ = ["leaned", "left_alone", "plan_settings", "planning_stock", "proof_setup"]
+__all__ = ["leaned", "left_alone", "plan_settings", "planning_stock", "proof_setup", "stock_step"]

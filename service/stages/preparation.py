@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import count
@@ -22,7 +22,7 @@ from service.from_wire import face_numbers
 from service.part_reading import PartReading
 from service.stages.blank_model import Blank
 from service.stages.job_inputs import JobInputs
-from service.stages.job_part import Progress, read_job_part
+from service.stages.job_part import JobPart, Progress, read_job_part
 from service.stages.sample_spacing import coarse_sets, coarse_spacing
 from zones.features.decomposition import decompose
 from zones.lattice import lattice_step
@@ -132,7 +132,7 @@ def _box(lo: F64, hi: F64) -> tuple[F64, np.ndarray]:
     return corners, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))], np.int32)
 
 
-def _room(body: ToolBody, bounds: F64, blank: Blank, rotation: F64) -> float:
+def planning_room(body: ToolBody, bounds: F64, blank: Blank, rotation: F64) -> float:
     """How far around the part a tool is planned, mm. Beside a large blank it has to pass around the stock there.
 
     bounds   : (2, 3) float64, mm, of the part in the access frame
@@ -147,19 +147,23 @@ def _room(body: ToolBody, bounds: F64, blank: Blank, rotation: F64) -> float:
 
 
 def prepare(path: Path, setup: Setup, progress: Progress, *, search: bool = True,
-            blank_path: Path | None = None, reading: PartReading | None = None) -> Prepared:
+            blank_path: Path | None = None, reading: PartReading | None = None,
+            begin: Callable[[JobPart], None] | None = None) -> Prepared:
     """Read the part, decompose it, measure the reach of the tools and build zones.
 
     search     : look for further tool axes on a machine with rotary axes; False: the accesses of the setup only
     blank_path : STEP file of a blank of kind 'step'
     reading    : the reading of this part, where it has begun already
+    begin      : called once the part is read, before anything large is made
 
     Raises
     ------
     CamError
-        The part or the setup is wrong, or the reader exceeds its limits.
+        The part or the setup is wrong, or the reader exceeds its limits; or what ``begin`` raises.
     """
     read = read_job_part(path, setup, progress, blank_path, reading)
+    if begin is not None:
+        begin(read)
     inputs, part, blank = read.inputs, read.part, read.blank
     progress("zones", 0.12)
     accesses = list(inputs.accesses)
@@ -249,7 +253,7 @@ def tip_field(inputs: JobInputs, blank: Blank, rotation: F64, standing: DiscHeig
     standing : DiscHeights of part and fixtures, access frame
     bounds   : (2, 3) float64, mm, of the part in the access frame
     """
-    room = _room(body, bounds, blank, rotation)
+    room = planning_room(body, bounds, blank, rotation)
     return TipField(standing.tree, body, inputs.clearances, bounds, room, lattice_step(body),
                     inputs.quality.stock_allowance_mm, inputs.quality.scallop_height_mm, standing)
 

@@ -7,6 +7,7 @@ import os
 import time
 
 import geometry.errors as errors
+from service.estimate.estimate import Estimate, Share
 
 NAPS = {"sleep": 400, "nap": 40, "short nap": 15}  # twentieths of a second
 
@@ -66,7 +67,15 @@ def _misbehave(what, progress):
         raise errors.PartError("the part has open shells", code="open_shell", subjects=("F3",))
 
 
-def plan(part_path, setup, out, progress, blank_path=None, kept=None):
+def _admitted(setup, admit):
+    """Wait for the memory that the label "memory_mb" says the job takes."""
+    if "memory_mb" in setup.labels:
+        share = Share("samples of the fake", 7, int(setup.labels["memory_mb"]), 1.5)
+        admit(Estimate(share.memory_mb, share.seconds, (share,)))
+
+
+def plan(part_path, setup, out, progress, blank_path=None, kept=None, admit=None):
+    _admitted(setup, admit)
     what = setup.labels.get("do", "")
     _misbehave(what, progress)
     for k in range(3):
@@ -87,13 +96,14 @@ def plan(part_path, setup, out, progress, blank_path=None, kept=None):
     return report
 
 
-def zones_only(part_path, setup, progress):
+def zones_only(part_path, setup, progress, admit=None):
     progress("zones", 0.5)
     report = _report(setup, "proved", [])
     return {k: report[k] for k in ("part", "walls", "connections", "channels", "zones", "remainder")}
 
 
-def verify_program(part_path, setup, program_text, progress, access=None, out=None, mesh=None, spindle_tool=0):
+def verify_program(part_path, setup, program_text, progress, access=None, out=None, mesh=None, spindle_tool=0,
+                   admit=None):
     progress("verify", 0.5)
     (out / "deviation.png").write_bytes(b"\x89PNG of the fake")
     findings = [{"kind": "gouge"}] if "GOUGE" in program_text else []

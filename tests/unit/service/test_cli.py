@@ -11,6 +11,8 @@ from typer.testing import CliRunner
 import service
 from geometry.errors import InternalError, PartError, VerificationError
 from service.cli import app
+from service.estimate import memory_room
+from service.estimate.estimate import Estimate, Share
 
 STEP = ("ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\n"
         "FILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n#1=CARTESIAN_POINT('',(0.,0.,0.));\nENDSEC;\n"
@@ -21,26 +23,29 @@ SETUP = {"tools": [{"id": "T1", "kind": "ball", "diameter_mm": 3}]}
 class FakeChain(types.ModuleType):
     def __init__(self):
         super().__init__("service.pipeline")
-        self.answer = {"state": "proved", "findings": []}
+        self.answer, self.estimate = {"state": "proved", "findings": []}, None
 
-    def _say(self, progress):
+    def _say(self, progress, admit):
+        if self.estimate is not None:
+            admit(self.estimate)
         progress("zones", 0.5)
         if isinstance(self.answer, Exception):
             raise self.answer
         return self.answer
 
-    def plan(self, part_path, setup, out, progress, mesh=None, blank_path=None, reading=None):
+    def plan(self, part_path, setup, out, progress, mesh=None, blank_path=None, reading=None, admit=None):
         self.mesh = mesh
-        return self._say(progress)
+        return self._say(progress, admit)
 
-    def zones_only(self, part_path, setup, progress, blank_path=None, reading=None):
-        return self._say(progress)
+    def zones_only(self, part_path, setup, progress, blank_path=None, reading=None, admit=None):
+        return self._say(progress, admit)
 
     def verify_program(self, part_path, setup, program_text, progress, access=None, out=None, mesh=None,
-                       spindle_tool=0, blank_path=None, dialect=None, ending="", program=None, reading=None):
+                       spindle_tool=0, blank_path=None, dialect=None, ending="", program=None, reading=None,
+                       admit=None):
         assert program_text.strip() and program.nc.text == program_text and program.spindle_tool == spindle_tool
         self.out, self.mesh, self.spindle_tool = out, mesh, spindle_tool
-        return self._say(progress)
+        return self._say(progress, admit)
 
 
 @pytest.fixture
@@ -254,3 +259,38 @@ def test_a_mesh_is_made_when_it_is_asked_for(chain, files):
 def test_stdout_of_a_verification_is_the_report_alone(chain, files):
     got = call("verify", files / "p.step", "--setup", files / "s.json", "--program", files / "x.ngc")
     assert json.loads(got.stdout) == chain.answer and "proved: no findings" in got.stderr
+
+
+SHARES = (Share("program and libraries", 1, 800, 20.0), Share("samples of the proof", 480_000, 1200, 90.0))
+
+
+def run_with_estimate(chain, files, command, monkeypatch, **variables):
+    chain.estimate = Estimate(2000, 110.0, SHARES)
+    monkeypatch.setattr(memory_room, "room_folder", lambda: files / "room")
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    more = {"plan": ["--out", str(files / "out")], "zones": [], "verify": ["--program", str(files / "x.ngc")]}[command]
+    return CliRunner().invoke(app, [command, str(files / "p.step"), "--setup", str(files / "s.json"), *more])
+
+
+@pytest.mark.parametrize("command", ["plan", "zones", "verify"])
+def test_the_estimate_is_printed_before_anything_is_computed(chain, files, command, monkeypatch):
+    ran = run_with_estimate(chain, files, command, monkeypatch, ZONEMILL_MEMORY_MB="2000")
+    assert ran.exit_code == 0
+    words = "estimate: 2000 MB of memory, 110 s of processor; the most for the samples of the proof"
+    assert words in ran.stderr and ran.stderr.index(words) < ran.stderr.index("zones")
+    assert not list((files / "room").glob("*.json"))  # it takes no room any more
+
+
+@pytest.mark.parametrize("command", ["plan", "zones", "verify"])
+def test_a_job_above_the_memory_of_the_setting_is_refused(chain, files, command, monkeypatch):
+    ran = run_with_estimate(chain, files, command, monkeypatch, ZONEMILL_MEMORY_MB="1999")
+    assert ran.exit_code == 2 and "zones" not in ran.stderr.split("error:")[0]
+    for words in ("about 2000 MB", "machine_too_small (CapacityError)", "samples of the proof", "limit     1999",
+                  "raise ZONEMILL_MEMORY_MB"):
+        assert words in ran.stderr, ran.stderr
+
+
+def test_a_setting_that_is_no_number_is_named(chain, files, monkeypatch):
+    ran = run_with_estimate(chain, files, "zones", monkeypatch, ZONEMILL_MEMORY_MB="much")
+    assert ran.exit_code == 2 and "bad_setting" in ran.stderr and "memory_mb" in ran.stderr

@@ -58,7 +58,7 @@ def run(folder, do="", keep=lambda: True, started=lambda: None, **limits):
                            "spindle_tool": None, "out": str(out), "kept": str(folder / "kept"), "chain": "fake_chain"},
                           ProcessLimits(**{"time_s": 60.0, "memory_bytes": 2_000_000_000, "preload": True,
                                            "poll_s": 0.05, **limits}), scratch, on_progress=progress,
-                          on_resumed=lambda _: None, keep=keep)
+                          on_resumed=lambda _: None, on_estimate=lambda _: None, keep=keep)
     finally:
         assert not list(scratch.iterdir())
     return state, stages
