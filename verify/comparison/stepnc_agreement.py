@@ -22,7 +22,6 @@ TIP = 1e-3  # mm
 AXIS = 1e-6  # of unit vectors, per component
 FEED = 1e-6  # share; feed words are decimal, so equal feeds differ by rounding only
 INVERSE = 1e-4  # 1/min, rounding of inverse time words, which time the turning blocks of joints
-FIRST_LOOK = 64  # moves that are compared at once to find the end of a stretch; then twice as many
 STILL_TIP, STILL_AXIS = 5e-5, 3e-6  # mm and of unit vectors: smaller moves count as none
 
 
@@ -39,6 +38,8 @@ class _Rows:
     """The moves of one reading in the form that is compared.
 
     at    : (n, 12) start and end of the tip, mm, and of the axis
+    pace  : feed, mm/min, 0 for rapids
+    alike : for each row, the end of the rows from it on with exactly its tool, kind, feed and speed
     """
 
     def __init__(self, p: Program, *, arrivals: bool) -> None:
@@ -69,6 +70,10 @@ class _Rows:
         other = np.abs(tip - self.feed) > FEED * np.nan_to_num(self.feed)
         self.timed = self.turning & ~self.rapid & other & (tip > 0.0)
         self.feed[self.timed] = tip[self.timed]
+        self.pace = np.nan_to_num(self.feed)
+        words = np.column_stack([self.rapid, self.tool, self.pace, self.speed])
+        ends = np.append(np.flatnonzero((words[1:] != words[:-1]).any(axis=1)) + 1, len(words))
+        self.alike = ends[np.searchsorted(ends, np.arange(len(words)), side="right")] if len(words) else ends
 
     def __len__(self) -> int:
         return len(self.at)
@@ -126,7 +131,7 @@ def _same_words(a: _Rows, i: int, b: _Rows, j: int, count: int) -> int | None:
     mine, theirs = slice(i, i + count), slice(j, j + count)
     rapid = a.rapid[mine]
     way = np.linalg.norm(a.at[mine, 3:6] - a.at[mine, :3], axis=1)
-    feed, other = (np.where(rapid, 0.0, np.nan_to_num(f)) for f in (a.feed[mine], b.feed[theirs]))
+    feed, other = (np.where(rapid, 0.0, pace) for pace in (a.pace[mine], b.pace[theirs]))
     slack = FEED * other + np.where(a.timed[mine], INVERSE * way + other * TIP / np.maximum(way, TIP), 0.0)
     turned = np.abs(a.speed[mine] - b.speed[theirs]) > FEED * b.speed[theirs]
     wet = a.coolant[mine] != b.coolant[theirs]
@@ -172,15 +177,13 @@ def _chords(r: _Rows, begin: int, end: int) -> bool:
 
 def _stretch(r: _Rows, begin: int, end: int) -> int:
     """End of the moves from ``begin`` on with its tool, kind and feed; feed moves also need its spindle speed."""
-    first, at, size = float(np.nan_to_num(r.feed[begin])), begin, FIRST_LOOK
-    while at < end:  # looked at in parts that grow: most stretches are short, and a file has as many as it has feeds
-        part = slice(at, min(at + size, end))
-        other = (r.rapid[part] != r.rapid[begin]) | (r.tool[part] != r.tool[begin]) \
-            | (np.abs(np.nan_to_num(r.feed[part]) - first) > FEED * first) \
-            | ((r.speed[part] != r.speed[begin]) & ~r.rapid[begin])
-        if other.any():
-            return at + int(np.argmax(other))
-        at, size = part.stop, 2 * size
+    first, at = r.pace[begin], int(r.alike[begin])
+    while at < end:  # feeds that differ by rounding alone are one
+        if (r.rapid[at] != r.rapid[begin] or r.tool[at] != r.tool[begin]
+                or abs(r.pace[at] - first) > FEED * first
+                or (r.speed[at] != r.speed[begin] and not r.rapid[begin])):
+            return at
+        at = int(r.alike[at])
     return end
 
 
@@ -214,13 +217,11 @@ def _abreast(points: F64, way: F64) -> float:
     if len(way) < 2 or not (gone[-1] > 0.0 and length[-1] > 0.0):
         return np.inf
     place = np.searchsorted(length, gone * (length[-1] / gone[-1])) - 1
-    near = np.full(len(points), np.inf)
-    for offset in (-2, -1, 0, 1, 2):
-        k = np.clip(place + offset, 0, len(way) - 2)
-        d = way[k + 1] - way[k]
-        share = np.clip(((points - way[k]) * d).sum(axis=1) / np.maximum((d * d).sum(axis=1), 1e-30), 0.0, 1.0)
-        np.minimum(near, np.linalg.norm(points - way[k] - share[:, None] * d, axis=1), out=near)
-    return float(near.max())
+    k = np.minimum(np.maximum(place[:, None] + np.arange(-2, 3), 0), len(way) - 2)
+    begin, d = way[k], way[k + 1] - way[k]
+    off = points[:, None] - begin
+    share = np.minimum(np.maximum((off * d).sum(axis=2) / np.maximum((d * d).sum(axis=2), 1e-30), 0.0), 1.0)
+    return float(np.sqrt(((off - share[..., None] * d)**2).sum(axis=2).min(axis=1).max()))
 
 
 def _differ(a: _Rows, i: int, b: _Rows, j: int, how: str) -> None:

@@ -87,9 +87,9 @@ class To(AttributeKind):
 
     def problem(self, value: Value, file: Part21File) -> str | None:
         if isinstance(value, Ref) and file.has(value):
-            names = file.names(value)
             if not self.entities:
                 return None
+            names = file.names(value)
             for name in names:
                 if name in self.entities:
                     return None
@@ -192,6 +192,7 @@ class Checked:
                                   for entity, kinds in these.items()}
                            for many, these in ((False, self._table), (True, self._records))}
         self._rows: dict[int, NDArray[np.int64]] = {}  # of the plain points of polylines
+        self._turns: dict[tuple[int | None, int | None], F64] = {}  # by the directions of placements: files share them
         for entity, numbers in sorted(file.entities().items()):
             if entity in self._table or entity in self._records:
                 for number in numbers:
@@ -213,6 +214,8 @@ class Checked:
         Raises ProgramError where it is of none of them.
         """
         records = self.file.records(number)
+        if len(records) == 1 and records[0][0] in entities and records[0][0] in self._table:
+            return records[0]
         for record in records:
             if record[0] in entities:
                 if record[0] not in (self._records if len(records) > 1 else self._table):
@@ -223,8 +226,11 @@ class Checked:
 
     def one(self, number: int, entity: str, attribute: str) -> Value:
         """One attribute of an instance."""
+        records = self.file.records(number)
+        if len(records) == 1 and records[0][0] == entity and entity in self._table:  # nearly always
+            return records[0][1][self._columns[False][entity][attribute]]
         values = self.get(number, entity)[1]
-        return values[self._columns[len(self.file.records(number)) > 1][entity][attribute]]
+        return values[self._columns[len(records) > 1][entity][attribute]]
 
     def ref(self, number: int, entity: str, attribute: str) -> int:
         """The number of the instance that an attribute refers to. Raises ProgramError where it refers to none."""
@@ -263,16 +269,23 @@ class Checked:
         """
         entity = "AXIS2_PLACEMENT_3D"
         out = np.eye(4)
-        out[:3, 3] = self._places(number, np.array([self.ref(number, entity, "location")], np.int64), scale)[0]
-        up, along = (self.maybe(number, entity, a) for a in ("axis", "ref_direction"))
+        out[:3, 3] = self._place(number, self.ref(number, entity, "location"), scale)
+        directions = self.maybe(number, entity, "axis"), self.maybe(number, entity, "ref_direction")
+        turn = self._turns.get(directions)
+        if turn is None:
+            turn = self._turns[directions] = self._turn(number, *directions)
+        out[:3, :3] = turn
+        return out
+
+    def _turn(self, number: int, up: int | None, along: int | None) -> F64:
+        """(3, 3) float64, dimensionless: the rotation of a placement, by the numbers of its directions."""
         z = np.array([0.0, 0.0, 1.0]) if up is None else self.vector(up)
         x = np.array([1.0, 0.0, 0.0]) if along is None else self.vector(along)
         x = x - (x @ z) * z
         if (length := float(np.linalg.norm(x))) < 1e-9:
             raise self.file.error(number, ", ref_direction: a direction that is not along the axis expected")
         x = x / length
-        out[:3, :3] = np.column_stack([x, np.cross(z, x), z])
-        return out
+        return np.column_stack([x, np.cross(z, x), z])
 
     def vector(self, number: int) -> F64:
         """(3,) float64, dimensionless, frame of the file: a DIRECTION of length one.
@@ -327,8 +340,18 @@ class Checked:
 
     def point(self, number: int, scale: float = 1.0) -> F64:
         """(3,) float64, mm, frame of the file: a CARTESIAN_POINT; ``scale`` is mm in the unit of the file."""
-        self.get(number, "CARTESIAN_POINT")
-        return np.asarray(self._places(number, np.array([number], np.int64), scale)[0])
+        if self.file.coordinates(number) is None:
+            self.get(number, "CARTESIAN_POINT")
+        return self._place(number, number, scale)
+
+    def _place(self, owner: int, number: int, scale: float) -> F64:
+        """(3,) float64: coordinates of one point that an instance refers to, times ``scale``."""
+        plain = self.file.coordinates(number)
+        if plain is not None:
+            scaled = [v * scale for v in plain]
+            if max(scaled) <= FARTHEST and min(scaled) >= -FARTHEST:
+                return np.array(scaled)
+        return np.asarray(self._places(owner, np.array([number], np.int64), scale)[0])  # names what is wrong
 
     def _places(self, owner: int, numbers: NDArray[np.int64], scale: float) -> F64:
         """(n, 3) float64: coordinates of points that an instance refers to, times ``scale``."""
@@ -355,7 +378,7 @@ class Checked:
 
     def _check(self, number: int, entity: str) -> None:
         records = self.file.records(number)
-        record = next((r for r in records if r[0] == entity), None)
+        record = records[0] if records[0][0] == entity else next((r for r in records if r[0] == entity), None)
         if record is None:
             raise self.file.error(number, f"must be {entity}")
         kinds = (self._records if len(records) > 1 else self._table).get(entity)
@@ -364,6 +387,8 @@ class Checked:
         if len(record[1]) != len(kinds):
             raise self.file.error(number, f"has {len(record[1])} attributes of {entity}, {len(kinds)} are required")
         for (name, kind), value in zip(kinds, record[1], strict=True):
+            if type(value) is str and type(kind) is Text:  # as most values are
+                continue
             problem = kind.problem(value, self.file)
             if problem is not None:
                 raise self.file.error(number, f", {name}: {problem}")

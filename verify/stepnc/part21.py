@@ -151,6 +151,9 @@ class Part21File:
 
     def line(self, number: int) -> int:
         """1-based line in which an instance begins."""
+        span = self._spans.get(number)
+        if span is not None:
+            return int(self._breaks.searchsorted(span[0])) + 1
         return int(self.lines_of(np.array([number], np.int64))[0])
 
     def lines_of(self, numbers: NDArray[np.int64]) -> I32:
@@ -196,6 +199,11 @@ class Part21File:
         out[row >= 0] = self._points[row[row >= 0]]
         return out
 
+    def coordinates(self, number: int) -> list[float] | None:
+        """Coordinates of a plain point, mm or the unit of the file, its frame; None where it is not a plain point."""
+        row = self._point(number)
+        return None if row < 0 else self._points[row].tolist()
+
     def plain_polyline(self, number: int) -> NDArray[np.int64] | None:
         """(n,) int64, index: numbers of the points of a POLYLINE; None where it is not a plain list of references."""
         span = self._spans.get(number)
@@ -222,7 +230,7 @@ class Part21File:
                             measured=self._text[at:at + SHOWN], remedy="send the whole STEP-NC file as it was written")
 
     def _point(self, number: int) -> int:
-        k = int(np.searchsorted(self._point_ids, number))
+        k = int(self._point_ids.searchsorted(number))
         return k if k < len(self._point_ids) and self._point_ids[k] == number else -1
 
     def rows(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
