@@ -13,14 +13,17 @@ import json
 import math
 import os
 import resource
+import select
 import signal
 import subprocess
 import sys
 import tempfile
 import threading
 import time
-from collections.abc import Sequence
+import weakref
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, wait
+from functools import partial
 from pathlib import Path
 
 import psutil
@@ -28,6 +31,7 @@ import psutil
 from geometry.errors import ResourceError, error_from_dict
 
 POLL, LONG_POLL = 0.02, 0.1  # s, of a child at work and of one that waits
+EARLY = "early"  # name of what a child hands over before its result
 FAMILY_EVERY = 0.25  # s between two searches for descendants: each reads the list of all processes of the machine
 _PR_SET_PDEATHSIG = 1
 GARBAGE = 100_000, 20, 20  # new containers between two searches for garbage, and searches of each age between the next
@@ -41,7 +45,8 @@ ADDRESS_ROOM = 4e9
 
 
 def run_limited(command: Sequence[str], request: bytes | Future[bytes], *, time_limit: float, memory_limit: float,
-                name: str = "reader", stop: threading.Event | None = None) -> bytes:
+                name: str = "reader", stop: threading.Event | None = None,
+                early: Callable[[bytes], None] | None = None) -> bytes:
     """Run a command, feed it a request on stdin, and return the content of its result file.
 
     command      : arguments; the child finds the name of its result file in ``ZONEMILL_CHILD_RESULT``
@@ -50,6 +55,7 @@ def run_limited(command: Sequence[str], request: bytes | Future[bytes], *, time_
     memory_limit : float, bytes resident in the child and its descendants together
     name         : first word of the error codes
     stop         : once set, the child is ended as if its time were over
+    early        : called, by this thread, with what the child hands over by ``hand_over`` before it goes on
 
     Returns bytes the child wrote before it exited with 0.
 
@@ -75,7 +81,7 @@ def run_limited(command: Sequence[str], request: bytes | Future[bytes], *, time_
             try:
                 if not isinstance(request, bytes):
                     _hand_over(child, request, stop)
-                _watch(child, time_limit, memory_limit, name, stop)
+                _watch(child, time_limit, memory_limit, name, stop, partial(_take, result.with_name(EARLY), early))
             finally:
                 _kill_group(child)
         return _outcome(child.returncode, result, log, memory_limit, name)
@@ -99,6 +105,20 @@ def guard_child() -> Path:
     return Path(os.environ[RESULT_VARIABLE])
 
 
+def hand_over(result: Path, data: bytes) -> None:
+    """Hand a first result over to the parent, in a child that goes on; result : as ``guard_child`` gives it."""
+    whole = result.with_name(f"{EARLY}.part")
+    whole.write_bytes(data)
+    whole.replace(result.with_name(EARLY))
+
+
+def _take(handed: Path, early: Callable[[bytes], None] | None) -> None:
+    if early is not None and handed.exists():
+        data = handed.read_bytes()
+        handed.unlink()
+        early(data)
+
+
 def _hand_over(child: subprocess.Popen[bytes], request: Future[bytes], stop: threading.Event | None) -> None:
     """Wait for a request and write it to a child; nothing where the child ends before, or ``stop`` is set."""
     while not (request.done() or child.poll() is not None or stop is not None and stop.is_set()):
@@ -109,15 +129,14 @@ def _hand_over(child: subprocess.Popen[bytes], request: Future[bytes], stop: thr
 
 
 def _watch(child: subprocess.Popen[bytes], time_limit: float, memory_limit: float, name: str,
-           stop: threading.Event | None) -> None:
+           stop: threading.Event | None, take: Callable[[], None]) -> None:
     deadline = time.monotonic() + time_limit
-    family = Family(child.pid)
+    family, end = Family(child.pid), _End(child)
     while True:
-        try:
-            child.wait(timeout=POLL)
+        ended = end.within(POLL)
+        take()
+        if ended:
             return
-        except subprocess.TimeoutExpired:
-            pass
         used = family.resident()
         if used > memory_limit:
             raise _memory_error(name, used, memory_limit)
@@ -125,6 +144,27 @@ def _watch(child: subprocess.Popen[bytes], time_limit: float, memory_limit: floa
             raise ResourceError(f"the {name} did not finish within {time_limit:g} s and was stopped",
                                 code=f"{name}_timeout", measured=time_limit, limit=time_limit,
                                 remedy="simplify the part, ask for a coarser chord, or raise the time limit")
+
+
+class _End:
+    """The end of a child: waited for by its descriptor where the system has them, which takes no processor time."""
+
+    def __init__(self, child: subprocess.Popen[bytes]) -> None:
+        self._child = child
+        self._poll: select.poll | None = None
+        with contextlib.suppress(AttributeError, OSError):
+            self._descriptor = os.pidfd_open(child.pid)
+            weakref.finalize(self, os.close, self._descriptor)
+            self._poll = select.poll()
+            self._poll.register(self._descriptor, select.POLLIN)
+
+    def within(self, seconds: float) -> bool:
+        """Whether it ends within some time, s."""
+        if self._poll is not None:
+            return bool(self._poll.poll(1e3 * seconds)) and self._child.poll() is not None
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._child.wait(timeout=seconds)
+        return self._child.returncode is not None
 
 
 class Family:

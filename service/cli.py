@@ -85,7 +85,7 @@ def plan(part: Part, setup: SetupPath,
 
     with error_reporting(as_json):
         make_folder(out)
-    _exit(part, setup, run, as_json, data)
+    _exit(part, setup, run, as_json, data, planned=True)
 
 
 @app.command()
@@ -278,10 +278,11 @@ def write_family_part(recipe: str, seed: int, out: Path, wanted: dict[str, int],
 
 
 def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress, Path | None, PartReading], tuple[Any, int]],
-          as_json: bool, data: Path | None) -> None:
+          as_json: bool, data: Path | None, *, planned: bool = False) -> None:
     """Run a command on part and setup, print its result and exit with its exit code.
 
-    data : data folder whose library the setup may refer to; None: it refers to none
+    data    : data folder whose library the setup may refer to; None: it refers to none
+    planned : the command plans passes
 
     The part is read by another process while the command imports what it needs.
     """
@@ -298,7 +299,7 @@ def _exit(part: Path, setup: Path, run: Callable[[Setup, Progress, Path | None, 
         blank = blank_file(setup, given)
         progress = Progress()
         try:
-            with PartReading(part, given) as reading:
+            with PartReading(part, given, planned=planned) as reading:
                 result, code = run(given, progress, blank, reading)
         finally:
             progress.close()

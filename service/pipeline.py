@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -79,14 +80,15 @@ def plan(part_path: Path, setup: Setup, out: Path, progress: Progress, mesh: Mes
     check_plannable(setup)
     out.mkdir(parents=True, exist_ok=True)
     clear_results(out)
-    ready = prepare(part_path, setup, progress, blank_path=blank_path, reading=reading,
-                    begin=_admission(admit, "plan"))
-    cautions = cautions_before_planning(ready)
-    with StepncUnderWay(out) as stepnc, reporting.known_before_planning(ready) as known:
-        job = _proved_plan(part_path, warned(ready, sentences(cautions)), kept or Kept(), planner, progress, stepnc,
-                           known)
-        give_back_memory()
-        report = deliver_job(job, cautions, out, mesh, progress, stepnc, known)
+    with PartReading(part_path, setup, planned=True) if reading is None else nullcontext(reading) as read:
+        ready = prepare(part_path, setup, progress, blank_path=blank_path, reading=read,
+                        begin=_admission(admit, "plan"))
+        cautions = cautions_before_planning(ready)
+        with StepncUnderWay(out) as stepnc, reporting.known_before_planning(ready) as known:
+            job = _proved_plan(part_path, warned(ready, sentences(cautions)), kept or Kept(), planner, progress,
+                               stepnc, known, read)
+            give_back_memory()
+            report = deliver_job(job, cautions, out, mesh, progress, stepnc, known)
     progress("done", 1.0)
     return report
 
@@ -112,9 +114,12 @@ def prove_plan(part_path: Path, setup: Setup, progress: Progress) -> Proof:
 
 def _proved_plan(part_path: Path, ready: Prepared, kept: Kept, planner: Planner, progress: Progress,
                  stepnc: StepncUnderWay | None = None,
-                 known: ComputedAhead[dict[str, Any]] | None = None) -> ProvedPlan:
-    """The last plan of a prepared job, with its proof; ``known`` is computed beside it, ``stepnc`` beside the proof."""
-    ready, trimmed, scored, first = _begun(part_path, ready)
+                 known: ComputedAhead[dict[str, Any]] | None = None, reading: PartReading | None = None) -> ProvedPlan:
+    """The last plan of a prepared job, with its proof; ``known`` is computed beside it, ``stepnc`` beside the proof.
+
+    reading : of the part, which may have read its exact faces
+    """
+    ready, trimmed, scored, first = _begun(part_path, ready, reading)
     frame = proof_frame(ready)
     samples = frame.into(scored.samples, ready.views[0])
     resumed = Resumed(kept, ready, scored.checks(ready), samples)
@@ -137,11 +142,12 @@ def _proved_plan(part_path: Path, ready: Prepared, kept: Kept, planner: Planner,
     return plan_and_prove(resumed, scored, trimmed, frame, conditions, planner, told, begin, blank)
 
 
-def _begun(part_path: Path, ready: Prepared) -> tuple[Prepared, Mapping[str, Sequence[Faces]], Score, FirstAccess]:
+def _begun(part_path: Path, ready: Prepared, reading: PartReading | None,
+           ) -> tuple[Prepared, Mapping[str, Sequence[Faces]], Score, FirstAccess]:
     """The exact faces by zone, which another process reads meanwhile, the samples of the proof, and the stock."""
     # one thread of numba there: no two threads may enter its threading layer at once
     with ThreadPoolExecutor(2, initializer=numba.set_num_threads, initargs=(1,)) as pool:
-        faces = pool.submit(trimmed_faces, part_path, ready) if ready.inputs.operations.finishing else None
+        faces = pool.submit(trimmed_faces, part_path, ready, reading) if ready.inputs.operations.finishing else None
         first = pool.submit(FirstAccess.of, ready)
         scored = score(ready)
     first.result().settle()

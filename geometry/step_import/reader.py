@@ -12,6 +12,7 @@ import json
 import os
 import sys
 import threading
+from collections.abc import Callable
 from typing import Any
 
 from geometry.child_process import run_limited
@@ -46,15 +47,38 @@ def read_part(path: str | os.PathLike[str], *, placement: SetupFrame | None = No
     or crashes it is PartError (``reader_timeout``, ``reader_memory``, ``reader_crashed``), since a retry fails as well.
     A reader killed from outside is ResourceError (``reader_crashed``).
     """
-    check_tolerances(chord, angle)
-    request: dict[str, Any] = {"path": os.path.abspath(path), "solid": solid, "fuse": fuse, "chord": chord,
-                               "angle": angle, "placement": placement.as_dict() if placement else None}
+    request = _request(path, placement, solid, fuse, chord, angle)
     return Part.from_bytes(ask_reader(request, time_limit, memory_limit, stop))
 
 
-def ask_reader(request: dict[str, Any], time_limit: float, memory_limit: float,
-               stop: threading.Event | None = None) -> bytes:
+def read_part_and_faces(path: str | os.PathLike[str], then: Callable[[Part], None], *, flat: bool,
+                        placement: SetupFrame | None = None, solid: int | None = None, fuse: bool = False,
+                        chord: float = 0.002, angle: float = 0.2, time_limit: float = 120.0,
+                        memory_limit: float = 6e9, stop: threading.Event | None = None) -> bytes:
+    """Read one solid as ``read_part`` does, hand it over, and read its exact faces while the CAD kernel has the file.
+
+    then : called, by this thread, with the part; it has nothing to do with the faces
+    flat : plane faces too
+
+    Returns what ``geometry.step_import.face_surfaces.patches_from_bytes`` reads. Raises as ``read_part``, also where
+    the part has been handed over.
+    """
+    request = _request(path, placement, solid, fuse, chord, angle) | {"wanted": "both", "flat": flat}
+    return ask_reader(request, time_limit, memory_limit, stop, lambda data: then(Part.from_bytes(data)))
+
+
+def _request(path: str | os.PathLike[str], placement: SetupFrame | None, solid: int | None, fuse: bool, chord: float,
+             angle: float) -> dict[str, Any]:
+    check_tolerances(chord, angle)
+    return {"path": os.path.abspath(path), "solid": solid, "fuse": fuse, "chord": chord, "angle": angle,
+            "placement": placement.as_dict() if placement else None}
+
+
+def ask_reader(request: dict[str, Any], time_limit: float, memory_limit: float, stop: threading.Event | None = None,
+               early: Callable[[bytes], None] | None = None) -> bytes:
     """Answer of ``geometry.step_import.reader_process``; limits in s and bytes, ``stop`` as in ``read_part``.
+
+    early : as in ``geometry.child_process.run_limited``
 
     Raises
     ------
@@ -68,7 +92,7 @@ def ask_reader(request: dict[str, Any], time_limit: float, memory_limit: float,
     command = [sys.executable, "-m", READER_MODULE]
     try:
         return run_limited(command, json.dumps(request).encode(), time_limit=time_limit, memory_limit=memory_limit,
-                           stop=stop)
+                           stop=stop, early=early)
     except ResourceError as error:
         raise _by_the_part(error) from None
 

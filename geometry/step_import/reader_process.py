@@ -1,5 +1,7 @@
 """Entry of the reader's child process: request on stdin, part, patches or error in the result file.
 
+Where both are wanted, the part is handed over first.
+
 The module has no heavy imports at its top, so that limits are set before the CAD kernel is loaded.
 """
 
@@ -7,8 +9,9 @@ from __future__ import annotations
 
 import json
 import sys
+from pathlib import Path
 
-from geometry.child_process import TYPED_ERROR, guard_child
+from geometry.child_process import TYPED_ERROR, guard_child, hand_over
 from geometry.errors import CamError, PartError, ResourceError
 
 
@@ -17,7 +20,7 @@ def main() -> int:
     result = guard_child()
     request = json.load(sys.stdin)
     try:
-        data = _load(request)
+        data = _load(request, result)
     except CamError as error:
         result.write_text(json.dumps(error.as_dict()))
         return TYPED_ERROR
@@ -28,16 +31,27 @@ def main() -> int:
     return 0
 
 
-def _load(request: dict) -> bytes:
+def _load(request: dict, result: Path | None = None) -> bytes:
     from geometry.setup_frame import SetupFrame
 
     placement = request.pop("placement")
     where = SetupFrame(**placement) if placement else None
     try:
-        if request.pop("wanted", "part") == "patches":
+        wanted = request.pop("wanted", "part")
+        if wanted == "patches":
             from geometry.step_import.occ.patches import load_patches
 
             return load_patches(placement=where, **request)
+        if wanted == "both" and result is not None:
+            from geometry.step_import.occ.loading import load_solid, part_of
+
+            flat, solid, fuse = request.pop("flat"), request.pop("solid"), request.pop("fuse")
+            loaded = load_solid(request.pop("path"), solid, fuse)
+            part = part_of(loaded, placement=where, **request)
+            hand_over(result, part.to_bytes())
+            from geometry.step_import.occ.patches import patches_of
+
+            return patches_of(loaded.body, where, [f.number for f in part.faces if flat or f.surface != "plane"])
         from geometry.step_import.occ.loading import load_part
 
         return load_part(placement=where, **request).to_bytes()

@@ -76,7 +76,7 @@ def compute(request, progress, resumed, estimated):
     with contextlib.ExitStack() as stack:
         stack.callback(room.leave)
         if request["chain"] == "service.pipeline":  # the part is read while the chain is imported
-            more["reading"] = stack.enter_context(PartReading(part, setup))
+            more["reading"] = stack.enter_context(PartReading(part, setup, planned=request["kind"] == "plan"))
         return _computed(importlib.import_module(request["chain"]), request, part, setup, out, progress, resumed, more)
 
 

@@ -12,6 +12,7 @@ from geometry.mesh import F64, I32
 from geometry.part import EdgeKind
 from geometry.step_import.face_surfaces import read_patches
 from geometry.trimming.trim import trim_faces
+from service.part_reading import PartReading
 from service.stages.preparation import Prepared
 from toolpath.passes.trimmed_faces import Faces, TangentFaces, TrimmedFace
 from toolpath.strategies.isoparametric import suits
@@ -21,13 +22,14 @@ TURN = 1e-3  # rad between normals at a joint; beyond it two faces are not one s
 WIDE = 1e3  # mm between the places where a face is searched for a change of label; there is none
 
 
-def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
+def trimmed_faces(path: Path, ready: Prepared, reading: PartReading | None = None) -> dict[str, tuple[Faces, ...]]:
     """The exact faces of every steep or shallow zone, by id of the zone, in the frame of its access.
 
     Faces of a zone that join smoothly form one sheet. Planes are left out, except on steep zones where tools may tilt;
     there each plane is a sheet of its own. Tools without a corner radius get passes only there, by their flank.
 
-    path : the STEP file that ``ready`` was read from
+    path    : the STEP file that ``ready`` was read from
+    reading : its reading, which may have read the exact faces
     """
     curved = {f.number for f in ready.part.faces if f.surface != "plane"}
     leans = ready.inputs.turns and ready.inputs.machine.simultaneous
@@ -37,11 +39,14 @@ def trimmed_faces(path: Path, ready: Prepared) -> dict[str, tuple[Faces, ...]]:
     numbers = sorted({f for z in wanted for f in z.faces} & curved | flat)
     if not numbers:
         return {}
-    exact = read_patches(path, numbers, placement=ready.inputs.placement, solid=ready.inputs.solid,
-                         fuse=ready.inputs.fuse)
+    exact = None if reading is None else reading.faces()
+    if exact is None or not exact.keys() >= set(numbers):
+        exact = read_patches(path, numbers, placement=ready.inputs.placement, solid=ready.inputs.solid,
+                             fuse=ready.inputs.fuse)
     pieces = trim_faces(ready.part, numbers, _whole, WIDE)[0]
     uv = np.array(ready.part.uv)
-    for f, patch in exact.items():
+    for f in numbers:
+        patch = exact[f]
         rows = ready.part.mesh.face_ids == f
         uv[rows] = patch.parameters(uv[rows].reshape(-1, 2)).reshape(-1, 3, 2)
     smooth = [e.faces for e in ready.part.edges if e.kind is EdgeKind.SMOOTH and abs(e.angle) < TURN]

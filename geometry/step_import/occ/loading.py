@@ -71,7 +71,11 @@ def load_part(path: str | Path, *, placement: SetupFrame | None = None, solid: i
     Nothing limits time or memory here.
     """
     check_tolerances(chord, angle)
-    loaded = load_solid(path, solid, fuse)
+    return part_of(load_solid(path, solid, fuse), placement=placement, chord=chord, angle=angle)
+
+
+def part_of(loaded: LoadedSolid, *, placement: SetupFrame | None, chord: float, angle: float) -> Part:
+    """The part of a solid that is loaded; arguments and errors as of ``load_part``."""
     step, body, warnings = loaded.step, loaded.body, loaded.warnings
     mesh = mesh_solid(body, chord, angle)
     warnings += mesh.warnings

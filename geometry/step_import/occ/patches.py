@@ -47,7 +47,12 @@ def load_patches(path: str | Path, *, placement: SetupFrame | None = None, solid
     StepError, PartError
         As ``load_solid``.
     """
-    shapes = faces_of(load_solid(path, solid, fuse).body)
+    return patches_of(load_solid(path, solid, fuse).body, placement, faces)
+
+
+def patches_of(body: Shape, placement: SetupFrame | None, faces: Iterable[int] | None) -> bytes:
+    """``load_patches`` of a kernel solid, STEP coordinates (mm), that is loaded."""
+    shapes = faces_of(body)
     wanted = range(1, len(shapes) + 1) if faces is None else sorted(set(faces))
     for number in wanted:
         if not 1 <= number <= len(shapes):

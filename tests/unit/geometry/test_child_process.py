@@ -44,6 +44,14 @@ def test_a_child_whose_request_does_not_come_is_stopped():
             told.result()
 
 
+def test_a_child_hands_over_a_first_result_and_goes_on():
+    code = ("import sys; from geometry.child_process import guard_child, hand_over; r = guard_child(); "
+            "hand_over(r, b'first'); sys.stdin.buffer.read(); r.write_bytes(b'last')")
+    told = []
+    last = run_limited([sys.executable, "-c", code], b"", time_limit=60.0, memory_limit=1e9, early=told.append)
+    assert (told, last) == ([b"first"], b"last")
+
+
 def hoarding(megabytes):
     """Code that takes memory and keeps it."""
     return f"import time; kept = bytearray(b'x') * ({megabytes} << 20); time.sleep(60)"

@@ -47,3 +47,27 @@ def test_a_job_that_fails_earlier_stops_it(monkeypatch):
     with pytest.raises(ZeroDivisionError), part_reading.PartReading(Path("p.step"), SETUP):
         raise ZeroDivisionError
     assert stopped == [True] and time.monotonic() - begun < 5.0
+
+
+def test_where_passes_are_planned_the_same_process_reads_the_faces_behind_the_part(monkeypatch):
+    go_on = Event()
+
+    def both(path, then, *, flat, **given):
+        then((path, given["chord"], flat))
+        go_on.wait(10.0)
+        raise PartError("killed", code="reader_crashed")
+
+    monkeypatch.setattr(part_reading, "read_part_and_faces", both)
+    with part_reading.PartReading(Path("p.step"), SETUP, planned=True) as reading:
+        assert reading.part() == (Path("p.step"), part_reading.mesh_chord(SETUP.quality), False)
+        go_on.set()
+        assert reading.faces() is None  # whoever needs them reads them alone, and meets the error
+
+
+def test_an_error_before_the_part_is_met_by_whoever_asks_for_it(monkeypatch):
+    def fails(*_, **__):
+        raise PartError("open", code="open_shell")
+
+    monkeypatch.setattr(part_reading, "read_part_and_faces", fails)
+    with part_reading.PartReading(Path("p.step"), SETUP, planned=True) as reading, pytest.raises(PartError):
+        reading.part()

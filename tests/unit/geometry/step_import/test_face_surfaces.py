@@ -11,10 +11,10 @@ import cadquery as cq  # noqa: E402
 from benchmarks.reach.exact_faces import ExactFaces  # noqa: E402
 from geometry.errors import GeometryError, StepError  # noqa: E402
 from geometry.setup_frame import SetupFrame  # noqa: E402
-from geometry.step_import.face_surfaces import patches_from_bytes, read_patches  # noqa: E402
+from geometry.step_import.face_surfaces import patches_from_bytes, patches_to_bytes, read_patches  # noqa: E402
 from geometry.step_import.occ.loading import load_part  # noqa: E402
 from geometry.step_import.occ.patches import load_patches  # noqa: E402
-from geometry.step_import.reader import read_part  # noqa: E402
+from geometry.step_import.reader import read_part, read_part_and_faces  # noqa: E402
 from tests.step_files import real_part, write_step  # noqa: E402
 
 PLACE = SetupFrame((1, 2, 3), (0.1, 1, 0.2), (1, 0, 0))
@@ -90,6 +90,14 @@ def test_curvature_is_that_of_the_exact_face(demo_files):
     rows = part.mesh.face_ids == face
     uv, points = part.uv[rows].reshape(-1, 2)[:40], part.mesh.triangles[rows].reshape(-1, 3)[:40]
     assert np.allclose(patch.surface.curvature(patch.parameters(uv)), exact.evaluate(face, points).curvature, atol=1e-5)
+
+
+def test_faces_read_behind_the_part_are_those_read_alone(demo_files):
+    parts = []
+    both = read_part_and_faces(demo_files[0], parts.append, flat=False, placement=PLACE, chord=0.02)
+    curved = [f.number for f in parts[0].faces if f.surface != "plane"]
+    assert both == patches_to_bytes(read_patches(demo_files[0], curved, placement=PLACE).values())
+    assert parts[0].to_bytes() == read_part(demo_files[0], placement=PLACE, chord=0.02).to_bytes()
 
 
 def test_faces_by_number_and_errors(demo_files, tmp_path):
