@@ -69,7 +69,7 @@ def paced(points: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> list[tupl
     if not busy.any():
         return [(False, points, pace.feed if pace.hidden is None else pace.hidden)]
     feeds = np.full(len(at), calm)
-    feeds[busy] = _in_stock(way, stock, tool, pace)[busy]
+    feeds[busy] = _in_stock(way, busy, stock, tool, pace)
     feeds = minimum_filter1d(feeds, 2 * LOOKS + 1, mode="nearest")
     # a stretch of higher feed shorter than the guard is left out
     feeds = maximum_filter1d(minimum_filter1d(feeds, LOOKS + 1, mode="nearest"), LOOKS + 1, mode="nearest")
@@ -83,16 +83,16 @@ def paced(points: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> list[tupl
             for k, low, high in zip(kinds.tolist(), bounds[:-1].tolist(), bounds[1:].tolist(), strict=True)]
 
 
-def _in_stock(way: F64, stock: StockMap, tool: ToolBody, pace: Pace) -> NDArray[np.float64]:
-    """Feeds at tips (n, 3), mm, whether in stock or not, (n,) float64, mm/min.
+def _in_stock(way: F64, busy: NDArray[np.bool_], stock: StockMap, tool: ToolBody, pace: Pace) -> NDArray[np.float64]:
+    """Feeds at those of the tips (n, 3), mm, of a way that are in stock, (n,) bool: one for each, float64, mm/min.
 
     Where no angle is engaged the whole front may be in a skin, which does not count. Deeper stock that is not in front
     is missed by a row of nodes. It is no thicker than ``SURE_RIM`` of a step. A cutter that breaks through it has it in
     front over at most 2 arccos (1 - thickness / radius).
     """
-    over = stock.overlap(way, tool, pace.rim, lower_bound=0.0)
+    over = stock.overlap(way[busy], tool, pace.rim, lower_bound=0.0)
     depth = np.ceil(over / pace.layer * DEPTHS - 1e-9).astype(np.int64)
-    turn = np.ceil(angles(stock, way, tool) / ANGLE - 1e-9).astype(np.int64)
+    turn = np.ceil(angles(stock, way, tool)[busy] / ANGLE - 1e-9).astype(np.int64)
     missed = 2.0 * math.acos(max(1.0 - SURE_RIM * stock.lattice.step / tool.radius, 0.0))
     deep = over > SKIN_SHARE * tool.radius
     turn[turn == 0] = np.where(deep, math.ceil(missed / ANGLE), round(math.pi / ANGLE))[turn == 0]

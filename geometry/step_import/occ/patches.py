@@ -51,7 +51,13 @@ def load_patches(path: str | Path, *, placement: SetupFrame | None = None, solid
 
 
 def patches_of(body: Shape, placement: SetupFrame | None, faces: Iterable[int] | None) -> bytes:
-    """``load_patches`` of a kernel solid, STEP coordinates (mm), that is loaded."""
+    """``load_patches`` of a kernel solid, STEP coordinates (mm), that is loaded.
+
+    Raises
+    ------
+    GeometryError
+        A face does not exist.
+    """
     shapes = faces_of(body)
     wanted = range(1, len(shapes) + 1) if faces is None else sorted(set(faces))
     for number in wanted:
