@@ -63,8 +63,8 @@ def touched_on_ways(tree: TriangleTree, points: F64, tool: ToolBody, ways: MillW
                     lift: float, grow: float) -> BOOL:
     """Places that a mill touches where its own feed moves take it, as low as the tree lets it go.
 
-    points : (n, 3) float64, mm
-    axes   : (k, 3) float64, unit, tip to spindle
+    points : (n, 3) float64, mm, frame of the tree
+    axes   : (k, 3) float64, unit, frame of the tree, tip to spindle
     lift   : mm, distance within which a touch counts, and by which the mill may enter walls, at most a quarter of its
              radius: facets of a slot of its own width stand in, and its ways are rounded
     grow   : mm, allowance that stays on the part

@@ -154,7 +154,7 @@ def _into(sweep: _Sweep, body: TurnedOutline, box: F64) -> tuple[NDArray[np.int6
     The first ``MAX_CONTACTS`` pieces; a direction that sets one piece apart from the box is tried for all that follow.
     """
     table = body.supports()
-    hit, depth, at = [], [], []
+    hit, depth, at = list[int](), list[float](), list[F64]()
     open_ = np.arange(len(sweep.start))
     for n in _FEW:
         open_ = open_[~_set_apart(sweep.only(open_), table, box, n)]
