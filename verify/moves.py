@@ -74,7 +74,7 @@ class Moves:
 def cutter_table(tools: Sequence[ToolBody]) -> F64:
     """Sizes of the cutting parts of k tools, as rows of ``geometry.kernels.cutter_sizes.CutterSizes``.
 
-    Returns (k, 6) float64, mm, in the tool frame; the last column, a tangent, is dimensionless.
+    Returns (k, 9) float64, mm, in the tool frame; column 5, a tangent, is dimensionless.
 
     Flutes that end at the corner to the rounding of its height reach to it.
 
@@ -91,7 +91,7 @@ def cutter_table(tools: Sequence[ToolBody]) -> F64:
                 code="flute_too_short", subjects=(tool.id,), measured=tool.flute_length, limit=corner_height,
                 remedy="give the flute length measured from the tip")
     return np.array([cutter_sizes(t, max(t.flute_length, high)) for t, high in zip(tools, corner, strict=True)],
-                    dtype=np.float64).reshape(-1, 6)
+                    dtype=np.float64).reshape(-1, 9)
 
 
 def cutter_sizes(tool: ToolBody, length: float | None = None) -> CutterSizes:
@@ -99,7 +99,10 @@ def cutter_sizes(tool: ToolBody, length: float | None = None) -> CutterSizes:
 
     length : mm, its height over the tip; None: the flute length
     """
-    high = tool.flute_length if length is None else length
+    high, arcs = tool.flute_length if length is None else length, tool.arcs
+    if arcs is not None:
+        return CutterSizes(tool.radius, tool.radius - arcs.flat, high, arcs.high, arcs.low, 0.0, arcs.out, arcs.up,
+                           arcs.bow)
     if tool.taper <= 0.0:
         return CutterSizes(tool.radius, tool.corner_width, high, tool.cone_height)
     wide, low = tool.corner_end

@@ -52,7 +52,7 @@ class Bodies:
     def arrays(self, cutters: F64, ends: F64) -> ToolArrays:
         """The tools for kernels.
 
-        cutters : (k, 6) float64, mm, tool frame, as ``cutter_table``
+        cutters : (k, 9) float64, mm, tool frame, as ``cutter_table``
         ends    : (k,) float64, mm, as ``end_radii``
         """
         return ToolArrays(cutters, ends, self.reach(cutters), self.rows, self.first)
@@ -60,7 +60,7 @@ class Bodies:
     def reach(self, cutters: F64) -> F64:
         """Largest distance of each assembly from its tip.
 
-        cutters : (k, 6) float64, mm, tool frame, as ``cutter_table``
+        cutters : (k, 9) float64, mm, tool frame, as ``cutter_table``
 
         Returns (k,) float64, mm.
         """
@@ -73,7 +73,7 @@ class Bodies:
     def width(self, cutters: F64) -> float:
         """Largest radius of all assemblies, mm.
 
-        cutters : (k, 6) float64, mm, tool frame, as ``cutter_table``
+        cutters : (k, 9) float64, mm, tool frame, as ``cutter_table``
         """
         return float(max(cutters[:, 0].max(initial=0.0), self.rows[:, 2:4].max(initial=0.0)))
 

@@ -22,6 +22,8 @@ class CutterSizes(NamedTuple):
     round  : float, mm, radius of the arc between the flat end and the side of a tapered mill, tangent to both; 0 for an
              edge
     taper  : float, dimensionless, tangent of the angle between the axis and the side of a tapered mill; else 0
+    out, up, bow : float, mm, centre (distance from the axis, height) and radius of the upper arc of a circle segment
+             mill, whose lower arc has the radius ``round``, and ends as high as ``cone``; ``up`` is 0 for other tools
     """
 
     radius: float
@@ -30,18 +32,23 @@ class CutterSizes(NamedTuple):
     cone: float = 0.0
     round: float = 0.0
     taper: float = 0.0
+    out: float = 0.0
+    up: float = 0.0
+    bow: float = 0.0
 
 
 @njit(**KERNEL)
 def sizes_of(cutters, k):
-    """Row k of a table of sizes, (n, 6) float64, mm, as ``CutterSizes``."""
-    return CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3], cutters[k, 4], cutters[k, 5])
+    """Row k of a table of sizes, (n, 9) float64, mm, as ``CutterSizes``."""
+    return CutterSizes(cutters[k, 0], cutters[k, 1], cutters[k, 2], cutters[k, 3], cutters[k, 4], cutters[k, 5],
+                       cutters[k, 6], cutters[k, 7], cutters[k, 8])
 
 
 @njit(**KERNEL)
 def widened(cutter, grow):
     """``CutterSizes`` of a cutting part with ``grow`` mm more radius everywhere, the shape of its corner as it was."""
-    return CutterSizes(cutter.radius + grow, cutter.corner, cutter.length, cutter.cone, cutter.round, cutter.taper)
+    return CutterSizes(cutter.radius + grow, cutter.corner, cutter.length, cutter.cone, cutter.round, cutter.taper,
+                       cutter.out + grow, cutter.up, cutter.bow)
 
 
 @njit(**KERNEL)
@@ -69,3 +76,11 @@ def side_height(cutter):
     if cutter.taper > 0.0:
         return corner_end(cutter)[1]
     return cutter.cone if cutter.cone > 0.0 else cutter.corner
+
+
+@njit(**KERNEL)
+def arcs_touch(cutter):
+    """Where the two arcs of a circle segment mill touch: distance from the axis and height, mm."""
+    flat, far = cutter.radius - cutter.corner, cutter.bow - cutter.round
+    share = cutter.round / far
+    return flat + (flat - cutter.out) * share, cutter.round + (cutter.round - cutter.up) * share

@@ -77,7 +77,7 @@ def free_widths(height: F64, origin: F64, step, moves: MoveArrays, cutters: F64,
 
     height    : (nx, ny) float64, mm, setup frame, lines as ``LineArrays``
     origin    : (2,) float64, mm, setup frame; step : mm between lines
-    cutters   : (k, 6) float64, mm, tool frame; stickouts : (k,) float64, mm, nan for a tool that is not asked for
+    cutters   : (k, 9) float64, mm, tool frame; stickouts : (k,) float64, mm, nan for a tool that is not asked for
     boxes     : (f, 2, 3) float64, mm, setup frame, fixtures
     least     : (k,) float64, mm, in: the largest radius asked for; out: the free radius
     where     : (k,) int64, index, out: the move that makes it the least; unchanged where none does

@@ -10,7 +10,7 @@ Notation
                   of a straight line from, and before it that of an arc
 Heights on the lines are exact; what stands wholly between two lines is not seen. The profile is convex and, but for the
 edges of cones, smooth, so its lowest place along a move is where its slope is that of the move: a closed form on a ball
-and on a cone, 40 halvings (1e-12 of the way) on the corner of a bull nose.
+and on a cone, 40 halvings (1e-12 of the way) on the corner of a bull nose and on the arcs of a circle segment mill.
 """
 
 from __future__ import annotations
@@ -21,14 +21,17 @@ import numpy as np
 from numba import njit
 
 from geometry.kernels.cutter_sizes import CutterSizes, corner_end, slope_of, widened
+from verify.kernels.segment import arc_bottom, arc_width, lowest_on_arcs
 
 INF = np.inf
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _bottom_with_side(rho, over, cutter):
-    """As ``bottom``, of a cone or a tapered mill, ``over`` mm beyond its flat end."""
+    """As ``bottom``, of a cone or a tapered or circle segment mill, ``over`` mm beyond its flat end."""
     r = cutter.round
+    if cutter.up > 0.0:
+        return arc_bottom(rho, cutter)
     if r <= 0.0:
         return over * cutter.cone / cutter.corner
     wide, high = corner_end(cutter)
@@ -52,6 +55,8 @@ def edge_radius(over, cutter: CutterSizes):
     if over >= (cone if cone > 0.0 else r):
         return radius
     if cone > 0.0:
+        if cutter.up > 0.0:
+            return arc_width(over, cutter)
         if cutter.round <= 0.0:
             return radius - r + over * r / cone
         wide, high = corner_end(cutter)
@@ -108,10 +113,12 @@ def _lowest_on_torus(wx, wy, dx, dy, dz, s1, s2, a, r):
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def _lowest_with_side(wx, wy, dx, dy, dz, plan, s0, miss2, s1, s2, cutter):
-    """As ``_lowest_s``, of a cone or a tapered mill.
+    """As ``_lowest_s``, of a cone or a tapered or circle segment mill.
 
     A tapered mill is smooth where its side begins: it is lowest on the side, or nearer than that on its corner.
     """
+    if cutter.up > 0.0:
+        return lowest_on_arcs(wx, wy, dx, dy, dz, s1, s2, cutter)
     a, r = cutter.radius - cutter.corner, cutter.round
     if r <= 0.0:
         return min(max(_lowest_on_cone(dz, plan, s0, miss2, a, 1.0 / slope_of(cutter)), s1), s2)
@@ -174,11 +181,11 @@ def lowest_within(x, y, ax, ay, az, dx, dy, dz, wide, cutter: CutterSizes):
 def _within(s, wx, wy, dx, dy, dz, over, cutter):
     """How deep a line is in a cutting part at s: the shorter of the way aside and the way over its end.
 
-    Aside, a line as high as that leaves a tapered mill where its side is as wide.
+    Aside, a line as high as that leaves a tapered or circle segment mill where its side is as wide.
     """
     rho = _rho(s, wx, wy, dx, dy)
     top = over - s * dz
-    wide = edge_radius(max(top, 0.0), cutter) if cutter.taper > 0.0 else cutter.radius
+    wide = edge_radius(max(top, 0.0), cutter) if cutter.taper > 0.0 or cutter.up > 0.0 else cutter.radius
     return min(wide - rho, top - bottom(min(rho, cutter.radius), cutter))
 
 

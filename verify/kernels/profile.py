@@ -2,8 +2,8 @@
 
 The profile over distance rho from the axis and height h from the tip is a rectangle grown by the corner radius r: flat
 end a = R - r, side R, cut off at the flute length L. With ``cone`` above 0 the corner is straight, from (a, 0) to
-(R, cone), and a tapered mill has an arc of radius r before it: that is a cone from (a, r) grown by r. Distances are
-exact but over the flutes, where the larger of the two ways is taken (a lower bound). A standing cutting part is convex,
+(R, cone), and a tapered mill has an arc of radius r before it: that is a cone from (a, r) grown by r. A circle segment
+mill has two arcs (``verify.kernels.segment``). Distances are exact but over the flutes, where the larger of the two ways is taken (a lower bound). A standing cutting part is convex,
 so along a line the distance is convex in s.
 """
 
@@ -15,6 +15,7 @@ from numba import njit
 
 from geometry.kernels.cutter_sizes import CutterSizes, slope_of, widened
 from geometry.kernels.options import KERNEL
+from verify.kernels.segment import arc_gradient, on_lower_arc
 
 GOLDEN = 0.3819660112501051
 FINE = 1e-5
@@ -27,6 +28,8 @@ def leaning(rho, h, cutter: CutterSizes):
     With x and y from the end of the flat at height r: under the cone and beside the flat the nearest place is on the
     arc; over the rim of the cone it is the rim or the cylinder. Inside, the distance is that to the nearest tangent.
     """
+    if cutter.up > 0.0:
+        return arc_gradient(rho, h, cutter)[0]
     m, r = slope_of(cutter), cutter.round
     x, y = rho - (cutter.radius - cutter.corner), h - r
     if x > 0.0 and m * x + y < 0.0:
@@ -133,7 +136,13 @@ def carried(qx, qy, qz, dx, dy, dz, cutter: CutterSizes):
         s = min(max((qx * dx + qy * dy + z * dz) / (plan2 + dz * dz), 0.0), 1.0)
         wx, wy, wz = qx - s * dx, qy - s * dy, z - s * dz
         # the nearest place is on the ball: under its equator, or where a cone begins
-        if (wz if cone == 0.0 else wz + cutter.taper * math.sqrt(wx * wx + wy * wy)) <= 0.0:
+        if cutter.up > 0.0:
+            # and no tangent of the rest is farther, as inside a lens
+            on_ball = on_lower_arc(math.sqrt(wx * wx + wy * wy), -wz, cutter) and _at(
+                s, qx, qy, qz, dx, dy, dz, cutter) <= math.sqrt(wx * wx + wy * wy + wz * wz) - r + 1e-12
+        else:
+            on_ball = (wz if cone == 0.0 else wz + cutter.taper * math.sqrt(wx * wx + wy * wy)) <= 0.0
+        if on_ball:
             return math.sqrt(wx * wx + wy * wy + wz * wz) - r
     if plan2 == 0.0 and cone == 0.0 and r <= 0.5 * length:
         # straight along the axis: no height is better than the middle of the flutes

@@ -144,7 +144,7 @@ def cut_tile(tile, cells: CellArrays, samples: SampleArrays, left, moves: MoveAr
 
     samples : sorted by cell
     left    : (cells,) float64, mm, largest residual of each cell, changed in place
-    cutters : (k, 6) float64, mm, rows of ``CutterSizes``
+    cutters : (k, 9) float64, mm, rows of ``CutterSizes``
     once    : whether the first cut of a sample is the last: its residual is then ``CUT_ONCE``
     """
     cx0, cx1, cy0, cy1 = tile

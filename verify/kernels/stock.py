@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from geometry.kernels.cutter_sizes import corner_end, sizes_of
+from geometry.kernels.cutter_sizes import arcs_touch, corner_end, sizes_of
 from geometry.kernels.cutter_sizes import end_radius as end_of
 from verify.kernels.engaged import LEAST_DEPTH, WINDOW, EngagedArrays, sector_bits
 from verify.kernels.frustum import Frustum, clear_of, contact
@@ -210,7 +210,11 @@ def _lower(lines, box, a, d, cutter, end, descents, m, history, engaged, totals,
     floor = min(a[2], a[2] + d[2])
     flat, plan2 = radius - corner, d[0] * d[0] + d[1] * d[1]
     rim = min(RIM, RIM_SHARE * radius)
-    inner, side = radius - rim, (corner_end(cutter)[0] if cutter.taper > 0.0 else radius)
+    inner, side, leans = radius - rim, radius, cutter.taper > 0.0 or cutter.up > 0.0
+    if cutter.taper > 0.0:
+        side = corner_end(cutter)[0]
+    elif cutter.bow > cutter.round:
+        side = arcs_touch(cutter)[0]
     along = 1.0 / plan2 if plan2 > 0.0 else 0.0
     plan = math.sqrt(plan2)
     for i in range(a0, a1 + 1):
@@ -234,7 +238,7 @@ def _lower(lines, box, a, d, cutter, end, descents, m, history, engaged, totals,
                 continue
             # a line on the very edge is lowered whatever rounding says, or the next pass would find it standing; a side
             # that leans meets it where it is as wide as its top is high, and not before
-            touch = reach if cutter.taper > 0.0 else radius
+            touch = reach if leans else radius
             low, s = lowest_within(x, y, a[0], a[1], a[2], d[0], d[1], d[2], touch * (1.0 + 0.5 * EDGE), cutter)
             gone = height[i, j] - low
             if gone <= 1e-9:
@@ -248,7 +252,9 @@ def _lower(lines, box, a, d, cutter, end, descents, m, history, engaged, totals,
                 k = min(int(s * count), count - 1)
                 taken[k, 0] += max(round((low + gone - max(low, bottom)) * cell), 1)
                 # what a leaning side takes off is its slope times that in width
-                if near < inner * inner and (near < side * side or gone * cutter.taper > rim):
+                if near < inner * inner and (near < side * side or gone * cutter.taper > rim or (
+                        cutter.bow > cutter.round
+                        and edge_radius(low + gone - a[2] - s * d[2], cutter) - math.sqrt(near) > rim)):
                     taken[k, 1] = max(taken[k, 1], round((low + gone - max(a[2] + s * d[2], bottom)) * UNITS))
             if plan > 0.0:
                 # a round end lowers a line bit by bit: what counts is all it takes off the line on its way over it

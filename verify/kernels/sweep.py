@@ -17,7 +17,8 @@ A tapered mill is its corner and a cone from where the corner ends. The whole ba
 in the endless cone over it, so it is cut off at the flute length only; flutes of a bull nose are as long as a torus is
 high.
 A torus corner is a disc of radius a grown by r: the distance to the swept disc is convex in t, so
-Newton's step from outside never passes the root.
+Newton's step from outside never passes the root. A circle segment mill is met in the same way: its signed distance is
+convex in s and t together, so the least of it over s is convex in t.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ import numpy as np
 from numba import njit
 
 from geometry.kernels.cutter_sizes import CutterSizes, corner_end
+from verify.kernels.segment import arc_gradient
 
 INF = np.inf
 FLAT_RAY = 1e-9
@@ -358,11 +360,95 @@ def _tapered_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter):
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _arcs_at(s, ray, dx, dy, dz, cutter):
+    """Signed distance from the beginning of a ray to a standing circle segment mill at s; derivatives by s and t."""
+    qx, qy, qz, nx, ny, nz = ray
+    wx, wy, h = qx - s * dx, qy - s * dy, qz - s * dz
+    rho = math.sqrt(wx * wx + wy * wy)
+    far, aside, up = arc_gradient(rho, h, cutter)
+    if h - cutter.length > far:
+        far, aside, up = h - cutter.length, 0.0, 1.0
+    aside = aside / rho if rho > 0.0 else 0.0
+    return far, -aside * (wx * dx + wy * dy) - up * dz, aside * (wx * nx + wy * ny) + up * nz
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _arcs_distance(ray, dx, dy, dz, cutter):
+    """Signed distance from the beginning of a ray to the swept circle segment mill, and its derivative along the ray.
+
+    At a kink the derivative is that of the two sides, weighed so that nothing is left of those by s.
+    """
+    qx, qy, _, _, _, _ = ray
+    plan2 = dx * dx + dy * dy
+    if dz == 0.0:
+        s = min(max((qx * dx + qy * dy) / plan2, 0.0), 1.0) if plan2 > 0.0 else 0.0
+        far, _, slope = _arcs_at(s, ray, dx, dy, dz, cutter)
+        return far, slope
+    lo, hi, side = 0.0, 1.0, 0
+    far_lo, flo, glo = _arcs_at(lo, ray, dx, dy, dz, cutter)
+    if flo >= 0.0:
+        return far_lo, glo
+    far_hi, fhi, ghi = _arcs_at(hi, ray, dx, dy, dz, cutter)
+    if fhi <= 0.0:
+        return far_hi, ghi
+    wlo, whi, small = flo, fhi, 1e-13 * math.sqrt(plan2 + dz * dz)
+    for k in range(150):
+        # false position creeps where the mill covers the ray or at a kink: halve in between
+        s = 0.5 * (lo + hi) if k % 3 == 2 else (lo * whi - hi * wlo) / (whi - wlo)
+        far, f, g = _arcs_at(s, ray, dx, dy, dz, cutter)
+        if abs(f) <= small:
+            return far, g
+        if f < 0.0:
+            lo, far_lo, flo, glo, wlo = s, far, f, g, f
+            whi = 0.5 * whi if side == -1 else whi
+            side = -1
+        else:
+            hi, far_hi, fhi, ghi, whi = s, far, f, g, f
+            wlo = 0.5 * wlo if side == 1 else wlo
+            side = 1
+        if hi - lo < 1e-13:
+            break
+    return min(far_lo, far_hi), (fhi * glo - flo * ghi) / (fhi - flo)
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _arcs_root(t, limit, sign, ray, dx, dy, dz, cutter):
+    """Newton from t (outside) in the direction of ``sign`` to the swept mill; NaN where the ray passes by."""
+    qx, qy, qz, nx, ny, nz = ray
+    for _ in range(80):
+        far, slope = _arcs_distance(Ray(qx + t * nx, qy + t * ny, qz + t * nz, nx, ny, nz), dx, dy, dz, cutter)
+        if far <= ROOT_ERROR:
+            return t
+        if slope * sign >= -1e-12:
+            return np.nan
+        t -= far / slope
+        if (t - limit) * sign > 0.0:
+            return np.nan
+    return t
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _arcs_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter):
+    """As ``cutter_interval``, of a circle segment mill, from the interval of the cylinder that holds it."""
+    lo, hi = cylinder_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter.radius, 0.0, cutter.length)
+    if lo > hi:
+        return INF, -INF
+    ray = Ray(qx, qy, qz, nx, ny, nz)
+    first = _arcs_root(lo, hi, 1.0, ray, dx, dy, dz, cutter)
+    if math.isnan(first):
+        return INF, -INF
+    last = _arcs_root(hi, first, -1.0, ray, dx, dy, dz, cutter)
+    return first, (first if math.isnan(last) else last)
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
 def cutter_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter: CutterSizes):
     """Interval of t inside the sweep of a whole cutting part; (inf, -inf) where the ray misses it."""
     radius, corner, length, cone = cutter.radius, cutter.corner, cutter.length, cutter.cone
     if cutter.taper > 0.0:
         return _tapered_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter)
+    if cutter.up > 0.0:
+        return _arcs_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter)
     lo, hi = cylinder_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius, cone if cone > 0.0 else corner, length)
     if cone > 0.0:
         u, v = cone_interval(qx, qy, qz, nx, ny, nz, dx, dy, dz, radius - corner, radius, cone)

@@ -46,7 +46,7 @@ class AxisArrays(NamedTuple):
 class ToolArrays(NamedTuple):
     """Sizes of tools, frame of the tool: tip at the origin, axis Z.
 
-    cutters : (k, 6) float64, mm, rows of ``CutterSizes``
+    cutters : (k, 9) float64, mm, rows of ``CutterSizes``
     ends    : (k,) float64, mm, radius of the end that cuts straight down
     reach   : (k,) float64, mm, largest distance of each assembly from its tip
     bodies  : (b, 6) float64, mm, rows of necks, shanks and holders; see ``verify.kernels.stock``

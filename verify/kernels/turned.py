@@ -78,7 +78,7 @@ def cut_chunk(chunk, balls, samples: SampleArrays, moves: MoveArrays, axes: Axis
 
     balls   : four (k, 4) float64, mm, balls of 8, 64, 512, 4096 samples
     samples : in the order of the tree
-    cutters : (k, 6) float64, mm, rows of ``CutterSizes``
+    cutters : (k, 9) float64, mm, rows of ``CutterSizes``
     reach   : (k,) float64, mm, how far the cutting part reaches from the tip
     once    : as in ``rays.cut_tile``
     """

@@ -236,6 +236,9 @@ def round_off(tools: Sequence[ToolBody]) -> F64:
     share = (np.arange(400) + 0.5) / 400.0  # of the area of the end
     out = []
     for tool, end in zip(tools, end_radii(tools).tolist(), strict=True):
+        if tool.arcs is not None:
+            out.append(float(np.mean([tool.arcs.height(rho) for rho in (end * np.sqrt(share)).tolist()])))
+            continue
         over, corner = np.maximum(end * np.sqrt(share) - (tool.radius - tool.corner_width), 0.0), tool.corner_width
         out.append(float(np.mean(over * tool.cone_height / corner if tool.cone_height > 0.0 else
                                  corner - np.sqrt(np.maximum(corner**2 - over**2, 0.0)))))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from geometry.kernels.cutter_sizes import CutterSizes, sizes_of, slope_of
 from verify.kernels.rays import TOUCH, CellArrays, gap, new_left, plan_distance
+from verify.kernels.segment import touching_place
 from verify.kernels.tables import F64, MoveArrays
 
 BOOL = NDArray[np.bool_]
@@ -60,6 +61,9 @@ def deepest_point(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter: CutterSizes):
         x, y, z = k * dx - qx, k * dy - qy, k * dz - qz
         if nz < -LEVEL:
             out, height = cutter.radius, z + cutter.length
+        elif nz > LEVEL and cutter.up > 0.0:
+            out, height = touching_place(aside, nz, cutter)
+            height += z
         elif nz > LEVEL and cutter.cone > 0.0:
             # the arc or the edge under the cone, or the upper end of the cone
             out, height = cutter.radius - cutter.corner + cutter.round * aside, z + cutter.round * (1.0 - nz)
@@ -82,7 +86,7 @@ def deepest_point(qx, qy, qz, nx, ny, nz, dx, dy, dz, cutter: CutterSizes):
 def judge_tile(tile, cells: CellArrays, places: PlaceArrays, moves: MoveArrays, cutters):
     """Work all feed moves through the places of the cell columns x0..x1-1, y0..y1-1 of a tile (x0, x1, y0, y1).
 
-    cutters : (k, 6) float64, mm, rows of ``CutterSizes``
+    cutters : (k, 9) float64, mm, rows of ``CutterSizes``
     """
     cx0, cx1, cy0, cy1 = tile
     origin, size, shape, first = cells
