@@ -25,8 +25,11 @@ The lower one touches the level of the tip at ``flat`` from the axis.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+
+MIN_ARC = 1e-6
+"""mm, least radius of the lower arc of an end that is made smaller."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,22 @@ class ArcPair:
         share = corner_radius / far if far > 0.0 else 0.0
         return cls(flat, corner_radius, out, up, profile_radius, flat + (flat - out) * share,
                    corner_radius - (up - corner_radius) * share, radius, up - profile_radius * taper / long)
+
+    def grown(self, by: float) -> ArcPair:
+        """The arcs of the same end ``by`` mm farther out on all sides, from its own tip on.
+
+        A barrel that leans at its end gets no less than that: the large arc goes on up to the larger diameter.
+        """
+        wide, low, bow = self.wide + by, max(self.low + by, MIN_ARC), self.bow + by
+        if self.flat == 0.0 and self.low > self.bow:
+            return ArcPair.lens(wide, low, max(bow, 0.0))
+        up, rest = self.up + by, max(bow * bow - (wide - self.out) ** 2, 0.0)
+        return replace(self, low=low, up=up, bow=bow, join=self.flat + low * self.join_sine,
+                       join_up=low * (1.0 - math.sqrt(1.0 - self.join_sine**2)), wide=wide, high=up - math.sqrt(rest))
+
+    def shifted(self, by: float) -> ArcPair:
+        """The arcs ``by`` mm farther from the axis, beside a flat as much wider; by > -flat."""
+        return replace(self, flat=self.flat + by, out=self.out + by, join=self.join + by, wide=self.wide + by)
 
     @property
     def join_sine(self) -> float:

@@ -2,7 +2,8 @@
 
 The cutter stands upright (+z), tip down. Its body is a disc-bottomed shape of ``radius`` and
 ``corner_radius`` (ball: equal, flat: 0, bull nose: between) under an endless cylinder. The side of a tapered
-mill (``LeaningSide``) leans outwards first. A tip height is the lowest at which the body does not enter the
+mill (``LeaningSide``) leans outwards first. The two arcs of a circle segment mill (``ArcPair``) take the place of the
+corner; ``radius`` is then where they end, and ``corner_radius`` does not count. A tip height is the lowest at which the body does not enter the
 mesh; -inf where nothing is below. Theory: docs/theory/drop.md.
 
 Arrays are split over numba's threads where it has several. Where it has one (``NUMBA_NUM_THREADS=1`` or
@@ -25,12 +26,13 @@ from geometry.errors import GeometryError
 from geometry.kernels import drop as kernels
 from geometry.kernels.drop import Bull, bull_of
 from geometry.kernels.tapered import Tapered, tapered_of
+from geometry.kernels.two_arcs import TwoArcs, two_arcs_of
 from geometry.mesh import F64, I32
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.curve_order import in_order
-from geometry.tool_body import ToolBody
+from geometry.tool_body import ArcPair, ToolBody
 
-Shape = Bull | Tapered
+Shape = Bull | Tapered | TwoArcs
 
 FEW = 4000  # fewer queries do not pay for a second thread
 
@@ -46,22 +48,29 @@ class LeaningSide(NamedTuple):
     widest: float
 
 
-def drop_shape(radius: float, corner_radius: float, side: LeaningSide | None = None) -> Shape:
+Side = LeaningSide | ArcPair
+"""What ends of other kinds than ball, flat and bull nose have beside their radii."""
+
+
+def drop_shape(radius: float, corner_radius: float, side: Side | None = None) -> Shape:
     """The body as compiled loops take it.
 
     radius        : float, mm, of the cutter, or of the end of a tapered one
     corner_radius : float, mm
-    side          : LeaningSide of a tapered mill, None for an upright side
+    side          : LeaningSide of a tapered mill, ArcPair of a circle segment mill, None for an upright side
     """
     if side is None:
         return bull_of.py_func(float(radius), float(corner_radius))
+    if isinstance(side, ArcPair):
+        a = side
+        return two_arcs_of(*map(float, (a.flat, a.low, a.out, a.up, a.bow, a.wide, a.high)))
     return tapered_of(float(radius), float(corner_radius), float(side.taper), float(side.widest))
 
 
 @lru_cache(maxsize=256)
 def cutter_shape(tool: ToolBody) -> Shape:
     """The cutting part of a tool as compiled loops take it."""
-    side = LeaningSide(tool.taper, tool.widest_radius) if tool.taper > 0.0 else None
+    side = LeaningSide(tool.taper, tool.widest_radius) if tool.taper > 0.0 else tool.arcs
     return drop_shape(tool.radius, tool.corner_radius, side)
 
 
@@ -80,7 +89,7 @@ class DropContacts:
 
 
 def drop_tips(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: float, out: F64 | None = None,
-              side: LeaningSide | None = None) -> F64:
+              side: Side | None = None) -> F64:
     """Lowest tip height over each point: contact with vertices, edges and facets [Yau2004].
 
     tree          : TriangleTree
@@ -88,7 +97,8 @@ def drop_tips(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: f
     radius        : float, mm, >= 0; 0 gives the height of the mesh itself
     corner_radius : float, mm, 0 <= corner_radius <= radius
     out           : (n,) float64, mm, to write into; new when None
-    side          : LeaningSide of a tapered mill, whose end has the radius; None for an upright side
+    side          : LeaningSide of a tapered mill, whose end has the radius, ArcPair of a circle segment mill; None for
+                    an upright side
 
     Returns
     -------
@@ -119,7 +129,7 @@ def drop_tips(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: f
 
 
 def drop_along(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: float,
-               side: LeaningSide | None = None) -> F64:
+               side: Side | None = None) -> F64:
     """``drop_tips`` over places that follow each other as on a path, with less work the closer they are.
 
     xy : (n, 2) float64, mm, places of the axis in the frame of the mesh; other parameters as there
@@ -142,7 +152,7 @@ def drop_along(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: 
 
 
 def drop_contacts(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radius: float,
-                  side: LeaningSide | None = None) -> DropContacts:
+                  side: Side | None = None) -> DropContacts:
     """``drop_tips`` with the triangle and the point that hold each tip up; parameters as there.
 
     xy : (n, 2) float64, mm, places of the axis in the frame of the mesh
@@ -164,7 +174,7 @@ def drop_contacts(tree: TriangleTree, xy: ArrayLike, radius: float, corner_radiu
 
 
 def blocked_many(tree: TriangleTree, tips: ArrayLike, radius: float, corner_radius: float,
-                 side: LeaningSide | None = None) -> NDArray[np.bool_]:
+                 side: Side | None = None) -> NDArray[np.bool_]:
     """Whether the body enters the mesh with its tip at each point.
 
     tips : (n, 3) float64, mm, frame of the mesh; the other parameters are those of ``drop_tips``
@@ -195,13 +205,13 @@ def blocked_many(tree: TriangleTree, tips: ArrayLike, radius: float, corner_radi
 
 
 def drop_grid(tree: TriangleTree, x0: float, y0: float, step: float, nx: int, ny: int, radius: float,
-              corner_radius: float, side: LeaningSide | None = None) -> F64:
+              corner_radius: float, side: Side | None = None) -> F64:
     """Lowest tip height over a grid of points.
 
     x0, y0 : float, mm, the first point
     step   : float, mm, > 0, distance of neighbours
     nx, ny : int, number of points along x and y
-    side   : LeaningSide of a tapered mill, None for an upright side
+    side   : LeaningSide of a tapered mill, ArcPair of a circle segment mill, None for an upright side
 
     Returns
     -------

@@ -16,7 +16,7 @@ from scipy import ndimage
 
 from geometry.mesh import F64, TriangleMesh
 from geometry.mesh_queries.bvh import TriangleTree
-from geometry.mesh_queries.drop import LeaningSide, drop_contacts, drop_grid, drop_tips
+from geometry.mesh_queries.drop import LeaningSide, Side, drop_contacts, drop_grid, drop_tips
 
 BLOCK = 16  # points along a side
 LARGE = 1_000_000  # points: a smaller grid is measured point by point
@@ -24,7 +24,7 @@ EVEN = 1e-9  # mm, heights that are the same
 
 
 def drop_over_flats(tree: TriangleTree, x0: float, y0: float, step: float, nx: int, ny: int, radius: float,
-                    corner_radius: float, large: int = LARGE, side: LeaningSide | None = None) -> F64:
+                    corner_radius: float, large: int = LARGE, side: Side | None = None) -> F64:
     """Lowest tip height over a grid of points, with few queries over level areas.
 
     x0, y0 : float, mm, the first point, frame of the mesh
@@ -32,7 +32,7 @@ def drop_over_flats(tree: TriangleTree, x0: float, y0: float, step: float, nx: i
     nx, ny : int, number of points along x and y
     radius, corner_radius : float, mm, of the body, as in ``geometry.mesh_queries.drop.drop_tips``
     large  : int, number of points from which on areas are looked for
-    side   : LeaningSide of a tapered mill, None for an upright side
+    side   : LeaningSide of a tapered mill, ArcPair of a circle segment mill, None for an upright side
 
     Returns
     -------
@@ -55,7 +55,8 @@ def drop_over_flats(tree: TriangleTree, x0: float, y0: float, step: float, nx: i
     under = drop_contacts(tree, middle, 0.0, 0.0)
     flat = (under.triangle >= 0) & level[under.triangle]
     row, column, middle, height = row[flat], column[flat], middle[flat], under.z[flat]
-    most = drop_tips(tree, middle, max(radius, side.widest if side else 0.0) + across * np.sqrt(0.5), 0.0)
+    widest = side.widest if isinstance(side, LeaningSide) else radius
+    most = drop_tips(tree, middle, max(radius, widest) + across * np.sqrt(0.5), 0.0)
     flat = most <= height + EVEN
     heights = np.full(shape, np.nan)
     heights[row[flat], column[flat]] = most[flat]

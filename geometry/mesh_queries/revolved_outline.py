@@ -17,6 +17,7 @@ import numpy as np
 from geometry.errors import SetupError
 from geometry.kernels.outline import Stack
 from geometry.mesh import F64
+from geometry.tool_body import ArcPair
 
 BOWLS = 256  # paraboloids below an outline, evenly spread over the radius
 STEEPEST = 5.0  # largest slope of a paraboloid at its radius: at the rim the outline may be upright
@@ -102,6 +103,16 @@ class Outline:
             pieces.append(OutlineArc(at, high, (radius - corner_radius, corner_radius)))
         if widest > at:
             pieces.append(OutlineLine(widest, high + (widest - at) / taper))
+        return cls(tuple(pieces))
+
+    @classmethod
+    @lru_cache(maxsize=64)
+    def two_arcs(cls, arcs: ArcPair) -> Outline:
+        """A circle segment mill."""
+        pieces: list[OutlineLine | OutlineArc] = [OutlineLine(arcs.flat, 0.0)] if arcs.flat > 0.0 else []
+        pieces.append(OutlineArc(arcs.join, arcs.join_up, (arcs.flat, arcs.low)))
+        if arcs.bow > 0.0:
+            pieces.append(OutlineArc(arcs.wide, arcs.high, (arcs.out, arcs.up)))
         return cls(tuple(pieces))
 
     @property
