@@ -16,9 +16,11 @@ Planner and proof use the same formulas; docs/theory/feeds.md has sources and om
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
+from geometry.arc_pair import ArcPair
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
 
@@ -30,6 +32,8 @@ of such a rod, mm; and how the strength falls with the diameter: 3 / m for a Wei
 CHIP_SHARE = 0.2
 """Feed per tooth over the diameter that no cutter bears. High-feed mills reach 0.083 [HighFeed2026], router bits 0.064
 [CutterShop2026]."""
+CONES = 16
+"""Into which the large arc of a barrel is divided."""
 CORE = 0.8
 """Diameter of a solid bar as stiff as the flutes, of the diameter of the cutter."""
 
@@ -42,7 +46,7 @@ def compliance(tool: ToolBody, modulus: float = CARBIDE) -> float:
     cylinders from z0 to z1. Shear and the holder's compliance are left out.
 
     Flutes of a tapered mill are a cylinder up to the side and then a cone, d = e + k z. As (z / d)' = e / d^2, the
-    integral of z^2 / d^4 over the cone is ((z1 / d1)^3 - (z0 / d0)^3) / (3 e).
+    integral of z^2 / d^4 over the cone is ((z1 / d1)^3 - (z0 / d0)^3) / (3 e). The large arc of a barrel is 16 cones.
     """
     total, low = 0.0, 0.0
     for top, narrow, wide in _bars(tool):
@@ -111,11 +115,23 @@ def _bars(tool: ToolBody) -> tuple[tuple[float, float, float], ...]:
     mm."""
     above = ((tool.neck_length, tool.neck_diameter, tool.neck_diameter),
              (tool.stickout, tool.shank_diameter, tool.shank_diameter))
+    if tool.arcs is not None:
+        return (*_arc_bars(tool.arcs, tool.flute_length), *above)
     if tool.taper <= 0.0:
         return ((tool.flute_length, CORE * tool.diameter, CORE * tool.diameter), *above)
     wide, high = tool.corner_end
     low, top = 2.0 * CORE * wide, 2.0 * CORE * tool.widest_radius
     return ((high, low, low), (tool.flute_length, low, top), *above)
+
+
+def _arc_bars(arcs: ArcPair, flute: float) -> Iterator[tuple[float, float, float]]:
+    """Bars of the flutes of a circle segment mill: the lower arc as a cylinder, the upper one as cones under its
+    chords, and the side."""
+    high = np.linspace(arcs.join_up, arcs.high, CONES + 1)
+    wide = (2.0 * CORE * arcs.widths(high)).tolist()
+    yield arcs.join_up, wide[0], wide[0]
+    yield from zip(high[1:].tolist(), wide, wide[1:], strict=False)
+    yield flute, wide[-1], wide[-1]
 
 
 def effective_diameter(diameter: float, corner_radius: float, depth: float) -> float:
@@ -137,6 +153,8 @@ def diameter_in_cut(tool: ToolBody, depth: float) -> float:
     >>> [round(diameter_in_cut(cone, a), 9) for a in (0.2, 0.4, 4.4, 20.0)]
     [1.2, 1.6, 7.6, 17.5]
     """
+    if tool.arcs is not None:
+        return 2.0 * tool.arcs.width(depth)
     wide, high = tool.corner_end
     if tool.taper <= 0.0 or depth < high:
         return effective_diameter(tool.diameter, tool.corner_radius, depth)
@@ -150,6 +168,8 @@ def diameters_in_cut(tool: ToolBody, depth: F64) -> F64:
 
     Returns (n,) float64, mm.
     """
+    if tool.arcs is not None:
+        return 2.0 * tool.arcs.widths(depth)
     r, (wide, high) = tool.corner_radius, tool.corner_end
     low = np.minimum(depth, high)
     in_corner = tool.diameter - 2.0 * r + 2.0 * np.sqrt(low * (2.0 * r - low))
@@ -183,9 +203,7 @@ def cutting_force(kc: float, mc: float, per_tooth: float, depth: float, width: f
     """
     if depth <= 0.0 or width <= 0.0:
         return 0.0
-    r = tool.corner_radius
-    low = min(depth, tool.corner_end[1])
-    edge = math.hypot(low, math.sqrt(low * (2.0 * r - low))) + (depth - low) * math.hypot(1.0, tool.taper)
+    edge = float(_edges(np.array(depth), tool))
     phi = engaged_angle(tool, depth, width)
     chip = per_tooth * depth / edge * (1.0 - math.cos(phi)) / phi
     return float(max(1.0, flutes * phi / (2.0 * math.pi)) * edge * chip ** (1.0 - mc) * kc)
@@ -235,11 +253,18 @@ def drill_loads(kc: float, mc: float, a_turn: float, drill: ToolBody, flutes: in
 
 def _chips(per_tooth: F64, depth: F64, width: F64, tool: ToolBody) -> tuple[F64, F64, F64]:
     """Length of the edge in the cut, mm, engaged angle, rad, and mean thickness of the chip, mm, of n cuts."""
-    r = tool.corner_radius
-    low = np.minimum(depth, tool.corner_end[1])
-    edge = np.hypot(low, np.sqrt(low * (2.0 * r - low))) + (depth - low) * math.hypot(1.0, tool.taper)
+    edge = _edges(depth, tool)
     phi = np.arccos(np.clip(1.0 - 2.0 * width / diameters_in_cut(tool, depth), -1.0, 1.0))
     return edge, phi, per_tooth * depth / edge * (1.0 - np.cos(phi)) / phi
+
+
+def _edges(depth: F64, tool: ToolBody) -> F64:
+    """Length of the edge up to heights over the tip, with round corners as chords, mm."""
+    if tool.arcs is not None:
+        return tool.arcs.edge_lengths(depth)
+    r = tool.corner_radius
+    low = np.minimum(depth, tool.corner_end[1])
+    return np.asarray(np.hypot(low, np.sqrt(low * (2.0 * r - low))) + (depth - low) * math.hypot(1.0, tool.taper))
 
 
 __all__ = ["CARBIDE", "CHIP_SHARE", "CORE", "bending_stress", "buckling", "compliance", "cutting_force",

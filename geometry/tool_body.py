@@ -16,20 +16,16 @@ The side of a tapered mill leans outwards by ``taper``, the tangent of its angle
 height r (1 - sin), where the cutting part is R - r (1 - cos) wide in radius, and ends with the flutes. ``diameter`` is
 that of its end: of the ball, or of the flat with the corner radius on both sides.
 
-A circle segment mill has two arcs under an upright side (``ArcPair``). Both bulge outwards and touch without an edge.
-The lower one touches the level of the tip at ``flat`` from the axis.
-    lens   : a large arc round a point of the axis, then the corner, which touches the side; without corner a sharp rim
-    barrel : a corner or a ball at the tip, then a large arc up to the diameter; there it leans by ``profile_taper``
+A circle segment mill has two arcs under an upright side (``geometry.arc_pair``).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
-MIN_ARC = 1e-6
-"""mm, least radius of the lower arc of an end that is made smaller."""
+from geometry.arc_pair import ArcPair
 
 
 @dataclass(frozen=True)
@@ -39,114 +35,6 @@ class HolderFrustum:
     diameter: float
     diameter_top: float
     length: float
-
-
-@dataclass(frozen=True)
-class ArcPair:
-    """The end of a circle segment mill in its half section: distances from the axis and heights over the tip, mm.
-
-    flat           : radius of the flat at the tip, 0 for a point of the lower arc
-    low            : radius of the lower arc, round (flat, low)
-    out, up, bow   : centre and radius of the upper arc; of radius 0 it is a rim
-    join, join_up  : where the arcs touch
-    wide, high     : where the upper arc ends and the upright side begins
-    """
-
-    flat: float
-    low: float
-    out: float
-    up: float
-    bow: float
-    join: float
-    join_up: float
-    wide: float
-    high: float
-
-    @classmethod
-    def lens(cls, radius: float, profile_radius: float, corner_radius: float) -> ArcPair:
-        """A large arc round a point of the axis and a corner that touches it and the side.
-
-        radius         : mm, half the diameter
-        profile_radius : mm, of the large arc, at least ``radius``
-        corner_radius  : mm, at most ``radius``
-        """
-        out, far = radius - corner_radius, profile_radius - corner_radius
-        up = profile_radius - math.sqrt(max(far * far - out * out, 0.0))
-        share = profile_radius / far if far > 0.0 else 1.0
-        return cls(0.0, profile_radius, out, up, corner_radius, out * share,
-                   profile_radius - (profile_radius - up) * share, radius, up)
-
-    @classmethod
-    def barrel(cls, radius: float, profile_radius: float, corner_radius: float, taper: float, flat: float) -> ArcPair:
-        """A corner round (flat, corner_radius) and a large arc that touches it and ends at the radius.
-
-        radius, flat   : mm, half the diameter and radius of the flat at the tip
-        profile_radius : mm, of the large arc
-        corner_radius  : mm
-        taper          : tangent of the angle between the axis and the large arc at its end
-
-        The large arc ends above the place where it touches the corner, if ``barrel_fault`` finds nothing wrong.
-        """
-        long = math.hypot(1.0, taper)
-        out, far = radius - profile_radius / long, profile_radius - corner_radius
-        up = corner_radius + math.sqrt(max(far * far - (flat - out) ** 2, 0.0))
-        share = corner_radius / far if far > 0.0 else 0.0
-        return cls(flat, corner_radius, out, up, profile_radius, flat + (flat - out) * share,
-                   corner_radius - (up - corner_radius) * share, radius, up - profile_radius * taper / long)
-
-    def grown(self, by: float) -> ArcPair:
-        """The arcs of the same end ``by`` mm farther out on all sides, from its own tip on.
-
-        A barrel that leans at its end gets no less than that: the large arc goes on up to the larger diameter.
-        """
-        wide, low, bow = self.wide + by, max(self.low + by, MIN_ARC), self.bow + by
-        if self.flat == 0.0 and self.low > self.bow:
-            return ArcPair.lens(wide, low, max(bow, 0.0))
-        up, rest = self.up + by, max(bow * bow - (wide - self.out) ** 2, 0.0)
-        return replace(self, low=low, up=up, bow=bow, join=self.flat + low * self.join_sine,
-                       join_up=low * (1.0 - math.sqrt(1.0 - self.join_sine**2)), wide=wide, high=up - math.sqrt(rest))
-
-    def shifted(self, by: float) -> ArcPair:
-        """The arcs ``by`` mm farther from the axis, beside a flat as much wider; by > -flat."""
-        return replace(self, flat=self.flat + by, out=self.out + by, join=self.join + by, wide=self.wide + by)
-
-    @property
-    def join_sine(self) -> float:
-        """Sine of the angle between the axis and the normal where the arcs touch."""
-        return (self.flat - self.out) / (self.bow - self.low)
-
-    @property
-    def end_sine(self) -> float:
-        """Sine of the angle between the axis and the normal where the upper arc ends."""
-        return (self.wide - self.out) / self.bow if self.bow > 0.0 else 1.0
-
-    def at_sine(self, sine: float) -> tuple[float, float]:
-        """Where the normal of the outline has an angle to the axis: distance from it and height over the tip, mm.
-
-        sine : of that angle, from 0 on
-        """
-        cosine = math.sqrt(max(1.0 - sine * sine, 0.0))
-        if sine <= self.join_sine:
-            return self.flat + self.low * sine, self.low * (1.0 - cosine)
-        if sine <= self.end_sine:
-            return self.out + self.bow * sine, self.up - self.bow * cosine
-        return self.wide, self.high
-
-    def height(self, rho: float) -> float:
-        """Height of the end over the tip at a distance of at most ``wide`` from the axis, mm."""
-        if rho <= self.flat:
-            return 0.0
-        if rho <= self.join:
-            return self.low - math.sqrt(max(self.low**2 - (rho - self.flat) ** 2, 0.0))
-        return self.up - math.sqrt(max(self.bow**2 - (rho - self.out) ** 2, 0.0))
-
-    def width(self, over: float) -> float:
-        """Distance from the axis at a height over the tip, mm."""
-        if over >= self.high:
-            return self.wide
-        if over <= self.join_up:
-            return self.flat + math.sqrt(max(over * (2.0 * self.low - over), 0.0))
-        return self.out + math.sqrt(max(self.bow**2 - (self.up - over) ** 2, 0.0))
 
 
 @dataclass(frozen=True)
@@ -235,6 +123,16 @@ class ToolBody:
         return self.arcs.low if self.arcs is not None else self.corner_radius
 
     @property
+    def end_height(self) -> float:
+        """Height of the rounded end over the tip, mm: the corner radius, or where the arcs end."""
+        return self.corner_radius if self.arcs is None else self.arcs.high
+
+    @property
+    def dull_radius(self) -> float:
+        """Radius within which the end leans by less than 30 degrees, mm: there it digs rather than cuts."""
+        return self.radius - 0.5 * self.corner_radius if self.arcs is None else self.arcs.at_sine(0.5)[0]
+
+    @property
     def corner_end(self) -> tuple[float, float]:
         """Where the corner ends and the side begins: distance from the axis and height over the tip, mm."""
         if self.arcs is not None:
@@ -257,7 +155,7 @@ class ToolBody:
             return [(0.0, 0.0), (self.radius - self.corner_width, 0.0), (self.radius, self.cone_height),
                     (self.radius, self.flute_length)]
         if self.arcs is not None:
-            return [*_arc_chords(self.arcs, chords), (self.radius, self.flute_length)]
+            return [*self.arcs.chords(chords), (self.radius, self.flute_length)]
         c, flat = self.corner_radius, self.radius - self.corner_radius
         turn = 0.5 * math.pi - math.atan(self.taper)
         arc = [(flat + c * math.sin(turn * k / chords), c - c * math.cos(turn * k / chords))
@@ -285,15 +183,3 @@ class ToolBody:
         """Radial clearance at the neck, mm: ``wanted``, or half the relief where that is less."""
         relief = self.widest_radius - 0.5 * self.neck_diameter
         return wanted if relief >= wanted else 0.5 * max(relief, 0.0)
-
-
-def _arc_chords(arcs: ArcPair, chords: int) -> list[tuple[float, float]]:
-    """Outline of the end of a circle segment mill from the axis at the tip on, with as many chords for each arc, mm."""
-    out = [(0.0, 0.0)]
-    for centre, radius, end in (((arcs.flat, arcs.low), arcs.low, (arcs.join, arcs.join_up)),
-                                ((arcs.out, arcs.up), arcs.bow, (arcs.wide, arcs.high))):
-        begin = (arcs.flat, 0.0) if len(out) == 1 else out[-1]
-        first, last = (math.atan2(rho - centre[0], centre[1] - high) for rho, high in (begin, end))
-        turns = [first + (last - first) * k / chords for k in range(1, chords)] if radius > 0.0 else []
-        out += [begin, *((centre[0] + radius * math.sin(t), centre[1] - radius * math.cos(t)) for t in turns), end]
-    return [p for k, p in enumerate(out) if k == 0 or p != out[k - 1]]

@@ -29,16 +29,18 @@ def decimal(value: float, digits: int = 4) -> str:
 
 
 def short_words(tool: ToolBody) -> str:
-    """'ball D3' or 'tapered ball D1 3 deg': kind, diameter, and angle between side and axis."""
-    angle = f" {decimal(tool.taper_deg)} deg" if tool.taper > 0.0 else ""
-    return f"{tool.kind.replace('_', ' ')} D{decimal(tool.diameter)}{angle}"
+    """'ball D3', 'tapered ball D1 3 deg' or 'lens D10 profile R40': kind, sizes, and angle between side and axis."""
+    angle = f" {decimal(tool.taper_deg)} deg" if tool.taper > 0.0 or tool.profile_taper > 0.0 else ""
+    profile = f" profile R{decimal(tool.profile_radius)}" if tool.form else ""
+    return f"{tool.kind.replace('_', ' ')} D{decimal(tool.diameter)}{profile}{angle}"
 
 
 def tool_words(tool: ToolBody) -> str:
     """Every dimension of a tool that a presetter can check, mm."""
     d = decimal
     cone = f" to D{d(2.0 * tool.widest_radius)}" if tool.taper > 0.0 else ""
-    words = [short_words(tool), f"corner R{d(tool.corner_radius)}", f"flute length {d(tool.flute_length)}{cone}"]
+    flat = [f"tip flat D{d(tool.tip_diameter)}"] if tool.form and tool.tip_diameter > 0.0 else []
+    words = [short_words(tool), *flat, f"corner R{d(tool.corner_radius)}", f"flute length {d(tool.flute_length)}{cone}"]
     if tool.neck_length > tool.flute_length:
         words.append(f"neck D{d(tool.neck_diameter)} to {d(tool.neck_length)}")
     words += [f"shank D{d(tool.shank_diameter)}", f"stickout {d(tool.stickout)}"]

@@ -9,13 +9,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, field_serializer, model_validator
 
+from geometry.arc_pair import ArcPair
 from schemas.base import Count, Number, WireModel
 from schemas.materials import same_material
 
-ToolKind = Literal["ball", "flat", "bull", "tapered_ball", "tapered_bull", "tapered_flat", "barrel", "drill", "tap",
-                   "chamfer", "thread_mill"]
+ToolKind = Literal["ball", "flat", "bull", "tapered_ball", "tapered_bull", "tapered_flat", "lens", "barrel", "drill",
+                   "tap", "chamfer", "thread_mill"]
 TAPERED_KINDS = ("tapered_ball", "tapered_bull", "tapered_flat")
-BUILT_KINDS = ("ball", "flat", "bull", *TAPERED_KINDS)
+SEGMENT_KINDS = ("lens", "barrel")
+"""Circle segment mills: a large arc is part of their outline."""
+BUILT_KINDS = ("ball", "flat", "bull", *TAPERED_KINDS, *SEGMENT_KINDS)
 VERIFIED_KINDS = ("drill", "tap", "chamfer", "thread_mill")
 """Kinds that programs to be verified use, and that jobs do not plan."""
 THREADING_KINDS = ("tap", "thread_mill")
@@ -24,6 +27,8 @@ POINT_ANGLES = {"drill": 118.0, "chamfer": 90.0}
 LENGTH_EPSILON = 1e-9
 MAX_TAPER = 45.0
 """Largest ``taper_angle_deg``, deg; a wider cone is a chamfer mill."""
+MAX_PROFILE_RADIUS = 5000.0
+"""Largest ``profile_radius_mm``, mm; a flatter end is a flat end mill."""
 CUTTING_FIELDS = ("spindle_rpm", "feed_mm_min", "plunge_feed_mm_min")
 """Speeds and feeds that a tool states for all materials, or in ``cutting_data`` for each."""
 CORE_SHARE = 0.3
@@ -81,31 +86,38 @@ class Tool(WireModel):
         ge=1, le=99999, description="Tool number in programs, in T and H words. Default: the digits of the id if they "
                                     "are unique, otherwise the position in the list.")] = None
     kind: Annotated[ToolKind, Field(description="Shape of the cutting part. Kinds drill, tap, chamfer and thread_mill "
-                                                "are for programs to be verified; jobs do not plan them. barrel is "
-                                                "not available yet.")]
+                                                "are for programs to be verified; jobs do not plan them. A lens ends "
+                                                "in an arc round a point of its axis, a barrel has a large arc above "
+                                                "the corner or ball at its tip.")]
     diameter_mm: Annotated[Length, Field(ge=0.01, description="Diameter of the cutting part, mm, from 0.01. Of a tap "
                                                               "or thread mill the outer diameter of its teeth. Of a "
                                                               "tapered mill the diameter of the end: of its ball, or "
-                                                              "of the flat with the corner radius on both sides.")]
+                                                              "of the flat with the corner radius on both sides. Of "
+                                                              "a lens or barrel the largest diameter.")]
     point_angle_deg: Annotated[Number | None, Field(
         ge=10, le=180, description="Whole angle of the cone at the end, deg. Default: 118 for a drill, 90 for a "
                                    "chamfer mill. null for a tap means no lead. null for all other kinds.")] = None
     tip_diameter_mm: Annotated[Number | None, Field(
         ge=0, le=2000, description="Diameter of the flat at the tip of the cone, mm. Default: 0, a point. The lead of "
-                                   "a tap needs it.")] = None
+                                   "a tap needs it. Of a barrel the diameter of the flat inside its corner; default: "
+                                   "0, a ball at the tip.")] = None
     pitch_mm: Annotated[Number | None, Field(
         ge=0.01, le=100, description="Pitch of the thread that a tap or thread mill cuts, mm. Feed over spindle speed "
                                      "of a tap, and the helices of a thread mill, must be within 2 % of it. null: only "
                                      "pitches that no thread has are findings. null for all other kinds.")] = None
     corner_radius_mm: Annotated[Number, Field(
         ge=0, description="Corner radius, mm. Above 0 for a bull nose, 0 for a flat end mill. For a ball, 0 means half "
-                          "the diameter.")] = 0.0
+                          "the diameter. Of a lens the radius between its arc and its side, 0 for a sharp rim. Of a "
+                          "barrel the radius at its tip, above 0.")] = 0.0
     taper_angle_deg: Annotated[Number, Field(
         ge=0, lt=90, description="Angle between the side of a tapered mill and its axis, deg: half the whole angle of "
                                  "the cone, at most 45. The cone touches ball or corner without an edge and ends with "
-                                 "the flutes. 0 for all other kinds.")] = 0.0
+                                 "the flutes. Of a barrel the angle between the axis and its large arc where that "
+                                 "reaches diameter_mm: 0 for an oval or tangential barrel, above 0 for a taper barrel. "
+                                 "0 for all other kinds.")] = 0.0
     profile_radius_mm: Annotated[Number | None, Field(
-        gt=0, description="Radius of a barrel, mm. Must be null, since barrel tools are not available yet.")] = None
+        gt=0, le=MAX_PROFILE_RADIUS, description="Radius of the large arc of a lens or barrel, mm. null for all other "
+                                                 "kinds.")] = None
     flutes: Annotated[Count, Field(ge=1, le=50, description="Number of teeth.")] = 2
     flute_length_mm: Annotated[Length | None, Field(
         description="Tip to the end of the cutting part, mm. Default: 3 x diameter_mm, but not more than "
@@ -185,9 +197,7 @@ class Tool(WireModel):
         self._check_cone()
         if self.pitch_mm is not None and self.kind not in THREADING_KINDS:
             raise ValueError(f"tool {self.id}: pitch_mm belongs to kinds tap and thread_mill")
-        if self.profile_radius_mm is not None:
-            raise ValueError(f"tool {self.id}: profile_radius_mm belongs to barrel tools, which are not available yet; "
-                             "leave it at null")
+        self._check_segment()
         self._check_taper()
         if self.corner_radius_mm > radius + LENGTH_EPSILON:
             raise ValueError(f"tool {self.id}: corner_radius_mm {self.corner_radius_mm:g} is larger than half the "
@@ -207,7 +217,43 @@ class Tool(WireModel):
                                  f"not {self.corner_radius_mm:g}; call it {other}bull")
             self.corner_radius_mm = radius
 
+    def _check_segment(self) -> None:
+        """Whether the arcs of a lens or a barrel touch each other and the side."""
+        if self.kind not in SEGMENT_KINDS:
+            if self.profile_radius_mm is not None:
+                raise ValueError(f"tool {self.id}: profile_radius_mm belongs to kinds lens and barrel; leave it at "
+                                 f"null for kind {self.kind}")
+            return
+        radius, large, corner = self.diameter_mm / 2, self.profile_radius_mm, self.corner_radius_mm
+        if large is None:
+            raise ValueError(f"tool {self.id}: a {self.kind} needs profile_radius_mm, the radius of its large arc")
+        if corner >= radius:
+            raise ValueError(f"tool {self.id}: corner_radius_mm {corner:g} of a {self.kind} must be less than half the "
+                             f"diameter, {radius:g}; reduce it, or use kind ball")
+        if self.kind == "lens":
+            if large <= radius:
+                raise ValueError(f"tool {self.id}: profile_radius_mm {large:g} of a lens must be more than half the "
+                                 f"diameter, {radius:g}; increase it, or use kind ball or bull")
+            return
+        if not 0 <= self.taper_angle_deg <= MAX_TAPER:
+            raise ValueError(f"tool {self.id}: taper_angle_deg {self.taper_angle_deg:g} of a barrel must be at most "
+                             f"{MAX_TAPER:g}; it is the angle between the axis and the upper end of the large arc")
+        if corner <= 0:
+            raise ValueError(f"tool {self.id}: a barrel needs a corner_radius_mm above 0, the radius at its tip; use "
+                             "kind lens for an arc that begins at the axis")
+        flat, cosine = 0.5 * (self.tip_diameter_mm or 0.0), math.cos(math.radians(self.taper_angle_deg))
+        if radius - flat <= corner * cosine:
+            raise ValueError(f"tool {self.id}: the tip of a barrel with tip_diameter_mm {2 * flat:g} and "
+                             f"corner_radius_mm {corner:g} is {2 * (flat + corner * cosine):g} wide, which must be "
+                             f"less than diameter_mm {self.diameter_mm:g}; reduce them, or increase diameter_mm")
+        if large <= max((radius - flat) / cosine, corner):
+            raise ValueError(f"tool {self.id}: profile_radius_mm {large:g} of a barrel must be more than "
+                             f"{max((radius - flat) / cosine, corner):g}, or its large arc does not touch the tip; "
+                             "increase it, or increase tip_diameter_mm")
+
     def _check_taper(self) -> None:
+        if self.kind == "barrel":
+            return
         if self.kind in TAPERED_KINDS:
             if not 0 < self.taper_angle_deg <= MAX_TAPER:
                 raise ValueError(f"tool {self.id}: taper_angle_deg {self.taper_angle_deg:g} of a tapered mill must be "
@@ -216,15 +262,16 @@ class Tool(WireModel):
         elif self.taper_angle_deg != 0:
             own = f"tapered_{self.kind}"
             raise ValueError(f"tool {self.id}: taper_angle_deg {self.taper_angle_deg:g} belongs to kinds "
-                             f"{', '.join(TAPERED_KINDS)}, and is 0 for kind {self.kind}; "
+                             f"{', '.join((*TAPERED_KINDS, 'barrel'))}, and is 0 for kind {self.kind}; "
                              f"{f'use kind {own}, or ' if own in TAPERED_KINDS else ''}leave it out")
 
     def _check_cone(self) -> None:
         if self.point_angle_deg is None:
             self.point_angle_deg = POINT_ANGLES.get(self.kind)
         if self.point_angle_deg is None:
-            if self.tip_diameter_mm is not None:
-                raise ValueError(f"tool {self.id}: tip_diameter_mm belongs to a cone, which needs point_angle_deg")
+            if self.tip_diameter_mm is not None and self.kind != "barrel":
+                raise ValueError(f"tool {self.id}: tip_diameter_mm belongs to a barrel, or to a cone, which needs "
+                                 "point_angle_deg")
             return
         if self.kind not in ("drill", "tap", "chamfer"):
             raise ValueError(f"tool {self.id}: point_angle_deg belongs to kinds drill, tap and chamfer")
@@ -255,12 +302,30 @@ class Tool(WireModel):
         return wide / math.tan(math.radians(0.5 * self.point_angle_deg))
 
     @property
+    def arcs(self) -> ArcPair | None:
+        """The two arcs of a lens or a barrel; None for other kinds."""
+        radius, large = 0.5 * self.diameter_mm, self.profile_radius_mm or 0.0
+        if self.kind == "lens":
+            return ArcPair.lens(radius, large, self.corner_radius_mm)
+        if self.kind == "barrel":
+            return ArcPair.barrel(radius, large, self.corner_radius_mm, math.tan(math.radians(self.taper_angle_deg)),
+                                  0.5 * (self.tip_diameter_mm or 0.0))
+        return None
+
+    @property
+    def end_height(self) -> float:
+        """Height over the tip at which a cone, or the arcs of a lens or barrel, end, mm; 0 without them."""
+        return self.cone_height if self.arcs is None else self.arcs.high
+
+    @property
     def corner_height(self) -> float:
         """Height over the tip at which a round corner ends and the side begins, mm; 0 without one."""
         return self.corner_radius_mm * (1.0 - math.sin(math.radians(self.taper_angle_deg)))
 
     def side_mm(self, height: float) -> float:
         """Diameter of the side at a height over the tip, mm, from the end of the corner on."""
+        if self.arcs is not None:
+            return self.diameter_mm
         half = math.radians(self.taper_angle_deg)
         side = max(height - self.corner_height, 0.0) * math.tan(half)
         return self.diameter_mm + 2.0 * (side - self.corner_radius_mm * (1.0 - math.cos(half)))
@@ -274,7 +339,7 @@ class Tool(WireModel):
         self._flutes_given = self.flute_length_mm is not None
         if self.flute_length_mm is None:
             bounds = [v for v in (self.neck_length_mm, self.stickout_mm) if v is not None]
-            usual = self.cone_height if self.kind == "chamfer" else max(3 * self.diameter_mm, self.cone_height)
+            usual = self.cone_height if self.kind == "chamfer" else max(3 * self.diameter_mm, self.end_height)
             self.flute_length_mm = min([usual, *bounds])
         if self.neck_length_mm is None:
             if self.neck_diameter_mm is not None and self.neck_diameter_mm < self.widest_mm:
@@ -347,7 +412,7 @@ class Tool(WireModel):
             raise ValueError(f"tool {self.id}: its cone is {self.widest_mm:g} wide at the end of the flutes, more than "
                              f"{MAX_LENGTH:g}; reduce taper_angle_deg or flute_length_mm")
         if _given(self.neck_diameter_mm) > self.widest_mm + LENGTH_EPSILON:
-            widest = "diameter_mm" if self.taper_angle_deg == 0 else "the end of the cone,"
+            widest = "diameter_mm" if self.kind not in TAPERED_KINDS else "the end of the cone,"
             raise ValueError(f"tool {self.id}: neck_diameter_mm {self.neck_diameter_mm:g} is larger than {widest} "
                              f"{self.widest_mm:g}; a neck is relieved, so give at most that")
         if self.core_diameter_mm is not None and self.kind == "tap":
@@ -357,7 +422,7 @@ class Tool(WireModel):
         elif self.core_diameter_mm is not None and (self.center_cutting or self.core_diameter_mm >= self.diameter_mm):
             raise ValueError(f"tool {self.id}: core_diameter_mm belongs to a tap, or to a tool with center_cutting "
                              f"false, and is less than diameter_mm {self.diameter_mm:g}")
-        tapered = self.taper_angle_deg > 0
+        tapered = self.kind in TAPERED_KINDS
         if tapered and _given(self.flute_length_mm) < 2.0 * self.corner_radius_mm - LENGTH_EPSILON:
             raise ValueError(f"tool {self.id}: flute_length_mm {self.flute_length_mm:g} is less than twice the corner "
                              f"radius, {2.0 * self.corner_radius_mm:g}, so there is next to no cone; give at least "
@@ -365,7 +430,11 @@ class Tool(WireModel):
         if not tapered and _given(self.flute_length_mm) < self.corner_radius_mm - LENGTH_EPSILON:
             raise ValueError(f"tool {self.id}: flute_length_mm {self.flute_length_mm:g} is shorter than the corner "
                              f"radius {self.corner_radius_mm:g}, so the rounded end would not cut")
-        if _given(self.flute_length_mm) < self.cone_height - LENGTH_EPSILON:
+        if self.arcs is not None and _given(self.flute_length_mm) < self.end_height - LENGTH_EPSILON:
+            raise ValueError(f"tool {self.id}: flute_length_mm {self.flute_length_mm:g} is shorter than the arcs of "
+                             f"the {self.kind}, which end {self.end_height:.4g} over the tip; give at least that, or "
+                             "reduce profile_radius_mm")
+        if self.arcs is None and _given(self.flute_length_mm) < self.cone_height - LENGTH_EPSILON:
             raise ValueError(f"tool {self.id}: flute_length_mm {self.flute_length_mm:g} is shorter than the cone at "
                              f"its end, {self.cone_height:g} high; flute_length_mm counts from the tip of the cone")
 
@@ -408,5 +477,6 @@ def numbered(tools: list[Tool]) -> list[Tool]:
     return [t.model_copy(update={"number": numbers[t.id]}) for t in tools]
 
 
-__all__: list[Any] = ["BUILT_KINDS", "CUTTING_FIELDS", "TAPERED_KINDS", "VERIFIED_KINDS", "HolderSegment", "Tool",
+__all__: list[Any] = ["BUILT_KINDS", "CUTTING_FIELDS", "TAPERED_KINDS", "SEGMENT_KINDS", "VERIFIED_KINDS",
+                      "HolderSegment", "Tool",
                       "ToolCuttingData", "ToolKind", "default_numbers", "numbered"]

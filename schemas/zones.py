@@ -180,8 +180,9 @@ class Remainder(ReportModel):
                     "not_in_program: only in a verification; the program does not work on the face.")]
     would_need: Annotated[dict[str, Any], Field(
         description="The tool that would reach the area, in available sizes. It has kind, diameter_mm, "
-                    "corner_radius_mm, neck_length_mm, shank_diameter_mm and stickout_mm, and taper_angle_deg for a "
-                    "tapered mill. like: the tool of the setup with the same holder. share: share of the area that "
+                    "corner_radius_mm, neck_length_mm, shank_diameter_mm and stickout_mm, taper_angle_deg for a "
+                    "tapered mill or barrel, and profile_radius_mm for a lens or barrel. like: the tool of the setup "
+                    "with the same holder. share: share of the area that "
                     "it reaches. Or kind is 'other access', 'other clamping' or 'other process'; the last has "
                     "slenderness. access: only with several accesses. Empty if no tool is needed or none would reach "
                     "the area.")] = {}

@@ -31,7 +31,8 @@ from zones.lattice import lattice_step
 DEFAULT_MAX_RPM = 18000.0
 DEFAULT_MAX_FEED_MM_MIN = 5000.0
 PLUNGE_FACTOR = 0.3
-STEP_DOWN = {"ball": 0.3, "bull": 0.3, "flat": 0.5, "drill": 0.5, "tap": 0.5, "chamfer": 0.5, "thread_mill": 0.5}
+STEP_DOWN = {"ball": 0.3, "bull": 0.3, "flat": 0.5, "lens": 0.3, "barrel": 0.3, "drill": 0.5,
+             "tap": 0.5, "chamfer": 0.5, "thread_mill": 0.5}
 """Deepest layer by the end of a tool, as a share of its diameter; of a tapered mill that of its end, so that the tip,
 its weakest place, bears the layer."""
 FINISHING_SPEED, LIGHT = 1.4, 0.1
@@ -113,6 +114,8 @@ def cut_diameter(tool: Tool, depth: float) -> float:
     >>> round(cut_diameter(cone, 1.5), 6)
     5.0
     """
+    if tool.arcs is not None:
+        return 2.0 * tool.arcs.width(depth)
     if tool.taper_angle_deg > 0.0 and depth > tool.corner_height:
         return tool.side_mm(depth)
     return effective_diameter(tool.diameter_mm, tool.corner_radius_mm, depth)

@@ -18,7 +18,7 @@ from geometry.tool_body import HolderFrustum, ToolBody
 from output.inverse_kinematics import RotaryMachine, program_limits
 from schemas.machine import Machine
 from schemas.setup import Quality, Setup
-from schemas.tools import BUILT_KINDS, VERIFIED_KINDS, Tool
+from schemas.tools import BUILT_KINDS, SEGMENT_KINDS, VERIFIED_KINDS, Tool
 from verify.kinematics import Kinematics
 
 LOWEST_AXIS = -0.5  # Z of the unit tool axis: 30 degrees below level
@@ -321,11 +321,12 @@ def tool_body(tool: Tool) -> ToolBody:
         raise SetupError(f"tool {tool.id} has not been completed by a Setup", subjects=(tool.id,))
     segments = tuple(HolderFrustum(s.diameter_mm, s.diameter_top_mm or s.diameter_mm, s.length_mm)
                      for s in tool.holder)
-    named = tool.kind in VERIFIED_KINDS
+    named, lean = tool.kind in VERIFIED_KINDS, math.tan(math.radians(tool.taper_angle_deg))
     return ToolBody(tool.id, int(number or 0), tool.diameter_mm, tool.corner_radius_mm, float(flute or 0),
                     float(neck_d or 0), float(neck_l or 0), float(shank or 0), float(stickout or 0), segments,
                     tool.kind if named else "", tool.tip_diameter_mm or 0.0, tool.cone_height if named else 0.0,
-                    math.tan(math.radians(tool.taper_angle_deg)))
+                    0.0 if tool.kind == "barrel" else lean, tool.kind if tool.kind in SEGMENT_KINDS else "",
+                    tool.profile_radius_mm or 0.0, lean if tool.kind == "barrel" else 0.0)
 
 
 def tool_bodies(setup: Setup) -> tuple[ToolBody, ...]:

@@ -27,6 +27,12 @@ TAPERED = {body.kind: body for body in (
     ToolBody("T1", 1, d, c, 12.0, 2.0, 20.0, 6.0, 45.0, HOLDER, taper=math.tan(math.radians(3.0)))
     for d, c in ((1.0, 0.5), (2.0, 0.4), (2.0, 0.0)))}
 """A tapered mill of each kind, 3 degrees between side and axis."""
+SEGMENTS = {name: ToolBody("T1", 1, d, c, 12.0, d, 12.0, 6.0, 45.0, HOLDER, form=form, profile_radius=profile,
+                           profile_taper=math.tan(math.radians(lean)))
+            for name, form, d, c, profile, lean in (
+                ("lens", "lens", 6.0, 0.5, 20.0, 0.0), ("sharp lens", "lens", 6.0, 0.0, 20.0, 0.0),
+                ("oval", "barrel", 6.0, 1.0, 20.0, 0.0), ("taper barrel", "barrel", 6.0, 1.0, 30.0, 15.0))}
+"""Circle segment mills."""
 
 
 def write_linuxcnc(plan: Workplan) -> str:
@@ -102,6 +108,12 @@ def tiny() -> Workplan:
 def tapered(kind: str = "tapered_ball", **changes: object) -> Workplan:
     """One step with a tapered mill."""
     tool = TAPERED[kind]
+    return plan(step(1, tool, "waterline"), tools=(tool,), **changes)
+
+
+def segment(kind: str = "lens", **changes: object) -> Workplan:
+    """One step with a circle segment mill."""
+    tool = SEGMENTS[kind]
     return plan(step(1, tool, "waterline"), tools=(tool,), **changes)
 
 

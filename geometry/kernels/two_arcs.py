@@ -35,7 +35,7 @@ class TwoArcs(NamedTuple):
     join, high     : rho and h of the join
     top            : h(R)
     sine, cosine   : of the angle of the profile at the join
-    under          : the tapered mill below it
+    grade, bend    : of the tapered mill below it, as in ``Tapered``
     """
 
     radius: float
@@ -49,7 +49,8 @@ class TwoArcs(NamedTuple):
     top: float
     sine: float
     cosine: float
-    under: Tapered
+    grade: float
+    bend: float
 
 
 @njit(**KERNEL)
@@ -60,7 +61,12 @@ def two_arcs_of(flat, low, out, up, bow, radius, top):
     join, high = flat + low * sine, low * (1.0 - cosine)
     # the tapered mill of that tangent: a ball or bull of the lower arc, whose side begins at the join
     under = tapered_of(flat + low, low, max(cosine, 1e-9) / max(sine, 1e-9), radius)
-    return TwoArcs(radius, flat, low, out, up, bow, join, high, top, sine, cosine, under)
+    return TwoArcs(radius, flat, low, out, up, bow, join, high, top, sine, cosine, under.grade, under.bend)
+
+
+@njit(**KERNEL)
+def _under(shape):
+    return Tapered(shape.radius, shape.low, shape.flat, shape.join, shape.high, shape.grade, shape.bend)
 
 
 @njit(**KERNEL)
@@ -93,7 +99,8 @@ def _widely(shape):
 @for_shape(revolved.widened, TwoArcs)
 def _widened(shape, off):
     return TwoArcs(shape.radius + off, shape.flat + off, shape.low, shape.out + off, shape.up, shape.bow,
-                   shape.join + off, shape.high, shape.top, shape.sine, shape.cosine, widened(shape.under, off))
+                   shape.join + off, shape.high, shape.top, shape.sine, shape.cosine, shape.grade,
+                   widened(_under(shape), off).bend)
 
 
 @for_shape(revolved.facet_contact, TwoArcs)
@@ -174,4 +181,4 @@ def _bound(shape, node, x, y, best):
     top = node[4] - _height_at(shape, math.sqrt(near2))
     if top <= best:
         return NOTHING
-    return min(top, node_bound(shape.under, node, x, y, best))
+    return min(top, node_bound(_under(shape), node, x, y, best))

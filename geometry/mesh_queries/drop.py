@@ -1,9 +1,9 @@
 """Lowest height of a body of revolution over a mesh: drop, blocked, contact and grids.
 
-The cutter stands upright (+z), tip down. Its body is a disc-bottomed shape of ``radius`` and
-``corner_radius`` (ball: equal, flat: 0, bull nose: between) under an endless cylinder. The side of a tapered
-mill (``LeaningSide``) leans outwards first. The two arcs of a circle segment mill (``ArcPair``) take the place of the
-corner; ``radius`` is then where they end, and ``corner_radius`` does not count. A tip height is the lowest at which the body does not enter the
+The cutter stands upright (+z), tip down. Its body is a disc-bottomed shape of ``radius`` and ``corner_radius`` (ball:
+equal, flat: 0, bull nose: between) under an endless cylinder. The side of a tapered mill (``LeaningSide``) leans
+outwards first. The two arcs of a circle segment mill (``ArcPair``) take the place of the corner; ``radius`` is then
+where they end, and ``corner_radius`` does not count. A tip height is the lowest at which the body does not enter the
 mesh; -inf where nothing is below. Theory: docs/theory/drop.md.
 
 Arrays are split over numba's threads where it has several. Where it has one (``NUMBA_NUM_THREADS=1`` or
@@ -21,6 +21,7 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from geometry.arc_pair import ArcPair
 from geometry.array_checks import finite_points
 from geometry.errors import GeometryError
 from geometry.kernels import drop as kernels
@@ -30,7 +31,7 @@ from geometry.kernels.two_arcs import TwoArcs, two_arcs_of
 from geometry.mesh import F64, I32
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.curve_order import in_order
-from geometry.tool_body import ArcPair, ToolBody
+from geometry.tool_body import ToolBody
 
 Shape = Bull | Tapered | TwoArcs
 

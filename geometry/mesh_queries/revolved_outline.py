@@ -14,10 +14,10 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from geometry.arc_pair import ArcPair
 from geometry.errors import SetupError
 from geometry.kernels.outline import Stack
 from geometry.mesh import F64
-from geometry.tool_body import ArcPair
 
 BOWLS = 256  # paraboloids below an outline, evenly spread over the radius
 STEEPEST = 5.0  # largest slope of a paraboloid at its radius: at the rim the outline may be upright

@@ -46,7 +46,7 @@ from output.workplan import Ap238, Workplan
 from toolpath.workingsteps import Trajectory, TrajectoryKind, Workingstep
 
 _KIND = {"ball": "ballnose endmill", "bull": "bullnose endmill", "flat": "endmill"}
-_TAPERED = "user defined milling tool"  # the standard has no tapered end mill since its second edition
+_USER_DEFINED = "user defined milling tool"  # the standard has no tapered end mill since its second edition
 _OLD_KIND = {"ball": "ball endmill"}  # names in the first edition that differ
 _OLD_TAPERED = "tapered endmill"
 _DEGREE = 0.0174532925199433  # rad
@@ -402,12 +402,18 @@ class _Ap238Writer:
         return strategy
 
     def _tool(self, number: int, tool: ToolBody, operations: list[int]) -> None:
-        """A tool with its body. One with a taper has its profile as the cutter of APT, and its kind in words."""
+        """A tool with its body. One with a taper has its profile as the cutter of APT, and its kind in words.
+
+        The standard has no circle segment mill: it is written as the bull nose or flat of its diameter and corner, with
+        its profile in words.
+        """
         add, known = self.file.add, self.plan.assembly(tool)
         kind = add("ACTION_RESOURCE_TYPE('milling cutting tool')")
         old = self.plan.ap238 is Ap238.INTEGRATED_CNC
-        if tool.taper > 0.0:
-            words = _OLD_TAPERED if old else _TAPERED
+        if tool.form:
+            words = (_KIND["bull"] if tool.corner_radius > 0.0 else _KIND["flat"]) if old else _USER_DEFINED
+        elif tool.taper > 0.0:
+            words = _OLD_TAPERED if old else _USER_DEFINED
         else:
             words = _OLD_KIND.get(tool.end, _KIND[tool.end]) if old else _KIND[tool.end]
         self.file.fill(number, f"MACHINING_TOOL('{tool.number}','{words}',{refs(operations)},#{kind})")
@@ -419,9 +425,13 @@ class _Ap238Writer:
         if known.teeth is not None:
             items.append(add(f"MEASURE_REPRESENTATION_ITEM('number of effective teeth',COUNT_MEASURE({known.teeth}.),"
                              f"#{self.count})"))
-        if tool.taper > 0.0:
+        if tool.form and not old:
+            note = f"{short_words(tool)}; its nearest shape of the standard is that of diameter and corner radius"
+            items += [*self._corner(tool, "corner radius"), add(
+                f"DESCRIPTIVE_REPRESENTATION_ITEM('tool description',{quoted(note)})")]
+        elif tool.taper > 0.0:
             items += self._taper(tool, old)
-        elif tool.end != "flat":
+        elif tool.corner_radius > 0.0:
             items.append(self._length("edge radius", tool.corner_radius))
         body = add(f"MACHINING_TOOL_BODY_REPRESENTATION('{words}',{refs(items)},#{self.plain})")
         add(f"RESOURCE_PROPERTY_REPRESENTATION('','',#{prop},#{body})")
@@ -439,16 +449,19 @@ class _Ap238Writer:
                                  f"#{self.radian})")
             self.degree = self.file.add(f"(CONVERSION_BASED_UNIT('degree',#{size}) NAMED_UNIT(#{none}) "
                                         "PLANE_ANGLE_UNIT())")
-        words = "edge radius,edge center horizontal,edge center vertical" if old else \
-            "corner radius,corner radius center horizontal,corner radius center vertical"
-        sizes = tool.corner_radius, tool.radius - tool.corner_radius, tool.corner_radius
-        items = [self._length(name, size) for name, size in zip(words.split(","), sizes, strict=True)]
+        items = self._corner(tool, "edge" if old else "corner radius")
         if not old:
             note = f"{short_words(tool)}; the effective cutting diameter is where its side meets the plane of its tip"
             items.append(self.file.add(f"DESCRIPTIVE_REPRESENTATION_ITEM('tool description',{quoted(note)})"))
         return [*items, self.file.add(
             f"(MEASURE_REPRESENTATION_ITEM() MEASURE_WITH_UNIT(PLANE_ANGLE_MEASURE({real(tool.taper_deg, 6)}),"
             f"#{self.degree}) PLANE_ANGLE_MEASURE_WITH_UNIT() REPRESENTATION_ITEM('taper angle'))")]
+
+    def _corner(self, tool: ToolBody, words: str) -> list[int]:
+        """Radius and centre of the corner of a cutter of APT; ``words`` begin the names of its centre."""
+        return [self._length(f"{words.removesuffix(' radius')} radius", tool.corner_radius),
+                self._length(f"{words} center horizontal", tool.radius - tool.corner_radius),
+                self._length(f"{words} center vertical", tool.corner_radius)]
 
     def _edge(self, tool: int, body: ToolBody, operations: list[int], gauge: float, life: float) -> None:
         """The cutter of a tool and its life, min in cut."""

@@ -300,7 +300,11 @@ class _Iso14649Writer:
         return self.technologies[key]
 
     def _tool(self, tool: ToolBody) -> int:
-        """A tool, one for the whole file; angles are degrees. A tapered mill of any end is a TAPERED_ENDMILL."""
+        """A tool, one for the whole file; angles are degrees. A tapered mill of any end is a TAPERED_ENDMILL.
+
+        The standard has no circle segment mill: it is written as the bull nose of its diameter and corner, with its
+        profile in the name.
+        """
         if tool.number not in self.tools:
             add, ball = self.file.add, tool.end == "ball"
             edge = tool.radius if ball else tool.corner_radius

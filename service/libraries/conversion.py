@@ -17,7 +17,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from schemas.libraries import Verdict
-from schemas.tools import BUILT_KINDS, MAX_TAPER, VERIFIED_KINDS, Tool, ToolCuttingData
+from schemas.tools import BUILT_KINDS, MAX_TAPER, SEGMENT_KINDS, VERIFIED_KINDS, Tool, ToolCuttingData
 from service.libraries.cone import end_diameter
 from service.libraries.entry import Entry, Preset, check_count, shown
 
@@ -126,6 +126,8 @@ def _shape(entry: Entry) -> dict[str, Any]:
         entry.leave_out(words)
         return {}
     radius, taper = v.get("corner_radius_mm"), v.get("taper_angle_deg", 0.0)
+    if kind in SEGMENT_KINDS:
+        return _segment(entry)
     if kind == "tapered" or kind.startswith("tapered_"):
         return _tapered(entry, radius or 0.0, taper)
     if taper and kind in ("mill", "ball", "flat", "bull"):
@@ -140,6 +142,18 @@ def _shape(entry: Entry) -> dict[str, Any]:
             entry.note(f"corner_radius_mm {radius:g} is left out; kind {kind} has none")
         return {"kind": kind, "diameter_mm": diameter}
     return {"diameter_mm": diameter, **_rounded(entry, kind, diameter, radius)}
+
+
+def _segment(entry: Entry) -> dict[str, Any]:
+    """Kind and radii of a circle segment mill."""
+    v, kind = entry.values, entry.kind
+    for name in ("diameter_mm", "profile_radius_mm", *(("corner_radius_mm",) if kind == "barrel" else ())):
+        if not v.get(name):
+            entry.leave_out(f"a {kind} needs {name}, which the library does not state")
+            return {}
+    out = {"kind": kind, "diameter_mm": v["diameter_mm"], "profile_radius_mm": v["profile_radius_mm"],
+           "corner_radius_mm": v.get("corner_radius_mm", 0.0)}
+    return out | ({"taper_angle_deg": v.get("taper_angle_deg", 0.0)} if kind == "barrel" else {})
 
 
 def _rounded(entry: Entry, kind: str, diameter: float, radius: float | None) -> dict[str, Any]:
@@ -281,6 +295,8 @@ def _least(entry: Entry, fields: dict[str, Any]) -> float:
 
 def _widest(fields: dict[str, Any], flutes: float | None) -> float:
     """Widest diameter of the cutting part, mm; see ``Tool.widest_mm``."""
+    if fields["kind"] in SEGMENT_KINDS:
+        return float(fields["diameter_mm"])
     half = math.radians(fields.get("taper_angle_deg", 0.0))
     corner = fields.get("corner_radius_mm", 0.0)
     side = max((flutes or 0.0) - corner * (1.0 - math.sin(half)), 0.0) * math.tan(half)

@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from geometry.errors import LibraryError
-from schemas.tools import BUILT_KINDS, VERIFIED_KINDS
+from schemas.tools import BUILT_KINDS, SEGMENT_KINDS, VERIFIED_KINDS
 from service.libraries.containers import Archive, is_zip, json_of, text_of, xml_of
 from service.libraries.entry import Entry, Source, shown
 from service.libraries.formats import (
@@ -31,6 +31,7 @@ NECK = frozenset({"neck_diameter_mm", "neck_length_mm"})
 SPEEDS = "cutting_data"
 ONE_SPEED = "cutting_data of one material"
 ALL_KINDS = frozenset((*BUILT_KINDS, *VERIFIED_KINDS))
+SIMPLE_KINDS = ALL_KINDS - {*SEGMENT_KINDS}
 AUTODESK_VALUES = SHAPE | NECK | {"taper_angle_deg", "point_angle_deg", "tip_diameter_mm", "pitch_mm", "stickout_mm",
                                   "gauge_length_mm"}
 MAX_LINES_SEEN = 200
@@ -60,15 +61,18 @@ class Format:
 
 
 NAMED = frozenset({"description", "library_id"})
+FUSION_VALUES = AUTODESK_VALUES | NAMED | {"profile_radius_mm", "number", "order_code", "coolant", "holder", SPEEDS}
 _ALL = frozenset(VALUES) | NAMED | {"number", "order_code", "coolant", "holder", SPEEDS}
 _XML = "application/xml"
 FORMATS: dict[str, Format] = {f.name: f for f in (
     Format("zonemill", "tools of a setup", (".json",), setup_tools.read, None, ALL_KINDS, _ALL, "application/json"),
-    Format("fusion", "Autodesk Fusion", (".json", ".tools"), fusion.read, fusion.write, ALL_KINDS,
-           AUTODESK_VALUES | {"number", "order_code", "coolant", "holder", SPEEDS} | NAMED, "application/json"),
-    Format("fusion-tools", "Autodesk Fusion, zipped", (".tools",), fusion.read, fusion.write_tools, ALL_KINDS,
-           AUTODESK_VALUES | {"number", "order_code", "coolant", "holder", SPEEDS} | NAMED, "application/zip"),
-    Format("hsmlib", "HSMWorks", (".hsmlib", ".xml"), hsmlib.read, hsmlib.write, ALL_KINDS,
+    Format("fusion", "Autodesk Fusion", (".json", ".tools"), fusion.read, fusion.write,
+           SIMPLE_KINDS | {"lens"},
+           FUSION_VALUES, "application/json"),
+    Format("fusion-tools", "Autodesk Fusion, zipped", (".tools",), fusion.read, fusion.write_tools,
+           SIMPLE_KINDS | {"lens"},
+           FUSION_VALUES, "application/zip"),
+    Format("hsmlib", "HSMWorks", (".hsmlib", ".xml"), hsmlib.read, hsmlib.write, SIMPLE_KINDS,
            AUTODESK_VALUES | {"number", "order_code", "coolant", "holder", ONE_SPEED} | NAMED, _XML),
     Format("freecad", "FreeCAD", (".zip", ".fctl", ".fctb"), freecad.read, freecad.write, frozenset(freecad.TO_SHAPE),
            SHAPE | NECK | {"taper_angle_deg", "point_angle_deg", "tip_diameter_mm", "pitch_mm", "number"} | NAMED,

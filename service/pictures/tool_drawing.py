@@ -88,7 +88,9 @@ def draw_tool(body: ToolBody, gauge: float) -> ToolDrawing:
     if scale * body.diameter < MIN_TIP_WIDTH:
         tip_scale = _add_tip(body, outlines[0][1], areas, strokes, words)
     what = body.named.replace("_", " ") or f"{body.kind.replace('_', ' ')} end mill"
-    cone = f" and {decimal(body.taper_deg)} deg" if body.taper > 0.0 else ""
+    cone = f" and {decimal(body.taper_deg)} deg" if body.taper_deg > 0.0 else ""
+    if body.form:
+        cone = f" with a profile radius of {decimal(body.profile_radius)} mm{cone}"
     title = f"T{body.number}: {what} of {decimal(body.diameter)} mm{cone}, to scale"
     return ToolDrawing(title, scale, tip_scale, tuple(areas), tuple(strokes), tuple(words))
 
@@ -96,7 +98,7 @@ def draw_tool(body: ToolBody, gauge: float) -> ToolDrawing:
 def _add_tip(body: ToolBody, outline: Sequence[Point], areas: list[FilledOutline], strokes: list[DrawnLine],
              words: list[DrawnText]) -> float:
     """The larger tip, cut off where its shape does not change any more; returns its scale."""
-    shown = min(body.flute_length, max(1.6 * body.diameter, 1.2 * body.corner_radius))
+    shown = min(body.flute_length, max(1.6 * body.diameter, 1.2 * body.corner_radius, 1.1 * body.end_height))
     cut = [*(p for p in outline if p[1] < shown), (_radius_at(outline, shown), shown)]
     scale = _scale(TIP_ROOM, 2.0 * max(cut[-1][0], body.radius), shown)
     areas.append(_placed("flutes", "tip", cut, TIP_MIDDLE, scale))
@@ -182,6 +184,11 @@ def _diameters(body: ToolBody) -> list[tuple[float, float, str]]:
         out = [(low, wide, f"Ø{d(body.diameter)} tip"),
                (middle, wide + body.taper * (middle - low), f"{d(body.taper_deg)}° side"),
                (body.flute_length, body.widest_radius, f"Ø{d(2.0 * body.widest_radius)} cone")]
+    if body.arcs is not None:
+        arcs = body.arcs
+        (rho, high), words = arcs.at_sine(0.5 * (arcs.join_sine + arcs.end_sine)), f"R{d(body.profile_radius)} profile"
+        out = [(*arcs.at_sine(0.5 * arcs.join_sine)[::-1], words), *out] if body.form == "lens" else \
+            [(high, rho, words), (arcs.high, body.radius, f"Ø{d(body.diameter)}")]
     if body.neck_length > body.flute_length:
         out.append((0.5 * (body.flute_length + body.neck_length), 0.5 * body.neck_diameter,
                     f"Ø{d(body.neck_diameter)} neck"))

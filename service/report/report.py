@@ -100,7 +100,7 @@ def _zone(ready: Prepared, zone: ZoneArea) -> dict[str, Any]:
             "axis": [r(v, 9) for v in view.direction.tolist()], "depth_mm": [r(zone.top), r(zone.bottom)],
             "approach": _cone(ready, zone), "cutting_plane_mm": r(zone.plane),
             "area_mm2": r(float(ready.samples.area[zone.samples].sum()), 3),
-            "strategy": {"steep": "waterline", "level": "planar_floor" if zone.tool.end != "ball" else "zigzag",
+            "strategy": {"steep": "waterline", "level": "planar_floor" if zone.tool.flat_radius > 0.0 else "zigzag",
                          "shallow": "zigzag"}[str(zone.form)],
             "patches": [{"face": f"F{p.face}", "area_mm2": r(p.area, 3), "whole": p.whole, "loops": len(p.loops)}
                         for p in ready.patches.get(zone.id, ())],

@@ -25,9 +25,13 @@ def number(value: float | None, digits: int = 3) -> str:
     return NONE if value is None else decimal(value, digits)
 
 
-def kind_words(kind: str, taper: float) -> str:
-    """'ball' or 'tapered ball 3°'; taper, deg: between side and axis."""
-    return kind.replace("_", " ") + (f" {number(taper)}°" if taper else "")
+def kind_words(kind: str, taper: float, profile: float | None = None) -> str:
+    """'ball', 'tapered ball 3°' or 'lens R40'.
+
+    taper : deg, between side and axis; profile : mm, radius of the large arc of a lens or barrel
+    """
+    words = kind.replace("_", " ") + (f" R{number(profile)}" if profile else "")
+    return words + (f" {number(taper)}°" if taper else "")
 
 
 def minutes(seconds: float | None) -> str:
@@ -144,7 +148,8 @@ def tools_table(report: Mapping[str, Any], inputs: JobInputs, used: Sequence[str
             f"Ø{number(tool.neck_diameter_mm)} to {number(tool.neck_length_mm)}"
         rows.append((
             f"T{tool.number}" + ("" if name == f"T{tool.number}" else f" {name}"),
-            kind_words(tool.kind, tool.taper_angle_deg), number(tool.diameter_mm), number(tool.corner_radius_mm),
+            kind_words(tool.kind, tool.taper_angle_deg, tool.profile_radius_mm), number(tool.diameter_mm),
+            number(tool.corner_radius_mm),
             str(tool.flutes), number(tool.flute_length_mm), neck,
             number(tool.shank_diameter_mm), number(tool.stickout_mm), number(tool.gauge_length_mm),
             ranged([s["spindle_rpm"] for s in mine]), ranged([s["feed_mm_min"] for s in mine]),

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from geometry.mesh import F64, TriangleMesh
 from geometry.part import Part
 from geometry.sampling import SurfaceSamples, graded_samples, joined, split_cells
+from geometry.tool_body import ToolBody
 from service.stages.job_inputs import JobInputs
 from zones.machinable_area import LEVEL, SEEN, AreaForm
 from zones.zoning.zones import ZoneArea
@@ -41,9 +42,9 @@ def coarse_spacing(part: Part, inputs: JobInputs, directions: F64) -> dict[int, 
     """
     if inputs.turns or not inputs.bodies:
         return {}
-    flats = [b.radius - b.corner_radius for b in inputs.bodies if b.radius > b.corner_radius]
+    flats = [b.flat_radius for b in inputs.bodies if b.flat_radius > 0.0]
     floor = FLOOR_SHARE * min(flats, default=0.0)
-    wall = WALL_SHARE * min((b.radius for b in inputs.bodies if b.taper <= 0.0), default=0.0)
+    wall = WALL_SHARE * min((b.radius for b in inputs.bodies if _upright(b)), default=0.0)
     mesh, out = part.mesh, {}
     area = np.bincount(mesh.face_ids, weights=mesh.areas)
     for face in part.faces:
@@ -61,6 +62,11 @@ def coarse_spacing(part: Part, inputs: JobInputs, directions: F64) -> dict[int, 
         if spacing >= LEAST:
             out[face.number] = spacing
     return out
+
+
+def _upright(tool: ToolBody) -> bool:
+    """Whether the side of a tool is upright where it meets walls: that of a barrel is its large arc."""
+    return tool.taper <= 0.0 and tool.form != "barrel"
 
 
 def coarse_sets(mesh: TriangleMesh, triangles: NDArray[np.int64], spacing: Mapping[int, float],
@@ -98,7 +104,7 @@ def split_where_zones_meet(samples: SurfaceSamples, planning: SurfaceSamples, zo
     owner = np.zeros(len(planning), np.int64)
     for k, zone in enumerate(zones, start=1):
         owner[zone.samples] = k
-    fits = np.array([True, *(z.tool.radius > z.tool.corner_radius if z.form is AreaForm.LEVEL else z.tool.taper <= 0.0
+    fits = np.array([True, *(z.tool.flat_radius > 0.0 if z.form is AreaForm.LEVEL else _upright(z.tool)
                              for z in zones)])
     wide = samples.covers > 0
     split = np.zeros(len(samples), np.bool_)

@@ -89,7 +89,7 @@ class ToolTouch:
         Returns (n,) bool.
         """
         out = np.zeros(len(samples), np.bool_)
-        for tool in (t for t in tools if t.corner_radius <= 0.0 and not t.named):
+        for tool in (t for t in tools if t.tip_curvature <= 0.0 and not t.named):
             rows = np.flatnonzero(~out)
             out[rows] = approach(self.obstacles, tool, self.inputs.clearances, samples.points[rows],
                                  samples.normals[rows], axes, lift,
@@ -132,7 +132,7 @@ class ToolTouch:
         for word, bodies, tree in tries:
             rows = np.flatnonzero(why == Reason.CORNER)
             why[rows[self._coverage(bodies, tree).reached(few.subset(rows), axes).any(axis=1)]] = word
-        for tool in (_cutter(t) for t in tools if t.corner_radius <= 0.0):
+        for tool in (_cutter(t) for t in tools if t.tip_curvature <= 0.0):
             rows = np.flatnonzero(why == Reason.CORNER)
             near = approach(self.obstacles, tool, self.inputs.clearances, few.points[rows], few.normals[rows], axes,
                             self._lift, self.inputs.quality.stock_allowance_mm)

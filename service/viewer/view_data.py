@@ -211,6 +211,8 @@ def tool_shape(tool: ToolBody) -> dict[str, Any]:
     if holder:
         bodies.append({"kind": "holder", "profile": holder})
     cone = {"taper_deg": round(tool.taper_deg, 6)} if tool.taper > 0.0 else {}
+    if tool.form:
+        cone = {"profile_radius_mm": tool.profile_radius, "taper_deg": round(tool.taper_deg, 6)}
     return {"id": tool.id, "number": tool.number, "kind": tool.kind, "diameter_mm": tool.diameter, **cone,
             "bodies": bodies}
 

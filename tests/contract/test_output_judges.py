@@ -19,12 +19,14 @@ from output.workplan import Ap238
 from tests import rs274
 from tests.synthetic_plan import (
     BALL,
+    SEGMENTS,
     TAPERED,
     block_mesh,
     clamped,
     full,
     long_plan,
     plan,
+    segment,
     shaped,
     step,
     tapered,
@@ -39,7 +41,7 @@ CHECK = SHARED / "stepnc" / "p21check.py"
 GCODE = SHARED / "tools" / "gcode_check.sh"
 JOBS = {"five steps": plan, "tiny": tiny, "flat": lambda: plan(flat_step()), "long": lambda: long_plan(20_000, 40),
         "along borders": lambda: plan(step(1, BALL, "isoparametric"))}
-TAPERS = {kind: partial(tapered, kind) for kind in TAPERED}
+TAPERS = {kind: partial(tapered, kind) for kind in TAPERED} | {kind: partial(segment, kind) for kind in SEGMENTS}
 MORE = TAPERS | {"all there is": full, "with shapes": shaped, "a mesh as blank": lambda: shaped(
     cylinder=None, stock_mesh=block_mesh(), stock_words="solid of a STEP file"), "a block": lambda: shaped(
     cylinder=None, stock_words=""), "turning, all": lambda: shaped(job=clamped())}

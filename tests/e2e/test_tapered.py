@@ -49,13 +49,18 @@ def along_wall(away=0.0):
 
 
 def proof_of(part, folder, name):
-    """Verify a text, and the mill with other fields, against a part -> the report. The part is read once."""
-    job = read_job_part(write_step(part, folder / f"{name}.step"), parse_setup(json.dumps({**SETUP, "tools": [BALL]})),
+    """``proof_of_tools`` with the tapered ball."""
+    return proof_of_tools(part, folder, name, BALL)
+
+
+def proof_of_tools(part, folder, name, mill):
+    """Verify a text, and a mill with other fields, against a part -> the report. The part is read once."""
+    job = read_job_part(write_step(part, folder / f"{name}.step"), parse_setup(json.dumps({**SETUP, "tools": [mill]})),
                         lambda _stage, _share: None)
 
     @lru_cache
     def proved(text, tool):
-        setup = parse_setup(json.dumps({**SETUP, "tools": [{**BALL, **json.loads(tool)}]}))
+        setup = parse_setup(json.dumps({**SETUP, "tools": [{**mill, **json.loads(tool)}]}))
         mine = replace(job, inputs=JobInputs.of(setup))
         made = proved_program(mine, read_first(setup, text, ending=".ngc"), lambda _share: None).report
         Verification.model_validate(made)

@@ -13,11 +13,11 @@ from geometry.mesh_queries.revolved_outline import Outline
 from geometry.sampling import sample_surface
 from tests.oracle.drop_shapes import SHAPES
 from tests.oracle.test_tapered_drop import places
-from tests.oracle.test_verify_segments import barrel, heights, lens
+from tests.oracle.test_verify_segments import barrel, heights, lens, outline
 
 MILLS = {"lens": lens(6.0, 20.0, 0.5), "sharp lens": lens(4.0, 3.0, 0.0), "flat lens": lens(10.0, 250.0, 1.0),
-         "oval": barrel(6.0, 85.0, 1.0), "stout oval": barrel(6.0, 4.0, 1.5), "bull barrel": barrel(8.0, 30.0, 0.5, 0.0, 2.0),
-         "taper barrel": barrel(8.0, 100.0, 1.0, 20.0)}
+         "oval": barrel(6.0, 85.0, 1.0), "stout oval": barrel(6.0, 4.0, 1.5),
+         "bull barrel": barrel(8.0, 30.0, 0.5, 0.0, 2.0), "taper barrel": barrel(8.0, 100.0, 1.0, 20.0)}
 
 
 @pytest.mark.parametrize("name", MILLS)
@@ -80,3 +80,21 @@ def test_grown_arcs_are_the_parallel_outline(name):
 def test_shapes_are_kept():
     assert cutter_shape(MILLS["oval"]) is cutter_shape(MILLS["oval"])
     assert cutter_shape(MILLS["oval"]).radius == 3.0
+
+
+def test_passes_apart_are_the_chord_of_the_outline():
+    for name, tool in MILLS.items():
+        line = outline(tool, 40_001)
+        line = np.concatenate([line[::-1] * [-1.0, 1.0], line])
+        for sine in (0.0, 0.05, 0.4, 0.8, 0.95, 0.999):
+            for cusp in (0.002, 0.02):
+                n, t = np.array([sine, -math.sqrt(1 - sine**2)]), np.array([math.sqrt(1 - sine**2), sine])
+                off = (line @ n).max() - line @ n
+                along = (line @ t)[off <= cusp]
+                got = float(tool.arcs.passes_apart(np.array([sine]), cusp)[0])
+                if along.max() < (line[:, 1].max() * t[1] - 1e-3):  # else it ends with the flutes
+                    assert got == pytest.approx(np.ptp(along), rel=2e-3, abs=2e-3), (name, sine, cusp)
+    big = lens(10.0, 40.0, 1.0)
+    assert big.arcs.passes_apart(np.array([0.0, 0.05]), 0.01) == pytest.approx(2 * math.sqrt(2 * 40 * 0.01 - 1e-4))
+    oval = barrel(10.0, 85.0, 3.0)
+    assert oval.arcs.passes_apart(np.array([0.99]), 0.01)[0] == pytest.approx(2 * math.sqrt(2 * 85 * 0.01 - 1e-4))

@@ -143,7 +143,9 @@ class Cutter:
 
     @classmethod
     def of(cls, tool: ToolBody) -> Cutter:
-        """The cutting part of a tool assembly."""
+        """The cutting part of a tool assembly; of a tapered mill its end under an upright side."""
+        if tool.arcs is not None:
+            return cls.turned(Outline.two_arcs(tool.arcs), length=tool.flute_length)
         return cls(tool.diameter, tool.corner_radius, tool.flute_length)
 
     @property

@@ -23,6 +23,7 @@ from geometry.kernels.bvh import TreeArrays
 from geometry.kernels.drop import BLOCK_TOLERANCE, Bull, blocked_by
 from geometry.kernels.push import stop_at
 from geometry.kernels.tapered import Tapered
+from geometry.kernels.two_arcs import TwoArcs
 from zones.kernels.lattice import LatticeFrame, noncut_at
 
 # For each of the 16 corner patterns (bit 0: (i,j), 1: (i,j+1), 2: (i+1,j+1), 3: (i+1,j) blocked) up to two
@@ -57,7 +58,7 @@ class TipLimits(NamedTuple):
     x0: float
     y0: float
     step: float
-    shape: Bull | Tapered
+    shape: Bull | Tapered | TwoArcs
     allowance: float
     rows: NDArray[np.float64]
 

@@ -24,6 +24,7 @@ from geometry.kernels.drop import MOST, WIDE, Bull, find_near, lift_at, tip_near
 from geometry.kernels.options import KERNEL
 from geometry.kernels.revolved import radius_of
 from geometry.kernels.tapered import Tapered
+from geometry.kernels.two_arcs import TwoArcs
 from zones.kernels.lattice import LatticeFrame, noncut_at
 
 DEEP = 40  # times that a piece is cut in four; far more than its length allows
@@ -39,7 +40,7 @@ class TipLimit(NamedTuple):
     """
 
     tree: TreeArrays
-    shape: Bull | Tapered
+    shape: Bull | Tapered | TwoArcs
     allowance: float
     noncut: NDArray[np.float64]
     frame: LatticeFrame

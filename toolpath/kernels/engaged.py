@@ -16,6 +16,7 @@ from numba import njit, prange
 from geometry.kernels.drop import Bull
 from geometry.kernels.revolved import for_shape, radius_of
 from geometry.kernels.tapered import Tapered
+from geometry.kernels.two_arcs import TwoArcs
 from toolpath.kernels.stock import bottom_at
 
 SECTORS = 36
@@ -49,6 +50,11 @@ def _tapered_side(shape):
     return shape.high
 
 
+@for_shape(side_begins, TwoArcs)
+def _arcs_side(shape):
+    return shape.top
+
+
 @for_shape(width_at, Bull)
 def _bull_width(shape, height):
     if height < shape.corner:
@@ -61,6 +67,16 @@ def _tapered_width(shape, height):
     if height < shape.high:
         return shape.flat + math.sqrt(max(height * (2.0 * shape.corner - height), 0.0))
     return min(shape.join + (height - shape.high) / shape.grade, shape.radius)
+
+
+@for_shape(width_at, TwoArcs)
+def _arcs_width(shape, height):
+    if height >= shape.top:
+        return shape.radius
+    if height <= shape.high:
+        return shape.flat + math.sqrt(max(height * (2.0 * shape.low - height), 0.0))
+    below = shape.up - height
+    return shape.out + math.sqrt(max(shape.bow * shape.bow - below * below, 0.0))
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)

@@ -4,7 +4,8 @@ For a tip at c the cutter (corner r, radius R, endless upwards) is as far from a
     sqrt(u^2 + w^2) - r,   u = max(rho - (R - r), 0),  w = max(c_z + r - p_z, 0),
 rho the distance of p from the axis in plan. The least over all tips of the passes is what remains at p to within
 the cosine of the angle between the sample normal and the direction of contact (under 1 % at a cusp). The side of a
-tapered mill leans: above the end of its corner the distance to that line counts. On a level
+tapered mill leans: above the end of its corner the distance to that line counts. A circle segment mill has
+two arcs, and the distance is that to the nearer of them. On a level
 plane, where a sharp-cornered end passes beside p or over it, the height above p is taken instead,
 and a wall below such an end counts as untouched. Along a
 straight move the least lies at the nearest point in plan, at the nearest point in space to the corner's centre,
@@ -26,6 +27,7 @@ from geometry.kernels.cutter_sizes import CutterSizes
 
 FAR = 1e3
 BANDS = 16  # of the rows of cells, shared among the threads
+SECTIONS = 24  # of a move, to 1e-5 of its length
 BELOW = 1e-6  # mm that a sharp-cornered end may stand over a place of a wall, whose tip a program has rounded
 LEVEL_PLANE, UPRIGHT = 1, 2
 
@@ -57,12 +59,20 @@ class MillEnd(NamedTuple):
 
     flat, corner : float, mm, radius of the flat bottom and corner radius
     sine, cosine : float, of the angle between the side and the axis; 0 and 1 for an upright side
+    out, up, bow : float, mm, centre (distance from the axis, height) and radius of the upper arc of a circle segment
+                   mill, whose lower arc is the corner; ``up`` is 0 for others, and ``cosine`` then counts
+    radius, high : float, mm, where the upper arc ends
     """
 
     flat: float
     corner: float
     sine: float
     cosine: float
+    out: float
+    up: float
+    bow: float
+    radius: float
+    high: float
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)
@@ -70,13 +80,65 @@ def _end_of(cutter: CutterSizes):
     flat = cutter.radius - cutter.corner
     if cutter.taper > 0.0:
         cosine = 1.0 / np.sqrt(1.0 + cutter.taper * cutter.taper)
-        return MillEnd(flat, cutter.round, cutter.taper * cosine, cosine)
-    return MillEnd(flat, cutter.corner, 0.0, 1.0)
+        return MillEnd(flat, cutter.round, cutter.taper * cosine, cosine, 0.0, 0.0, 0.0, cutter.radius, 0.0)
+    if cutter.up > 0.0:
+        return MillEnd(flat, cutter.round, 1.0, 0.0, cutter.out, cutter.up, cutter.bow, cutter.radius, cutter.cone)
+    return MillEnd(flat, cutter.corner, 0.0, 1.0, 0.0, 0.0, 0.0, cutter.radius, 0.0)
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _arcs_gap(rho, h, end: MillEnd, level):
+    """Distance from a place beside the axis to a circle segment mill; on a level plane that along the axis.
+
+    Places nearest to an arc are on the side of the join where that is, seen from its centre.
+    """
+    far = end.bow - end.corner
+    sine, cosine = (end.flat - end.out) / far, (end.up - end.corner) / far
+    x, y = rho - end.flat, end.corner - h
+    if level == LEVEL_PLANE:
+        if rho > end.radius:
+            return FAR
+        if x <= 0.0:
+            return -h
+        if x > end.corner * sine:
+            x = rho - end.out
+            return end.up - np.sqrt(max(end.bow * end.bow - x * x, 0.0)) - h
+        return end.corner - np.sqrt(max(end.corner * end.corner - x * x, 0.0)) - h
+    if x <= 0.0:
+        return -h if h < 0.0 else max(-h, rho - end.radius)
+    if x * cosine <= y * sine:
+        return np.sqrt(x * x + y * y) - end.corner
+    # beyond the end of the upper arc the side counts, and under it the rim where that leans
+    x, y = rho - end.out, end.up - h
+    if (y >= 0.0) if end.bow <= 0.0 else x * (end.up - end.high) <= y * (end.radius - end.out):
+        return np.sqrt(x * x + y * y) - end.bow
+    return rho - end.radius if h >= end.high else np.sqrt((rho - end.radius) ** 2 + (h - end.high) ** 2)
+
+
+@njit(cache=True, nogil=True, no_cfunc_wrapper=True)
+def _arcs_move(p, a, d, end: MillEnd, level):
+    """``_arcs_gap`` where it is least on a move from a by d: it is convex along the move."""
+    lo, hi, best = 0.0, 1.0, FAR
+    for _ in range(SECTIONS):
+        for side in range(2):
+            s = lo + (hi - lo) * (0.381966 if side == 0 else 0.618034)
+            x, y = p[0] - a[0] - s * d[0], p[1] - a[1] - s * d[1]
+            gap = _arcs_gap(np.sqrt(x * x + y * y), p[2] - a[2] - s * d[2], end, level)
+            best = min(best, gap)
+            if side == 0:
+                left = gap
+        if left <= gap:
+            hi = lo + (hi - lo) * 0.618034
+        else:
+            lo = lo + (hi - lo) * 0.381966
+    return best
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True, inline="always")
 def _gap(px, py, pz, cx, cy, cz, end: MillEnd, level):
     corner, out = end.corner, np.sqrt((px - cx) ** 2 + (py - cy) ** 2) - end.flat
+    if end.up > 0.0:
+        return _arcs_gap(out + end.flat, pz - cz, end, level)
     if level == LEVEL_PLANE:
         if out > corner:
             return FAR
@@ -103,7 +165,9 @@ def _segment_gap(p, a, b, end: MillEnd, level):
         if 0.0 < s < 1.0:
             best = min(best, _gap(p[0], p[1], p[2], a[0] + s * dx, a[1] + s * dy, a[2] + s * dz, end, level))
     d3 = d2 + dz * dz
-    if d3 > 0.0 and dz != 0.0:
+    if d3 > 0.0 and dz != 0.0 and end.up > 0.0:
+        best = min(best, _arcs_move(p, a, (dx, dy, dz), end, level))
+    elif d3 > 0.0 and dz != 0.0:
         s = ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy + (p[2] - a[2] - end.corner) * dz) / d3
         if 0.0 < s < 1.0:
             best = min(best, _gap(p[0], p[1], p[2], a[0] + s * dx, a[1] + s * dy, a[2] + s * dz, end, level))

@@ -2,7 +2,8 @@
 
 Notation: S (ny, nx) top z at nodes, or the most in the cell round each; a cutter with its tip at c reaches down
 to c_z + h(rho) at distance rho, h(rho) = 0 for rho <= d, else r - sqrt(r^2 - (rho - d)^2), d = R - r; the side of a
-tapered mill goes on as a line. ``shape`` is a ``Bull`` or a ``Tapered``.
+tapered mill goes on as a line, and a circle segment mill has two arcs. ``shape`` is a ``Bull``, a ``Tapered`` or a
+``TwoArcs``.
 This is for deciding (is there something to cut, may the tool come down here); the proof has a model of its own.
 """
 
@@ -14,6 +15,7 @@ from numba import njit, prange
 from geometry.kernels.drop import Bull
 from geometry.kernels.revolved import for_shape, radius_of
 from geometry.kernels.tapered import Tapered
+from geometry.kernels.two_arcs import TwoArcs
 from zones.kernels.lattice import LatticeFrame
 
 HALF_DIAGONAL = 0.7072  # of a cell, rounded up
@@ -21,7 +23,7 @@ LEAST_RISE = 0.02  # of a tool axis: one that lies lower takes nothing off a hei
 
 
 def bottom_at(shape, rho):
-    """h(rho) for rho <= R, mm; ``shape`` is a ``Bull`` or a ``Tapered``."""
+    """h(rho) for rho <= R, mm."""
     raise NotImplementedError
 
 
@@ -41,6 +43,16 @@ def _bottom_of_tapered(shape, rho):
     if rho > shape.join:
         return shape.high + (rho - shape.join) * shape.grade
     return corner - np.sqrt(max(corner * corner - u * u, 0.0))
+
+
+@for_shape(bottom_at, TwoArcs)
+def _bottom_of_two_arcs(shape, rho):
+    u, centre, radius = rho - shape.flat, shape.low, shape.low
+    if u <= 0.0:
+        return 0.0
+    if rho > shape.join:
+        u, centre, radius = rho - shape.out, shape.up, shape.bow
+    return centre - np.sqrt(max(radius * radius - u * u, 0.0))
 
 
 @njit(cache=True, nogil=True, no_cfunc_wrapper=True)

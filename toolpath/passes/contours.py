@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from geometry.arc_pair import ArcPair
 from geometry.mesh import F64
 from geometry.mesh_queries.drop import one_thread
 from geometry.mesh_queries.revolved_outline import Outline
@@ -344,8 +345,11 @@ def from_walls(field: TipField, z: float, distance: float) -> NDArray[np.bool_] 
 def _limits(field: TipField) -> TipLimits:
     """What keeps the tip of a field's tool up, beside the obstacles, for kernels."""
     side = field.grown_side
-    outline = Outline.bull(field.grown_radius, field.grown_corner) if side is None else \
-        Outline.tapered(field.grown_radius, field.grown_corner, side.taper, side.widest)
+    if isinstance(side, ArcPair):
+        outline = Outline.two_arcs(side)
+    else:
+        outline = Outline.bull(field.grown_radius, field.grown_corner) if side is None else \
+            Outline.tapered(field.grown_radius, field.grown_corner, side.taper, side.widest)
     return TipLimits(field.noncut, *field.coarse.frame, field.shape, field.allowance, outline.stack.rows)
 
 

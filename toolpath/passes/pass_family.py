@@ -165,6 +165,9 @@ class Family(ABC):
         """A first step, mm, which leaves about the scallop on a level plane."""
         cutter = self.dragged.cutter
         r = cutter.corner_radius if cutter.corner_radius > 0.0 else cutter.radius
+        if cutter.outline is not None:
+            arcs = cutter.outline.stack.rows[:, ARC]
+            r = float(arcs[arcs > 0.0][:1].sum()) or r
         h = min(self.promise.scallop, r)
         return max(FLOOR, min(BEGIN * 2.0 * math.sqrt(max(2.0 * r * h - h * h, 0.0)), r))
 

@@ -18,11 +18,11 @@ MIN_DEPTH = 2.0
 
 
 def largest_corner(zones: Iterable[ZoneArea]) -> float:
-    """Largest corner radius, mm, of the tools that finish walls; half the diameter of a ball.
+    """Largest height of the rounded end, mm, of the tools that finish walls; half the diameter of a ball.
 
     The tip of a tool lies that far below its contact with an upright wall.
     """
-    return max((z.tool.corner_radius for z in zones if z.form is AreaForm.STEEP), default=0.0)
+    return max((z.tool.end_height for z in zones if z.form is AreaForm.STEEP), default=0.0)
 
 
 def planes(walls: Iterable[HighWall], corner: float, ratio: float) -> tuple[float, ...]:

@@ -251,7 +251,7 @@ class ToolLayers:
         """Where a layer gets no rims because of faces left alone or walls that are finished, (ny, nx) bool."""
         lat = self.field.lattice
         alone = lat.mask(self.alone[np.abs(self.alone[:, 2] - one.z) <= 2.0 * self.cut.step_down, :2])
-        at_size = sized.along(lat, one.z + self.field.tool.corner_radius, one.z + (one.deep or 0.0))
+        at_size = sized.along(lat, one.z + self.field.tool.end_height, one.z + (one.deep or 0.0))
         return np.asarray(dilated(alone, self.alone_wide / lat.step) | at_size)
 
     def _cut_rims(self, linker: Linker, one: _Layer, spared: NDArray[np.bool_],

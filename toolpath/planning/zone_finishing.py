@@ -135,7 +135,7 @@ class Finish:
 
     def above(self, plane: float) -> NDArray[np.bool_]:
         """Whether checks are finished above a height of contact, mm, with a tip that stays above it, (n,) bool."""
-        low = plane - self.field.tool.corner_radius - 1e-6
+        low = plane - self.field.tool.end_height - 1e-6
         return np.asarray((self.checks.points[:, 2] >= plane) & (self.checks.tips[:, 2] >= low))
 
     def walk(self, step_id: str, wanted: NDArray[np.bool_] | None = None) -> list[Workingstep]:
@@ -206,15 +206,18 @@ class Finish:
         found: list[tuple[str, Runs]] = []
         if self.zone.form is AreaForm.STEEP:
             found.append((flank.NAME, flank.flanked(alone, *given, self._surroundings(), self.field.allowance)
-                          if self.field.tool.taper == 0.0 else Runs((), ("the side of the tool leans",))))
-        if self.zone.form is not AreaForm.LEVEL and curvature_matched.suits(self.field.tool):
+                          if not (why := _no_flank(self.field.tool)) else Runs((), (why,))))
+        arcs = self.field.tool.arcs is not None
+        if self.zone.form is not AreaForm.LEVEL and arcs:
+            found.append((curvature_matched.NAME, Runs((), (UPRIGHT_ONLY,))))
+        elif self.zone.form is not AreaForm.LEVEL and curvature_matched.suits(self.field.tool):
             curved = [face for face in alone if not face.flat]
             found.append((curvature_matched.NAME,
                           curvature_matched.matched(curved, *given, self._surroundings(), self.field.allowance,
                                                     max_seconds)))
         if (leaned := inclined_axis.requested_lean(self.settings.leaned, self.zone.form,
                                                    self.field.tool)) is not None:
-            found.append((inclined_axis.NAME,
+            found.append((inclined_axis.NAME, Runs((), (UPRIGHT_ONLY,)) if arcs else
                           inclined_axis.inclined_passes(self.faces, self.checks, self.field, self.cut, self.settings,
                                                         self._surroundings(), self._enters(inclined_axis.WARY),
                                                         leaned)))
@@ -384,6 +387,16 @@ class Finish:
             again[a:b] &= b - a >= MIN_AGAIN  # places where a line crosses or touches itself
         fresh &= ~again  # the first pass over a place is measured there
         return still_to_walk(line, fresh)
+
+
+UPRIGHT_ONLY = "a circle segment mill is planned upright only"
+
+
+def _no_flank(tool: ToolBody) -> str:
+    """Why the flank of a tool does not fit walls; empty where it is a cylinder."""
+    if tool.arcs is not None:
+        return UPRIGHT_ONLY
+    return "the side of the tool leans" if tool.taper > 0.0 else ""
 
 
 TiltedPasses = tuple[str, Sequence[tuple[Trajectory, ...]]]

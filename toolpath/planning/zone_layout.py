@@ -133,7 +133,7 @@ class ZoneLayout:
         field, settings, form = self.field, self.settings, self.zone.form
         if not len(checks.points) or form is AreaForm.STEEP or _has_floor(self.zone, field.tool):
             return checks
-        r = field.tool.corner_radius or field.tool.radius
+        r = field.tool.tip_curvature or field.tool.radius
         precision = BORDER_SHARE * math.sqrt(8.0 * settings.scallop_height * r)
         return checks.joined(beyond(field, checks, settings.lift, precision, self.zone.faces))
 
@@ -148,7 +148,8 @@ class ZoneLayout:
         suited = suited and not (steep and tool.taper > 0.0)  # along walls they count on an upright flank
         faces = [face for face in self.faces if not face.flat]
         if not (suited and faces and self.given):
-            return None, ()
+            words = f"its passes count on one round corner, and tool {tool.id} is a {tool.form}"
+            return None, _refused((words,)) if tool.arcs is not None and faces and self.given else ()
         checks, usual = self.checks, self.usual
         every, scallop, chord = np.arange(len(checks.points)), settings.budget.laid, settings.budget.chord
         cut = self.eased(usual)
@@ -207,7 +208,7 @@ def _not_taken(reason: str, value: float, limit: float) -> dict[str, object]:
 
 def _has_floor(zone: ZoneArea, tool: ToolBody) -> bool:
     """Whether a zone is finished by a flat end that stands on it."""
-    return zone.form is AreaForm.LEVEL and tool.radius > tool.corner_radius
+    return zone.form is AreaForm.LEVEL and tool.flat_radius > 0.0
 
 
 def _strategy(zone: ZoneArea, checks: FinishTarget, field: TipField, cut: CutData,
@@ -237,8 +238,9 @@ def _strategy(zone: ZoneArea, checks: FinishTarget, field: TipField, cut: CutDat
             covers = None if checks.covers is None else checks.covers[failing]
             return planar_floor.planes(field, checks.tips[failing], chord, k, covers)
 
-        return Strategy("planar_floor", 1.6 * (tool.radius - tool.corner_radius), planes, False)
-    wide = float(side_step(np.zeros(1), tool.corner_radius, settings.budget.laid)[0]) or tool.radius
+        return Strategy("planar_floor", 1.6 * tool.flat_radius, planes, False)
+    wide = float(side_step(np.zeros(1), tool.tip_curvature, settings.budget.laid)[0]) or tool.radius
+    wide = min(wide, tool.diameter)
     eased = cut.under(left_by_layers(cut.step_down, field.lattice.step), wide)
     promise = Promise(settings.budget.laid, settings.chordal_tolerance, 0.3 * tool.radius,
                       linked(tool, eased, settings))

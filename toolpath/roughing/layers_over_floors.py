@@ -38,7 +38,7 @@ def left_to_floors(fine: CutData, tool: ToolBody, low: float, step: float) -> fl
 
     fine : of the finish; low : mm, what layers leave, which its feed is made for; step : mm, of the deepest layer
     """
-    flat = 1.6 * (tool.radius - tool.corner_radius)
+    flat = 1.6 * tool.flat_radius
     bending, feed, least, most = fine.bending, fine.under(low, flat).feed, LEFT * step, step
     if bending is None:
         return least

@@ -158,6 +158,9 @@ def _poses(tips: F64, axes: F64) -> tuple[F64, F64]:
 
 
 def _sizes(tool: ToolBody) -> CutterSizes:
+    if (arcs := tool.arcs) is not None:
+        return CutterSizes(tool.radius, tool.radius - arcs.flat, tool.flute_length, arcs.high, arcs.low, 0.0, arcs.out,
+                           arcs.up, arcs.bow)
     if tool.taper > 0.0:
         wide = tool.widest_radius
         return CutterSizes(wide, wide - tool.radius + tool.corner_radius, tool.flute_length, tool.flute_length,

@@ -321,10 +321,10 @@ class StockMap:
         tips        : (n, 3) float64, mm, access frame
         lower_bound : mm, as in ``overlap``
 
-        The end cuts straight down: a flat to its edge, a bull nose to half its corner, a ball to half its radius. See
-        ``cover``.
+        The end cuts straight down: a flat to its edge, a bull nose to half its corner, a ball to half its radius,
+        a circle segment mill to where it leans by 30 degrees. See ``cover``.
         """
-        reach = tool.radius - 0.5 * tool.corner_radius
+        reach = tool.dull_radius
         out, lat = np.empty(len(tips)), self.lattice
         half = HALF_DIAGONAL * lat.step
         overlaps(self.cover, self._covered, POOLED, lat.frame, np.ascontiguousarray(tips),

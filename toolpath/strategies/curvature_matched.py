@@ -71,7 +71,7 @@ class _Lattice:
 
 def suits(tool: ToolBody) -> bool:
     """Whether a tool has an end that can be matched: a nose circle of some radius under an upright side."""
-    return tool.radius > tool.corner_radius + 1e-9 and tool.taper == 0.0
+    return tool.radius > tool.corner_radius + 1e-9 and tool.taper == 0.0 and tool.arcs is None
 
 
 def matched(faces: Sequence[Faces], target: FinishTarget, tool: ToolBody, cut: CutData, settings: PlanSettings,

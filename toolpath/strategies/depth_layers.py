@@ -20,6 +20,7 @@ from zones.reach.tip_field import LEVEL_TOLERANCE, TipField
 
 ROUND_CORNERS = 3.5  # lattice steps, beyond three allowances: ways round the ends of finished walls have no rim
 FLAT_SPACING, ROUND_SPACING = 1.3, 0.8  # of the radius of the flat bottom, and of that of the corner, between rings
+ROUND_CUSP = 0.08  # of the radius, height of the cusp between rings of a round end
 APART = 2.0  # lattice steps that nodes of one strip are apart, at most half
 STOCK_WORTH = 0.05  # mm of stock above the cutter that makes a place worth a pass
 EVEN = 0.25  # of the deepest layer, how uneven stock may stay along the axis where it is evened out
@@ -30,8 +31,11 @@ def ring_spacing(tool: ToolBody) -> float:
 
     A flat end leaves nothing between rings less than two radii apart on straight ways. Round a corner of the angle
     theta rings s apart leave an island where s > 2 R sin(theta / 2), so 1.3 R leaves none from 81 degrees on. Between
-    rings of a ball the cusp s^2 / (8 r) stays for the next layer, at most 0.3 D deep: 0.8 r keeps it to 0.08 r.
+    rings of a ball the cusp s^2 / (8 r) stays for the next layer, at most 0.3 D deep: 0.8 r keeps it to 0.08 r. Rings
+    of a circle segment mill keep it to 0.08 R.
     """
+    if tool.arcs is not None:
+        return min(FLAT_SPACING * tool.radius, 2.0 * tool.arcs.width(ROUND_CUSP * tool.radius))
     return FLAT_SPACING * (tool.radius - tool.corner_radius) + ROUND_SPACING * tool.corner_radius
 
 

@@ -102,8 +102,8 @@ class _Nose:
 
 
 def requested_lean(leaned: ToolLean | None, form: AreaForm, tool: ToolBody) -> ToolLean | None:
-    """Requested tilt of a tool on a zone of a form; None on level zones and for tools without a corner radius."""
-    if leaned is None or form is AreaForm.LEVEL or tool.corner_radius <= 0.0:
+    """Requested tilt of a tool on a zone of a form; None on level zones and for sharp-cornered tools."""
+    if leaned is None or form is AreaForm.LEVEL or tool.tip_curvature <= 0.0:
         return None
     if form is not AreaForm.STEEP:
         return leaned if leaned.lead > 0.0 or leaned.tilt > 0.0 else None

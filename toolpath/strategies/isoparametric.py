@@ -188,8 +188,8 @@ def laid(planned: FacePasses, field: TipField, scallop: float, chord: float,
 
 
 def suits(tool: ToolBody) -> bool:
-    """Whether a tool can take such passes: its corner forms the cusps between them."""
-    return tool.corner_radius > 0.0
+    """Whether a tool can take such passes: one round corner forms the cusps between them."""
+    return tool.corner_radius > 0.0 and tool.arcs is None
 
 
 def _against(place: F64, normal: F64) -> bool:

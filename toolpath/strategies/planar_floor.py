@@ -79,7 +79,7 @@ def _plane(field: TipField, z: float, tips: F64, tolerance: float, share: float,
     place : mm, radius of the widest flat place that one move has to cover whole
     """
     lat, tool = field.lattice, field.tool
-    flat = tool.radius - tool.corner_radius
+    flat = tool.flat_radius
     mask = dilated(lat.mask(tips[:, :2]), near / lat.step)
     free = field.height <= z + LEVEL_TOLERANCE
     lines = _rings(field, z, mask & free, 0.2 * flat, 1.6 * flat * share, COVERED * flat - place)
@@ -105,7 +105,7 @@ def _rings(field: TipField, z: float, area: NDArray[np.bool_], first: float, spa
 
     Where a ring has no next one inside it and there is more than ``covered`` mm, another one goes there.
     """
-    lat, flat = field.lattice, field.tool.radius - field.tool.corner_radius
+    lat, flat = field.lattice, field.tool.flat_radius
     far = blocked_beside(np.pad(area, 1), lat.step)[0][1:-1, 1:-1]
     deepest = float(far.max()) if far.size else 0.0
     d = min(max(first, 0.6 * lat.step), 0.9 * deepest)

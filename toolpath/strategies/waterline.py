@@ -29,9 +29,13 @@ def level_step(tool: ToolBody, normals: F64, cusp: float, step_down: float) -> f
     On a wall inclined by n_z a corner r leaves s^2/(8 r) between lines s apart along the wall, s = dz/sin. The flank
     above the corner leaves no more than dz n_z; n_z counts from the side of the tool where that leans. The greater dz
     of the two holds for each sample. The 5 % quantile over the area is taken; the measurement finds the rest. Second
-    order in the cusp.
+    order in the cusp. Of a circle segment mill lines lie a chord of its outline apart, which counts arcs and flank.
     """
     nz = np.abs(normals[:, 2])
+    if tool.arcs is not None and len(nz):
+        sine = np.sqrt(np.maximum(1.0 - nz * nz, 0.0))
+        wanted = float(np.quantile(tool.arcs.passes_apart(sine, cusp) * sine, 0.05))
+        return max(MIN_STEP, min(wanted, step_down))
     by_corner = math.sqrt(8.0 * cusp * tool.corner_radius) * np.sqrt(np.maximum(1.0 - nz * nz, 0.0))
     long = math.hypot(1.0, tool.taper)
     off_flank = nz / long - np.sqrt(np.maximum(1.0 - nz * nz, 0.0)) * tool.taper / long
@@ -81,7 +85,7 @@ def waterlines(field: TipField, tips: F64, levels: F64, window: float, tolerance
             continue
         wanted = dilated(lat.mask(tips[near, :2]), reach)
         active = dilated(wanted, 2.0 * field.tool.radius / lat.step + 3)
-        dip = SHARP_DIP if field.tool.corner_radius == 0 else 0.0
+        dip = SHARP_DIP if field.tool.tip_curvature == 0 else 0.0
         out.append(contour_pieces(field, z, active, wanted, 0.5 * field.tool.radius, 2.0 * field.tool.radius,
                                   tolerance, dip))
     return out

@@ -203,6 +203,6 @@ def _steep_stock(points: F64, stock: StockMap, tool: ToolBody, wall: bool) -> F6
     steep = rise > STEEP * np.hypot(move[:, 0], move[:, 1])
     steep = np.concatenate([steep, [False]]) | np.concatenate([[False], steep])
     over = stock.under_end(points, tool) if wall else stock.overlap(points, tool, -0.3)
-    if tool.corner_radius == 0.0:  # the edge of a flat cuts going down, and a short move takes no more than a rim
+    if tool.tip_curvature == 0.0:  # the edge of a flat cuts going down, and a short move takes no more than a rim
         over = np.maximum(over, stock.standing(points, tool))
     return np.where(np.isfinite(over) & steep, over, 0.0)

@@ -83,8 +83,12 @@ def _lowest(tool: ToolBody, setup: ProofSetup, tip: F64, axis: F64, swings: F64)
     z = axis[:, 2]
     s = np.sqrt(np.maximum(1.0 - z * z, 0.0))
     c, flat = tool.corner_radius, tool.radius - tool.corner_width
-    out = tip[:, 2] + c * z - flat * s - c
-    rims = [(tool.flute_length, tool.widest_radius), (max(tool.cone_height, c), tool.radius)]
+    rims = [(tool.flute_length, tool.widest_radius), (max(tool.cone_height, tool.end_height), tool.radius)]
+    if tool.arcs is not None:
+        rho, high = tool.arcs.at_sines(s)
+        out = tip[:, 2] + high * z - rho * s
+    else:
+        out = tip[:, 2] + c * z - flat * s - c
     for z0, z1, r0, r1, clearance, _ in Bodies.of([tool], setup).rows.tolist():
         rims += [(z0, r0 - clearance), (z1, r1 - clearance)]
     for h, r in rims:

@@ -3,8 +3,8 @@
 The profile over distance rho from the axis and height h from the tip is a rectangle grown by the corner radius r: flat
 end a = R - r, side R, cut off at the flute length L. With ``cone`` above 0 the corner is straight, from (a, 0) to
 (R, cone), and a tapered mill has an arc of radius r before it: that is a cone from (a, r) grown by r. A circle segment
-mill has two arcs (``verify.kernels.segment``). Distances are exact but over the flutes, where the larger of the two ways is taken (a lower bound). A standing cutting part is convex,
-so along a line the distance is convex in s.
+mill has two arcs (``verify.kernels.segment``). Distances are exact but over the flutes, where the larger of the two
+ways is taken (a lower bound). A standing cutting part is convex, so along a line the distance is convex in s.
 """
 
 from __future__ import annotations

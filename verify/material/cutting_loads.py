@@ -141,7 +141,7 @@ def _lengths(moves: Moves, depth: F64, tools: Sequence[ToolBody]) -> tuple[F64, 
     tip = np.linalg.norm(way, axis=1)
     if axes is None:
         return tip, tip
-    sizes = np.array([(t.flute_length, t.radius - t.corner_radius) for t in tools]).reshape(-1, 2)[moves.tool]
+    sizes = np.array([(t.flute_length, t.flat_radius) for t in tools]).reshape(-1, 2)[moves.tool]
     swing = axes.swing * np.minimum(depth, sizes[:, 0])[:, None]
     rim = (axes.angle * sizes[:, 1])[:, None] * axes.middle
     ways = [np.linalg.norm(way + more, axis=1) for more in (swing, rim, -rim, 0.5 * swing)]
@@ -249,11 +249,11 @@ class _Judge:
     def speeds(self, depth: F64) -> Judged:
         """Cutting speed at the largest diameter in the cut; depth : (m,) mm.
 
-        Where an upright cone hangs below the part, it cuts as much higher over its tip.
+        Where an upright cone or barrel hangs below the part, it cuts as much higher over its tip.
         """
         rows, moves = self.rows[self.cuts.speed[self.rows] > 0.0], self.cuts.moves
         high = depth[rows]
-        if self.tool.taper > 0.0 and moves.axes is None:
+        if (self.tool.taper > 0.0 or self.tool.arcs is not None) and moves.axes is None:
             low = np.minimum(moves.start[rows, 2], moves.end[rows, 2])
             high = high + np.maximum(self.cuts.underside - low, 0.0) * (high > 0.0)
         speed = math.pi * diameters_in_cut(self.tool, high) * self.cuts.speed[rows] / 1000.0

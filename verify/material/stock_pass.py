@@ -201,15 +201,11 @@ def end_radii(tools: Sequence[ToolBody], holes: Mapping[int, float] | None = Non
     """
     known = holes or {}
     share = {"flat": lambda t: t.radius, "ball": lambda t: 0.5 * t.radius,
-             "bull": lambda t: t.radius - 0.5 * t.corner_radius, "drill": lambda t: t.radius,
-             "lens": _dull_radius, "barrel": _dull_radius, "thread_mill": lambda t: t.radius, "tap": lambda t: 0.5 * known.get(t.number, 2.0 * TAP_CORE * t.radius),
+             "bull": lambda t: t.dull_radius, "drill": lambda t: t.radius,
+             "lens": lambda t: t.dull_radius, "barrel": lambda t: t.dull_radius,
+             "thread_mill": lambda t: t.radius, "tap": lambda t: 0.5 * known.get(t.number, 2.0 * TAP_CORE * t.radius),
              "chamfer": lambda t: 0.5 * t.tip_diameter if t.tip_diameter > 0.0 else t.radius}
     return np.array([share[t.end](t) for t in tools])
-
-
-def _dull_radius(tool: ToolBody) -> float:
-    """Where the outline of a circle segment mill leans by 30 degrees, mm from its axis; so far the others count too."""
-    return tool.arcs.at_sine(0.5)[0] if tool.arcs is not None else tool.radius
 
 
 def event_table() -> F64:

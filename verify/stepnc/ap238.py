@@ -405,12 +405,15 @@ class Ap238Reader:
             raise self.file.error(tool, f"has {len(shown_by)} representations of its 'tool body', one is required")
         self.data.get(shown_by[0], "MACHINING_TOOL_BODY_REPRESENTATION")
         sizes: dict[str, float] = {}
+        words = " ".join(str(self.data.one(n, "RESOURCE_PROPERTY", "description")) for n in bodies)
         kind = _TOOLS[self._word(tool, "MACHINING_TOOL", "description", _TOOLS)]
         for item in self._items(shown_by[0]):
             name = self._item_name(item, (*_ITEMS, *(_CONE_ITEMS if kind == "cone" else ())))
             if name == "hand of cut":
                 self.data.get(item, "DESCRIPTIVE_REPRESENTATION_ITEM")
                 self._word(item, "DESCRIPTIVE_REPRESENTATION_ITEM", "description", ("right", "neutral"))
+            elif name == "tool description":
+                words = str(self.data.one(item, "DESCRIPTIVE_REPRESENTATION_ITEM", "description"))
             elif name not in _QUIET_ITEMS:
                 dimensions, sizes[name] = self._measured(item)
                 wanted = _UNIT_OF.get(name, {"length": 1.0})
@@ -431,7 +434,8 @@ class Ap238Reader:
                                                f"expected, not {given}")
         name = str(self.data.one(tool, "MACHINING_TOOL", "name"))
         return CutterRecord(tool_number(name), name, shape_of(diameter, corner, taper), diameter, corner,
-                      sizes.get("maximum depth of cut"), sizes.get("overall assembly length"), tool, taper=taper)
+                            sizes.get("maximum depth of cut"), sizes.get("overall assembly length"), tool, taper=taper,
+                            words=words)
 
     def _cone(self, tool: int, body: int, sizes: dict[str, float]) -> CutterShape:
         """The cutter of APT: its end is level, its side leans and touches its corner; else there is a remark."""

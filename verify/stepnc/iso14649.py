@@ -430,7 +430,7 @@ class Iso14649Reader:
                  for n in self.data.refs(number, "MILLING_CUTTING_TOOL", "its_cutting_edge")}
         return CutterRecord(tool_number(name), name, shape_of(wide, corner, taper), wide, corner, long,
                             self.data.real(number, "MILLING_CUTTING_TOOL", "overall_assembly_length"), number,
-                            tuple(sorted(edges)), taper)
+                            tuple(sorted(edges)), taper, name)
 
     def _taper(self, body: int, kind: str, size: int) -> float:
         """Angle between the side of a tapered end mill and its axis, deg; 0 of all others."""

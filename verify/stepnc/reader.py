@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 
 from geometry.errors import ProgramError
@@ -13,6 +14,7 @@ from verify.stepnc import ap238, iso14649
 from verify.stepnc.part21 import Part21File, is_exchange_file
 from verify.stepnc.tool_motion import CutterMoves, CutterRecord, MotionRecorder
 
+_PROFILE = re.compile(r"\b(lens|barrel) D[\d.]+ profile R([\d.]+)(?: ([\d.]+) deg)?")
 SAME_SIZE = 1e-4  # mm, between sizes of a tool in the file and in the setup
 SAME_ANGLE = 1e-3  # deg, between a taper in the file and in the setup
 SAME_LENGTH = 1.0  # mm, between lengths from the spindle to the tip, which are measured at the machine
@@ -119,9 +121,23 @@ def _differs(cutter: CutterRecord, body: ToolBody) -> str:
              ("flute length", cutter.flute_length, body.flute_length))
     found = [f"{word} {there:g} mm in the file and {here:g} mm in the setup" for word, there, here in pairs
              if there is not None and abs(there - here) > SAME_SIZE]
-    if abs(cutter.taper - body.taper_deg) > SAME_ANGLE:
+    if profile := _profile_differs(cutter, body):
+        found.append(profile)
+    elif not body.form and abs(cutter.taper - body.taper_deg) > SAME_ANGLE:
         found.append(f"taper {cutter.taper:g} deg in the file and {body.taper_deg:g} deg in the setup")
     return ", ".join(found)
+
+
+def _profile_differs(cutter: CutterRecord, body: ToolBody) -> str:
+    """Differences between the large arc of a tool in the words of the file and in the setup; '' where there is none."""
+    stated = _PROFILE.search(cutter.words)
+    there = (stated[1], float(stated[2]), float(stated[3] or 0.0)) if stated else ("", 0.0, 0.0)
+    here = (body.form, body.profile_radius, body.taper_deg if body.form else 0.0)
+    if there[0] == here[0] and abs(there[1] - here[1]) <= SAME_SIZE and abs(there[2] - here[2]) <= SAME_ANGLE:
+        return ""
+    texts = [f"{form} with profile R{radius:g}{f' and {angle:g} deg' if angle else ''}" if form else
+             "no profile radius" for form, radius, angle in (there, here)]
+    return f"{texts[0]} in the file and {texts[1]} in the setup"
 
 
 __all__ = ["is_stepnc", "read_moves", "read_stepnc"]

@@ -43,6 +43,7 @@ class CutterRecord:
     instance      : number of its instance
     offsets       : mm, lengths from the spindle to the cutting edges
     taper         : deg, between side and axis; 0 for an upright side
+    words         : text of the file on the tool, which has the profile of a circle segment mill
     """
 
     number: int | None
@@ -55,6 +56,7 @@ class CutterRecord:
     instance: int
     offsets: tuple[float, ...] = ()
     taper: float = 0.0
+    words: str = ""
 
 
 @dataclass(frozen=True, eq=False)

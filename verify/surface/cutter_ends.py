@@ -2,8 +2,9 @@
 
 A cut that is narrow to all sides mostly ends where the path turns: down and up, in and out. So the end of a tool is
 looked at wherever a feed move ends at a corner of the path, and at even distances along all feed moves. So is the rim
-where the flutes end, if the tool is thinner over it. The points of drills and pointed chamfer mills have findings of
-their own. Coordinates are float64, mm, in the setup frame.
+where the flutes end, if the tool is thinner over it. Of a circle segment mill the end is balls inside it that touch the
+outline at several heights, and its rim. The points of drills and pointed chamfer mills have findings of their own.
+Coordinates are float64, mm, in the setup frame.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ ROUNDS = 4  # of the search round the deepest of them
 RELIEF = 1e-6  # mm by which a neck is thinner than the rim below it, in radius
 OVERHANG = -0.02  # normal along the axis: the side of a cylinder meets a steeper surface before its upper rim does
 LIFT, LIFT_SHARE = 0.05, 0.25  # mm, and of the radius: a second rim over the sharp one, for walls
+PER_ARC = 3  # rings on each arc of a circle segment mill, beside the middle
 TOLD = 0.5  # mm: a wider step along the ways is a note
 THIN = 0.05  # mm
 BATCH = 4096  # poses
@@ -199,6 +201,8 @@ def _posed(moves: Moves, row: INT, share: F64) -> tuple[F64, F64]:
 def _far(tool: ToolBody) -> float:
     """How far from its tip a tool is looked at, mm."""
     whole = max(tool.taper, tool.cone_height) > 0.0 or len(_upper_rims(tool)) > 0
+    if tool.arcs is not None and not whole:
+        return math.hypot(tool.radius, tool.end_height)
     return math.hypot(tool.widest_radius, tool.flute_length) if whole else tool.radius
 
 
@@ -245,7 +249,10 @@ def _inside_alone(tree: TriangleTree, points: F64, radius: float) -> NDArray[np.
 
 
 def _ends(tool: ToolBody) -> list[_Ring]:
-    """The end of a mill, or the rim of the flat at the tip of a cone."""
+    """Rings of the end: its corner, of a circle segment mill balls inside it that touch each of its arcs, and of a cone
+    the rim of the flat at its tip."""
+    if tool.arcs is not None:
+        return [_Ring(*ring) for ring in tool.arcs.inner_balls(PER_ARC, tool.flute_length)]
     if tool.cone_height > 0.0:
         return [_Ring(0.5 * tool.tip_diameter, 0.0, 0.0)] if tool.tip_diameter > 0.0 else []
     return [_Ring(tool.radius - tool.corner_radius, tool.corner_radius, tool.corner_radius)]
@@ -253,9 +260,13 @@ def _ends(tool: ToolBody) -> list[_Ring]:
 
 def _rims(tool: ToolBody) -> list[_Ring]:
     """Of a sharp end a rim over it, and of a cone the edge where its side begins."""
+    high = min(LIFT, LIFT_SHARE * tool.radius)
+    if tool.arcs is not None:
+        sharp = tool.arcs.bow <= 0.0 or tool.profile_taper > 0.0
+        return [_Ring(tool.radius, tool.end_height + high, 0.0)] if sharp else []
     if tool.along_axis_only or tool.corner_radius > 0.0:
         return []
-    return [_Ring(tool.radius, max(tool.cone_height, min(LIFT, LIFT_SHARE * tool.radius)), 0.0)]
+    return [_Ring(tool.radius, max(tool.cone_height, high), 0.0)]
 
 
 def _upper_rims(tool: ToolBody) -> list[_Ring]:
@@ -446,7 +457,9 @@ def _near_surface(tree: TriangleTree, tip: F64, z: F64, of: INT, tool: NDArray[n
 
     tip, z : (n, 3) float64, mm and unit; of : (n,) int64, index, the move of each; tool : (m,) int32, index, of moves
     """
-    corner, radius = (np.array(v)[tool][of] for v in ([t.corner_radius for t in tools], [t.radius for t in tools]))
+    corner, radius = (np.array(v)[tool][of] for v in (
+        [t.corner_radius if t.arcs is None else 0.5 * t.end_height for t in tools],
+        [t.radius if t.arcs is None else math.hypot(t.radius, 0.5 * t.end_height) for t in tools]))
     away, _, _ = nearest(tree, tip + corner[:, None] * z, float(radius.max(initial=0.0)))
     ball = corner >= radius - 1e-9
     through = np.zeros(len(tool), np.bool_)
@@ -461,9 +474,12 @@ def _end_places(tip: F64, z: F64, tool: ToolBody) -> list[F64]:
         return out
     x = square_to(z)
     y = np.cross(z, x)
-    corner = tool.corner_radius
-    for tilt in TILTS if corner > 0.0 else TILTS[:1]:
-        wide, high = tool.radius - corner * (1.0 - math.sin(tilt)), corner * (1.0 - math.cos(tilt))
+    corner, arcs = tool.corner_radius, tool.arcs
+    tilts = TILTS if corner > 0.0 else TILTS[:1]
+    places = [(tool.radius - corner * (1.0 - math.sin(t)), corner * (1.0 - math.cos(t))) for t in tilts] \
+        if arcs is None else [arcs.at_sine(s) for s in (0.5 * arcs.join_sine, arcs.join_sine,
+                                                        0.5 * (arcs.join_sine + arcs.end_sine), arcs.end_sine)]
+    for wide, high in places:
         if wide > 0.0:
             out += [tip + wide * (math.cos(t) * x + math.sin(t) * y) + high * z
                     for t in (2.0 * math.pi * np.arange(ENDS_AROUND) / ENDS_AROUND).tolist()]

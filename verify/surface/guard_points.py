@@ -186,12 +186,17 @@ def path_places(moves: Moves, count: NDArray[np.int64]) -> tuple[F64, F64, NDArr
     return tip, np.cos(turn) * axis + np.sin(turn) * np.cross(moves.axes.about[of], axis), of
 
 
+def _inner_ball(tool: ToolBody) -> float:
+    """Radius of a ball on the tip that the end holds, mm; 0 for a sharp one."""
+    return tool.corner_radius if tool.arcs is None else min(tool.arcs.low, tool.radius)
+
+
 def _under(tree: TriangleTree, moves: Moves, count: NDArray[np.int64], tools: Sequence[ToolBody], tolerance: float
            ) -> tuple[F64, NDArray[np.int64]]:
     """Places of the surface and their triangles under ``count`` (m,) even places of each move, both ends among them."""
     tip, z, of = path_places(moves, count)
     radius, corner = (np.array(size)[moves.tool[of]]
-                      for size in ([t.radius for t in tools], [t.corner_radius for t in tools]))
+                      for size in ([t.radius for t in tools], [_inner_ball(t) for t in tools]))
     middle = tip + corner[:, None] * z
     # a ball that is one tolerance deep under one place of a cell is 0.4 of it deep at any other
     least = float(radius.min(initial=np.inf))

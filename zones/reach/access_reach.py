@@ -26,15 +26,19 @@ class Reach:
     tips: F64
 
 
+
+PREFERRED = {"flat": 0.0, "bull": 1.0, "lens": 2.0, "barrel": 3.0, "ball": 3.0}
+"""Order of the ends on level planes: flats, and then those that leave lower scallops."""
+
 def able(tool: ToolBody, normals: F64, scallop: float) -> NDArray[np.bool_]:
     """(n,) bool: a strategy exists for this tool on samples with these normals.
 
     normals : (n, 3) float64, dimensionless, access frame
 
-    A tool with a corner radius cuts everything. A sharp-cornered flat end cuts level planes, and walls so upright that
-    steps of at least 0.1 mm keep the scallop.
+    A tool with a corner radius, or an arc at its tip, cuts everything. A sharp-cornered flat end cuts level planes, and
+    walls so upright that steps of at least 0.1 mm keep the scallop.
     """
-    if tool.corner_radius > 0:
+    if tool.corner_radius > 0 or tool.arcs is not None:
         return np.ones(len(normals), np.bool_)
     nz = normals[:, 2]
     return np.asarray((nz > LEVEL) | (np.abs(nz) <= 0.5 * scallop / 0.1))
@@ -45,7 +49,7 @@ def preference(tool: ToolBody, form: AreaForm) -> tuple[float, float, float, flo
 
     Of two ends of one diameter that of the wider cone is the stouter tool.
     """
-    kind = {"flat": 0.0, "bull": 1.0, "ball": 2.0}[tool.end] if form is AreaForm.LEVEL else 0.0
+    kind = PREFERRED[tool.end] if form is AreaForm.LEVEL else 0.0
     return (kind, -tool.diameter, -tool.taper, tool.stickout)
 
 

@@ -27,6 +27,7 @@ GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 CHUNK_PAIRS = 400_000  # pairs of sample and direction in one batch
 CANDIDATES = 4000  # axes to try for a cone before the best is refined
 ROUNDING = 1e-9  # rad
+ARC_RINGS = 8  # of bull noses on each arc of a circle segment mill
 SIDE_SLICES = 24  # of the leaning side of a tapered mill
 
 
@@ -71,6 +72,10 @@ def assembly(tool: ToolBody, clear: Clearances, allowance: float) -> F64:
     Bodies above one that is as wide are left out.
     """
     rows = [(tool.radius + allowance, max(tool.corner_radius + allowance, 0.0), -allowance)]
+    if tool.arcs is not None:  # bull noses within the arcs that touch them, and the side above
+        rows = [(ring + ball + allowance, ball + allowance, high - ball - allowance)
+                for ring, high, ball in tool.arcs.inner_balls(ARC_RINGS, tool.flute_length)]
+        rows.append((tool.radius + allowance, 0.0, tool.end_height - allowance))
     if tool.taper > 0.0:  # the leaning side as slices that enclose it
         (wide, high), rise = tool.corner_end, tool.flute_length - tool.corner_end[1]
         rows += [(wide + tool.taper * rise * (k + 1) / SIDE_SLICES + allowance, 0.0,
@@ -100,7 +105,8 @@ def approach(tree: TriangleTree, tool: ToolBody, clear: Clearances, points: Arra
     Returns
     -------
     (n, d) bool
-        Exact for mesh and assembly (holder frusta as enclosing slices), except for 1e-5 mm along the axis.
+        Exact for mesh and assembly (holder frusta as enclosing slices), except for 1e-5 mm along the axis. Between 8
+        places on each arc of a circle segment mill a little less than its body counts, a few hundredths of a mm.
 
     Notes
     -----
@@ -132,7 +138,7 @@ def _reached(tree: TriangleTree, tool: ToolBody, frames: F64, bodies: F64, p: F6
     tips = contact_tips(tool, points, normals, lift)
     tips[:, 2] += LEVEL_TOLERANCE
     free = ~blocked_along(tree, frames, frame, tips, bodies)
-    flat = tool.radius - tool.corner_radius
+    flat = tool.flat_radius
     level = normals[:, 2] > LEVEL
     for reach in (0.5 * flat, max(flat - EDGE_SLACK, 0.9 * flat)) if flat > 0 else ():
         for side in FLAT_RING:

@@ -24,7 +24,7 @@ from scipy.spatial import cKDTree
 
 from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
-from geometry.mesh_queries.drop import LeaningSide, Shape, blocked_many, drop_along, drop_shape, drop_tips
+from geometry.mesh_queries.drop import LeaningSide, Shape, Side, blocked_many, drop_along, drop_shape, drop_tips
 from geometry.mesh_queries.flat_grid import drop_over_flats
 from geometry.tool_body import ToolBody
 from zones.kernels.lattice import noncut_blocked, noncut_lookup
@@ -151,8 +151,8 @@ class TipField:
         return self.tool.corner_radius + self.allowance
 
     @property
-    def grown_side(self) -> LeaningSide | None:
-        """Side of a tapered cutting part with the allowance; None for an upright one."""
+    def grown_side(self) -> Side | None:
+        """Side of a tapered or arcs of a circle segment mill with the allowance; None for another cutting part."""
         return self._side(0.0)
 
     @property
@@ -160,9 +160,11 @@ class TipField:
         """The cutting part with the allowance, as compiled loops take it."""
         return drop_shape(self.grown_radius, self.grown_corner, self.grown_side)
 
-    def _side(self, wider: float) -> LeaningSide | None:
+    def _side(self, wider: float) -> Side | None:
         """``grown_side`` of a cutting part whose radius is ``wider`` mm larger than it is."""
         tool = self.tool
+        if tool.arcs is not None:
+            return tool.arcs.grown(self.allowance).shifted(wider)
         return LeaningSide(tool.taper, tool.widest_radius + self.allowance + wider) if tool.taper > 0.0 else None
 
     @property
@@ -249,7 +251,7 @@ class TipField:
             around = math.sqrt(2.0) * aside + 1e-3 * lat.step
             empty, full = some.copy(), np.zeros_like(some)
             empty[a, b] = ~self.blocked_by_cutter(middle, around)
-            if self.grown_radius - around > self.grown_corner:
+            if self.tool.flat_radius > around:
                 left = np.flatnonzero(~empty[a, b])
                 full[a[left], b[left]] = self.blocked_by_cutter(middle[left], -around)
             spread = (np.arange(near.shape[0])[:, None] // SQUARE, np.arange(near.shape[1])[None] // SQUARE)
@@ -322,12 +324,20 @@ def contact_tips(tool: ToolBody, points: F64, normals: F64, lift: float) -> F64:
     points, normals : (n, 3) float64, mm and dimensionless, out of the material, access frame
     lift            : mm, offset of the contact along the normal
     Returns (n, 3) float64, mm, access frame: tips. The contact lies on the torus of the corner: axis at
-    p + r n + (R - r) n_xy/|n_xy|, tip at its height r (n_z - 1) + p_z. The whole bottom of a flat or bull end touches a
-    level facet; there the axis is over the point.
+    p + r n + (R - r) n_xy/|n_xy|, tip at its height r (n_z - 1) + p_z. On a circle segment mill it lies where the
+    outline leans as the surface does. The whole bottom of a flat or bull end touches a level facet; there the axis is
+    over the point.
     """
+    level = np.linalg.norm(normals[:, :2], axis=1)
+    if tool.arcs is not None:
+        rho, high = tool.arcs.at_sines(np.minimum(level, 1.0))
+        out = points + normals * lift
+        # as below, the flat end is not shifted over a facet that is all but level
+        out[:, :2] += np.where(level > 1e-3, rho / np.maximum(level, 1e-12), tool.arcs.low)[:, None] * normals[:, :2]
+        out[:, 2] -= high
+        return np.ascontiguousarray(out)
     r, flat = tool.corner_radius, tool.radius - tool.corner_radius
     out = points + normals * (lift + r)
-    level = np.linalg.norm(normals[:, :2], axis=1)
     side = np.where(level > 1e-3, 1.0 / np.maximum(level, 1e-12), 0.0)[:, None] * normals[:, :2]
     out[:, :2] += flat * side
     out[:, 2] -= r
@@ -416,7 +426,7 @@ def _touched(field: TipField, points: F64, normals: F64, tips: F64,
     aside[:, :2] += play * field.lattice.step * side
     cutter[upright] = ~field.blocked_by_cutter(aside)
     whole = cutter & ~field.blocked_by_body(tips)
-    flat = field.tool.radius - field.tool.corner_radius
+    flat = field.tool.flat_radius
     if flat > 0:
         level = normals[:, 2] > LEVEL
         for reach in (0.5 * flat, max(flat - EDGE_SLACK, 0.9 * flat)):

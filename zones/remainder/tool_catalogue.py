@@ -55,7 +55,8 @@ def shank_of(diameter: float, at_hand: float) -> float:
 
 def sold(like: ToolBody, diameter: float, corner_radius: float) -> ToolBody:
     """A cutter of the series, mm, in the holder of a tool at hand, without its final lengths; its side is upright."""
-    return replace(like, taper=0.0, diameter=diameter, corner_radius=corner_radius, flute_length=FLUTES * diameter,
+    return replace(like, taper=0.0, form="", profile_radius=0.0, profile_taper=0.0, tip_diameter=0.0,
+                   diameter=diameter, corner_radius=corner_radius, flute_length=FLUTES * diameter,
                    neck_diameter=(1.0 - RELIEF) * diameter, shank_diameter=shank_of(diameter, like.shank_diameter))
 
 

@@ -144,10 +144,10 @@ def _known(few: SurfaceSamples, requirement: ToolRequirement) -> NDArray[np.obje
 def _cutters(requirement: ToolRequirement) -> list[CuttingPart]:
     """The cutters to try, stout to thin: those at hand and those of the series.
 
-    A tapered mill is not made longer: its cone would be wider at the end.
+    A tapered mill is not made longer: its cone would be wider at the end. Nor is a circle segment mill.
     """
     tools = list(requirement.tools.values())
-    out = [CuttingPart(t.diameter, t.corner_radius, t.id, True) for t in tools if t.taper == 0.0]
+    out = [CuttingPart(t.diameter, t.corner_radius, t.id, True) for t in tools if t.taper == 0.0 and t.arcs is None]
     have = {(c.diameter, c.corner) for c in out}
     for d in DIAMETERS:
         if 0.5 * d <= requirement.cusp:  # the cusp would exceed the radius of such a tool, and no setup allows it

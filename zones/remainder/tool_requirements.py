@@ -170,7 +170,9 @@ class ToolRequirement:
             does = rows[short & (need[:, 0] <= neck) & (need[:, 1] <= stickout)]
             share = float(samples.area[does].sum()) / whole
             if share >= DOES:
-                cone = {"taper_angle_deg": round(body.taper_deg, 6)} if body.taper > 0.0 else {}
+                cone = {"taper_angle_deg": round(body.taper_deg, 6)} if body.taper_deg > 0.0 else {}
+                cone |= {"profile_radius_mm": body.profile_radius} if body.form else {}
+                cone |= {"tip_diameter_mm": body.tip_diameter} if body.form and body.tip_diameter > 0.0 else {}
                 return {"kind": body.kind, "diameter_mm": body.diameter, **cone,
                         "corner_radius_mm": round(body.corner_radius, 6), "neck_length_mm": neck,
                         "shank_diameter_mm": body.shank_diameter, "stickout_mm": stickout, "like": cutter.like,

@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from geometry.errors import LibraryError
+from schemas.tools import SEGMENT_KINDS
 from service.libraries.containers import Archive, is_zip, json_bytes, json_of, zipped
 from service.libraries.entry import Entry, Preset, Source, Unit, check_count, shown
-from service.libraries.formats.kind_words import AUTODESK, TO_AUTODESK
+from service.libraries.formats.kind_words import AUTODESK, SEGMENTS, TO_AUTODESK
 
 LENGTHS = {"RE": "corner_radius_mm", "tip-diameter": "tip_diameter_mm", "LCF": "flute_length_mm",
            "SFDM": "shank_diameter_mm", "LB": "stickout_mm", "OAL": "overall_length_mm",
@@ -66,6 +67,10 @@ def _entry(item: Any, place: int, source: Source) -> Entry:
     for key, name in LENGTHS.items():
         entry.length(name, geometry.get(key), unit, zero=key in ZERO)
     entry.count("flutes", geometry.get("NOF"))
+    if entry.kind in SEGMENT_KINDS:
+        _segment(entry, geometry, unit)
+        if entry.stated_kind.casefold() not in SEGMENTS:
+            return entry
     autodesk_angles(entry, geometry.get("TA"), geometry.get("SIG"))
     if geometry.get("HAND") is False:
         entry.leave_out("it turns counterclockwise, which is not available")
@@ -88,6 +93,19 @@ def _entry(item: Any, place: int, source: Source) -> Entry:
         if isinstance(preset, dict):
             _preset(entry, preset, unit)
     return entry
+
+
+def _segment(entry: Entry, geometry: dict[str, Any], unit: Unit) -> None:
+    """Set the radii of a circle segment mill: the large arc of a lens is its lower radius, that of an oval its profile.
+
+    A barrel or taper of Fusion has an upper radius over the large arc, which tools of a setup have not.
+    """
+    if entry.stated_kind.casefold() not in SEGMENTS:
+        entry.leave_out(f"kind '{shown(entry.stated_kind)}' has an upper radius, which is not available")
+        return
+    corner, profile = SEGMENTS[entry.stated_kind.casefold()]
+    entry.length("corner_radius_mm", geometry.get(corner), unit, zero=True)
+    entry.length("profile_radius_mm", geometry.get(profile), unit)
 
 
 def autodesk_angles(entry: Entry, taper: Any, point: Any) -> None:
@@ -181,6 +199,8 @@ def _item(entry: Entry) -> dict[str, Any]:
     v = entry.values
     geometry: dict[str, Any] = {"DC": v.get("cone_tip_diameter_mm", v["diameter_mm"]), "HAND": True, "CSP": False}
     geometry |= {k: v[n] for k, n in LENGTHS.items() if n in v}
+    if entry.kind == "lens":
+        geometry["lower-radius"] = v["profile_radius_mm"]
     if "flutes" in v:
         geometry["NOF"] = v["flutes"]
     if v.get("taper_angle_deg"):

@@ -7,12 +7,16 @@ import re
 AUTODESK = {
     "flat end mill": "flat", "ball end mill": "ball", "bull nose end mill": "bull", "tapered mill": "tapered",
     "face mill": "mill", "drill": "drill", "spot drill": "drill", "chamfer mill": "chamfer", "engraving": "chamfer",
-    "tap right hand": "tap", "thread mill": "thread_mill", "end mill": "mill"}
+    "tap right hand": "tap", "thread mill": "thread_mill", "end mill": "mill",
+    "circle segment lens": "lens", "circle segment oval": "barrel", "circle segment taper": "barrel",
+    "circle segment barrel": "barrel"}
 """Kinds of Fusion and HSMWorks that a tool has; all others are left out."""
 TO_AUTODESK = {
     "flat": "flat end mill", "ball": "ball end mill", "bull": "bull nose end mill", "tapered_flat": "tapered mill",
     "tapered_ball": "tapered mill", "tapered_bull": "tapered mill", "drill": "drill", "chamfer": "chamfer mill",
-    "tap": "tap right hand", "thread_mill": "thread mill"}
+    "tap": "tap right hand", "thread_mill": "thread mill", "lens": "circle segment lens"}
+SEGMENTS = {"circle segment lens": ("RE", "lower-radius"), "circle segment oval": ("lower-radius", "profile-radius")}
+"""Kinds of Fusion whose outline a lens or barrel of a setup has: names of the corner radius and of the large one."""
 _NOT_AVAILABLE = re.compile(r"lolli?pop|barrel|tonnen|t-?slot|t-?nut|dovetail|schwalben|woodruff|undercut|form mill|"
                             r"radius mill|concave|corner round|viertelkreis")
 _WORDS = (

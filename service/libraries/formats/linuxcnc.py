@@ -16,11 +16,12 @@ from service.libraries.formats.kind_words import kind_of_words
 
 _WORD = re.compile(r"([A-Za-z])\s*([-+]?(?:\d+\.?\d*|\.\d+))(?=[\sA-Za-z]|$)")
 _PAIR = re.compile(r"\b([a-z_]+)=(\S+)")
-REMARKED = ("corner_radius_mm", "taper_angle_deg", "point_angle_deg", "tip_diameter_mm", "pitch_mm", "flutes",
+REMARKED = ("corner_radius_mm", "profile_radius_mm", "taper_angle_deg", "point_angle_deg", "tip_diameter_mm",
+            "pitch_mm", "flutes",
             "flute_length_mm", "neck_diameter_mm", "neck_length_mm", "shank_diameter_mm", "stickout_mm")
 """Fields that the remark carries, since the table has no words for them; lengths in mm."""
-_KINDS = ("flat", "ball", "bull", "tapered_flat", "tapered_ball", "tapered_bull", "drill", "tap", "chamfer",
-          "thread_mill")
+_KINDS = ("flat", "ball", "bull", "tapered_flat", "tapered_ball", "tapered_bull", "lens", "barrel", "drill", "tap",
+          "chamfer", "thread_mill")
 LINE = re.compile(r"^\s*T\s*\d+\s+(?:P\s*\d+\s*)?(?:[A-Z]\s*[-+]?[\d.]+\s*)*(?:;.*)?$")
 """A line of a tool table, to tell one from other texts."""
 

@@ -33,6 +33,7 @@ LENGTHS = {
     "diameter_mm": "diameter dia d dc durchmesser ø cuttingdiameter",
     "cone_tip_diameter_mm": "conetipdiameter",
     "corner_radius_mm": "cornerradius cr re eckenradius radius eckradius",
+    "profile_radius_mm": "profileradius prfrad",
     "flute_length_mm": "flutelength lcf apmx cuttinglength cutlength schneidenlänge schneidenlaenge",
     "neck_diameter_mm": "neckdiameter dn halsdurchmesser shoulderdiameter",
     "neck_length_mm": "necklength ln halslänge shoulderlength",
@@ -62,8 +63,8 @@ _UNIT = re.compile(r"[\s_]*[(\[]\s*(mm|in|inch|inches|mm/min|in/min|1/min|rpm|de
                    r"|_(mm|in|inch|mm_min|in_min|deg)$", re.IGNORECASE)
 FORMULA = tuple("=+-@")
 """Letters with which a spreadsheet takes a text for a formula."""
-_KINDS = ("ball", "flat", "bull", "tapered_ball", "tapered_bull", "tapered_flat", "drill", "tap", "chamfer",
-          "thread_mill")
+_KINDS = ("ball", "flat", "bull", "tapered_ball", "tapered_bull", "tapered_flat", "lens", "barrel", "drill",
+          "tap", "chamfer", "thread_mill")
 WRITTEN = ("library_id", "number", "description", "order_code", "kind", *LENGTHS, *NUMBERS, "flutes",
            "center_cutting", "coolant", "holder", "cutting_data")
 """Columns of a written table; ``cone_tip_diameter_mm`` is left out of it."""

@@ -15,11 +15,12 @@ const DEFAULTS: OwnTool[] = [
   { id: "T2", number: 2, kind: "ball", diameter_mm: 3, flutes: 2, flute_length_mm: 9, neck_diameter_mm: 2.8, neck_length_mm: 20, shank_diameter_mm: 6, stickout_mm: 36, holder: HOLDER },
   { id: "T3", number: 3, kind: "ball", diameter_mm: 1, flutes: 2, flute_length_mm: 3, neck_diameter_mm: 0.9, neck_length_mm: 13, shank_diameter_mm: 4, stickout_mm: 29, holder: HOLDER },
 ];
-const KINDS = ["flat", "ball", "bull", "tapered_flat", "tapered_ball", "tapered_bull"];
+const KINDS = ["flat", "ball", "bull", "tapered_flat", "tapered_ball", "tapered_bull", "lens", "barrel"];
 const COLUMNS: { key: string; title: string; hint: string }[] = [
   { key: "number", title: "T", hint: "T number" }, { key: "kind", title: "Kind", hint: "Kind of tool" },
-  { key: "diameter_mm", title: "Ø", hint: "Diameter, mm" }, { key: "corner_radius_mm", title: "Corner R", hint: "Corner radius of a bull-nose tool, mm" },
-  { key: "taper_angle_deg", title: "Taper °", hint: "Angle between side and axis of a tapered mill, degrees" },
+  { key: "diameter_mm", title: "Ø", hint: "Diameter, mm" }, { key: "corner_radius_mm", title: "Corner R", hint: "Corner radius of a bull-nose tool, a lens or a barrel, mm" },
+  { key: "profile_radius_mm", title: "Profile R", hint: "Radius of the large arc of a lens or barrel, mm" },
+  { key: "taper_angle_deg", title: "Taper °", hint: "Angle between the axis and the side of a tapered mill, or the upper end of a barrel, degrees" },
   { key: "flutes", title: "Teeth", hint: "Number of teeth" }, { key: "flute_length_mm", title: "Flute length", hint: "Flute length, mm" },
   { key: "neck_diameter_mm", title: "Neck Ø", hint: "Neck diameter, mm" }, { key: "neck_length_mm", title: "Neck length", hint: "Neck length, tip to shank, mm" },
   { key: "shank_diameter_mm", title: "Shank Ø", hint: "Shank diameter, mm" }, { key: "stickout_mm", title: "Stickout", hint: "Stickout, tip to holder, mm" },
@@ -39,8 +40,10 @@ export class ToolTable {
     return this.tools.map((t) => {
       if (typeof t === "string") return t;
       const out = { ...t };
-      if (!out.kind.endsWith("bull")) delete out.corner_radius_mm;
-      if (!out.kind.startsWith("tapered_")) delete out.taper_angle_deg;
+      const segment = out.kind === "lens" || out.kind === "barrel";
+      if (!out.kind.endsWith("bull") && !segment) delete out.corner_radius_mm;
+      if (!out.kind.startsWith("tapered_") && out.kind !== "barrel") delete out.taper_angle_deg;
+      if (!segment) delete out.profile_radius_mm;
       return out;
     });
   }

@@ -9,12 +9,16 @@ export interface Grid {
   origin: [number, number, number];
 }
 
-/** Cutting part of a tool: radius of its end, corner radius and flute length, mm; angle between side and axis, rad. */
+/**
+ * Cutting part of a tool: radius of its end, corner radius and flute length, mm; angle between side and axis, rad.
+ * Of a lens or barrel its outline counts instead: radius and height of points from the tip up, mm.
+ */
 export interface Cutter {
   radius: number;
   corner: number;
   length: number;
   taper: number;
+  outline?: [number, number][];
 }
 
 type Three = ArrayLike<number>;
@@ -39,7 +43,8 @@ function place(g: Grid, values: Float32Array, tool: Cutter, px: number, py: numb
   const { radius, corner, length } = tool;
   const flat = radius - corner;
   const [sin, cos] = [Math.sin(tool.taper), Math.cos(tool.taper)];
-  const widest = flat + (corner + Math.max(0, length - corner) * sin) / cos; // from the middle of the corner along the side
+  const edges = tool.outline ? normals(tool.outline) : null;
+  const widest = edges ? radius : flat + (corner + Math.max(0, length - corner) * sin) / cos; // from the middle of the corner along the side
   const range = (p: number, a: number, n: number): [number, number] => {
     const aside = widest * Math.sqrt(Math.max(0, 1 - a * a)) + h;
     return [Math.max(0, Math.ceil((Math.min(p, p + length * a) - aside) / h)), Math.min(n - 1, Math.floor((Math.max(p, p + length * a) + aside) / h))];
@@ -64,12 +69,30 @@ function place(g: Grid, values: Float32Array, tool: Cutter, px: number, py: numb
         if (wide <= 0 || r2 >= wide * wide) continue;
         const r = Math.sqrt(r2);
         const [out, over] = [r - flat, up - corner]; // from the middle of the corner
-        const end = out > 0 && out * sin + over * cos < 0 ? Math.hypot(out, over) - corner : Math.max(out * cos - over * sin - corner, -up);
+        const end = edges ? farthest(edges, r, up) : out > 0 && out * sin + over * cos < 0 ? Math.hypot(out, over) - corner : Math.max(out * cos - over * sin - corner, -up);
         const d = Math.max(end, up - length, -h);
         if (d < now) values[n] = d;
       }
     }
   }
+}
+
+/** Edges of a convex outline from the tip up: outward unit normal (radius, height) and distance from the tip along it. */
+function normals(outline: [number, number][]): [number, number, number][] {
+  const out: [number, number, number][] = [];
+  for (let k = 1; k < outline.length; k++) {
+    const [[r0, h0], [r1, h1]] = [outline[k - 1]!, outline[k]!];
+    const size = Math.hypot(r1 - r0, h1 - h0);
+    if (size > 1e-9) out.push([(h1 - h0) / size, (r0 - r1) / size, (r0 * (h1 - h0) + h0 * (r0 - r1)) / size]);
+  }
+  return out;
+}
+
+/** Largest distance of a place from the edges: negative inside. */
+function farthest(edges: [number, number, number][], r: number, up: number): number {
+  let most = -Infinity;
+  for (const [a, b, c] of edges) most = Math.max(most, a * r + b * up - c);
+  return most;
 }
 
 /** A surface. `spare`: how far each vertex lies outside the part, mm. The arrays are longer than what is used of them. */

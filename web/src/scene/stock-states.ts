@@ -110,6 +110,10 @@ export class StockStates {
 export function cutterOf(tool: ToolShape): Cutter {
   const profile = tool.bodies[0]!.profile;
   const length = profile[profile.length - 1]![1];
+  if (tool.profile_radius_mm) {
+    const radius = 0.5 * tool.diameter_mm;
+    return { radius, corner: 0, length, taper: 0, outline: profile };
+  }
   if (tool.taper_deg) {
     const radius = 0.5 * tool.diameter_mm; // of the end; the second point is where its flat ends
     return { radius, corner: radius - profile[1]![0], length, taper: (tool.taper_deg * Math.PI) / 180 };

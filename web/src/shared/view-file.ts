@@ -30,8 +30,10 @@ export interface ToolShape {
   kind: string;
   /** Of a tapered mill that of its end. */
   diameter_mm: number;
-  /** Angle between the side of a tapered mill and its axis; missing for all others. */
+  /** Angle between the side of a tapered mill, or the upper end of a barrel, and the axis; missing for all others. */
   taper_deg?: number;
+  /** Radius of the large arc of a lens or barrel; missing for all others. */
+  profile_radius_mm?: number;
   bodies: { kind: string; profile: [number, number][] }[];
 }
 

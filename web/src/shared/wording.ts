@@ -22,9 +22,10 @@ export function findingPlace(f: ViewFinding): string {
   return `${f.kind}: ${f.message}${f.line ? `; ${f.program} line ${f.line}` : ""}${at}`;
 }
 
-/** "ball D3", "tapered ball D1 3°". */
-export function cutterWords(t: { kind: string; diameter_mm: number }, taper?: number): string {
-  return `${spaced(t.kind)} D${t.diameter_mm}${taper ? ` ${taper}°` : ""}`;
+/** "ball D3", "tapered ball D1 3°", "lens D6 R20". */
+export function cutterWords(t: { kind: string; diameter_mm: number; profile_radius_mm?: number }, taper?: number): string {
+  const profile = t.profile_radius_mm ? ` R${t.profile_radius_mm}` : "";
+  return `${spaced(t.kind)} D${t.diameter_mm}${profile}${taper ? ` ${taper}°` : ""}`;
 }
 
 /** The same for a T number; empty if the setup has no such tool. */

@@ -36,6 +36,9 @@ TOOLS = [
     tool(8, "tap", 6, pitch_mm=1, flute_length_mm=14),
     tool(9, "chamfer", 10, point_angle_deg=90, tip_diameter_mm=1, flute_length_mm=6),
     tool(10, "thread_mill", 8, pitch_mm=1.25, flute_length_mm=16),
+    tool(12, "lens", 8, profile_radius_mm=40.5, corner_radius_mm=0.5, flute_length_mm=16),
+    tool(13, "barrel", 8, profile_radius_mm=60, corner_radius_mm=1.5, taper_angle_deg=12.5, tip_diameter_mm=1,
+         flute_length_mm=24),
 ]
 FULL = [tool(11, "flat", 4, flute_length_mm=11, center_cutting=False, core_diameter_mm=1.5, ramp_angle_deg=2,
              max_rpm=20000, max_engagement_deg=90, life_min=45.5, spindle_rpm=7000, feed_mm_min=600,
