@@ -29,6 +29,8 @@ MAX_TAPER = 45.0
 """Largest ``taper_angle_deg``, deg; a wider cone is a chamfer mill."""
 MAX_PROFILE_RADIUS = 5000.0
 """Largest ``profile_radius_mm``, mm; a flatter end is a flat end mill."""
+MIN_SEGMENT_DIAMETER = 1.5
+"""Least ``diameter_mm`` of a lens or barrel, mm: the proof looks closer at finer ends of other kinds only."""
 CUTTING_FIELDS = ("spindle_rpm", "feed_mm_min", "plunge_feed_mm_min")
 """Speeds and feeds that a tool states for all materials, or in ``cutting_data`` for each."""
 CORE_SHARE = 0.3
@@ -225,6 +227,9 @@ class Tool(WireModel):
                                  f"null for kind {self.kind}")
             return
         radius, large, corner = self.diameter_mm / 2, self.profile_radius_mm, self.corner_radius_mm
+        if self.diameter_mm < MIN_SEGMENT_DIAMETER:
+            raise ValueError(f"tool {self.id}: diameter_mm {self.diameter_mm:g} of a {self.kind} must be at least "
+                             f"{MIN_SEGMENT_DIAMETER:g}; use kind ball or bull")
         if large is None:
             raise ValueError(f"tool {self.id}: a {self.kind} needs profile_radius_mm, the radius of its large arc")
         if corner >= radius:

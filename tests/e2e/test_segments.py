@@ -74,7 +74,7 @@ def wall(tmp_path_factory):
 
 
 def deepest(tool, other):
-    """How far the profile of one mill is in that of another, and how far it stays out at most below the upper edge."""
+    """How far the profile of one mill reaches out of that of another, mm."""
     lines = []
     for fields in (tool, other):
         arcs = body(fields).arcs
@@ -84,7 +84,7 @@ def deepest(tool, other):
     a, b = lines
     near = np.hypot(b[:, None, 0] - a[None, :, 0], b[:, None, 1] - a[None, :, 1]).min(axis=1)
     out = b[:, 0] > np.interp(b[:, 1], a[:, 1], a[:, 0])
-    return float(near[out].max(initial=0.0)), float(near[~out].max(initial=0.0))
+    return float(near[out].max(initial=0.0))
 
 
 def test_a_groove_of_the_shape_of_the_mill_has_no_finding(groove):
@@ -103,16 +103,16 @@ def test_a_pass_beside_the_groove_gouges_its_side(groove):
     assert told["depth"] == pytest.approx(0.04, abs=5e-3) and told["line"] == len(program().splitlines()) - 4
 
 
-def test_another_profile_radius_gouges_or_leaves_stock(groove):
+def test_another_profile_radius_gouges_or_covers_less(groove):
     fields, proved = groove
     for share in (1.5, 0.8):
         other = {**fields, "profile_radius_mm": share * fields["profile_radius_mm"]}
         report = proved(program(), profile_radius_mm=other["profile_radius_mm"])
-        gouge, _ = deepest(fields, other)
+        gouge = deepest(fields, other)
         if gouge > 0.015:
             assert found(report, "gouge")["depth"] == pytest.approx(gouge, abs=6e-3)
         else:
-            assert found(report, "stock_left")["depth"] > 0.01
+            assert "gouge" not in report["finding_counts"] and report["coverage"] < 0.99
 
 
 @pytest.mark.parametrize("name", TOOLS)
@@ -129,7 +129,8 @@ def test_beside_a_wall_the_widest_diameter_counts(wall, name):
 
     assert "gouge" not in wall(name)(along(0.001))["finding_counts"]
     told = found(wall(name)(along(-0.03)), "gouge")
-    assert told["depth"] == pytest.approx(0.03, abs=5e-3) and told["line"] == len(along(0.0).splitlines()) - 4
+    over = body(TOOLS[name]).arcs.width(DEEP) - radius  # the arcs of the oval end a little over the wall
+    assert told["depth"] == pytest.approx(0.03 + over, abs=5e-3) and told["line"] == len(along(0.0).splitlines()) - 4
 
 
 def test_a_floor_keeps_the_scallop_of_the_lens_at_its_closed_form(wall):
@@ -143,4 +144,4 @@ def test_a_floor_keeps_the_scallop_of_the_lens_at_its_closed_form(wall):
     report = wall("lens")("\n".join([*lines, "M5", "M30", "%"]) + "\n")
     assert left > 0.05 and "gouge" not in report["finding_counts"]
     told = found(report, "stock_left")
-    assert told["depth"] > 0.9 * left
+    assert left - 0.02 < told["depth"] < left + 1e-3  # no sample lies just on the crest

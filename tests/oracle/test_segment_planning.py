@@ -14,8 +14,11 @@ from tests.plan_checks import dense
 from toolpath.kernels.engaged import SECTORS, sectors
 from toolpath.kernels.stock import HALF_DIAGONAL, stamp
 from toolpath.passes.contours import contour_pieces
+from toolpath.planning.zone_finishing import no_flank
 from toolpath.stock.residual_map import UNTOUCHED, ResidualMap
+from toolpath.strategies import curvature_matched, isoparametric
 from zones.kernels.lattice import LatticeFrame
+from zones.reach.access_reach import able
 from zones.reach.assembly import Clearances
 from zones.reach.tip_field import TipField, contact_tips
 
@@ -145,3 +148,18 @@ def test_a_field_keeps_its_allowance():
         # beside the box the end rests on its rim
         assert field.tips(np.array([[-0.5, 15.0]]))[0] == pytest.approx(
             0.2 - tool.arcs.grown(0.2).height(0.5), abs=1e-9)
+
+
+def test_a_rim_cuts_no_slope():
+    """A sharp lens and a taper barrel finish what their arcs touch, and upright walls."""
+    lean = np.radians([0.0, 10.0, 30.0, 74.0, 76.0, 89.9])
+    normals = np.column_stack([np.sin(lean), 0.0 * lean, np.cos(lean)])
+    assert able(MILLS["lens"], normals, 0.02).all() and able(MILLS["oval"], normals, 0.02).all()
+    assert able(MILLS["sharp lens"], normals, 0.02).tolist() == [True, True, False, False, False, True]
+    assert able(MILLS["taper barrel"], normals, 0.02).tolist() == [True, True, True, True, False, True]
+
+
+def test_strategies_that_count_on_a_round_corner_leave_them_out():
+    for tool in MILLS.values():
+        assert not isoparametric.suits(tool) and not curvature_matched.suits(tool)
+        assert no_flank(tool) == "a circle segment mill is planned upright only"

@@ -206,7 +206,7 @@ class Finish:
         found: list[tuple[str, Runs]] = []
         if self.zone.form is AreaForm.STEEP:
             found.append((flank.NAME, flank.flanked(alone, *given, self._surroundings(), self.field.allowance)
-                          if not (why := _no_flank(self.field.tool)) else Runs((), (why,))))
+                          if not (why := no_flank(self.field.tool)) else Runs((), (why,))))
         arcs = self.field.tool.arcs is not None
         if self.zone.form is not AreaForm.LEVEL and arcs:
             found.append((curvature_matched.NAME, Runs((), (UPRIGHT_ONLY,))))
@@ -392,7 +392,7 @@ class Finish:
 UPRIGHT_ONLY = "a circle segment mill is planned upright only"
 
 
-def _no_flank(tool: ToolBody) -> str:
+def no_flank(tool: ToolBody) -> str:
     """Why the flank of a tool does not fit walls; empty where it is a cylinder."""
     if tool.arcs is not None:
         return UPRIGHT_ONLY

@@ -187,7 +187,8 @@ def path_places(moves: Moves, count: NDArray[np.int64]) -> tuple[F64, F64, NDArr
 
 
 def _inner_ball(tool: ToolBody) -> float:
-    """Radius of a ball on the tip that the end holds, mm; 0 for a sharp one."""
+    """Radius of a ball on the tip that the end holds, mm; 0 for a sharp one. Circle segment mills are wider than
+    ``FINE``."""
     return tool.corner_radius if tool.arcs is None else min(tool.arcs.low, tool.radius)
 
 

@@ -35,13 +35,17 @@ def able(tool: ToolBody, normals: F64, scallop: float) -> NDArray[np.bool_]:
 
     normals : (n, 3) float64, dimensionless, access frame
 
-    A tool with a corner radius, or an arc at its tip, cuts everything. A sharp-cornered flat end cuts level planes, and
-    walls so upright that steps of at least 0.1 mm keep the scallop.
+    A tool with a corner radius cuts everything. A sharp-cornered flat end cuts level planes, and walls so upright that
+    steps of at least 0.1 mm keep the scallop. Where the rim of a circle segment mill would touch, it is as sharp.
     """
-    if tool.corner_radius > 0 or tool.arcs is not None:
-        return np.ones(len(normals), np.bool_)
     nz = normals[:, 2]
-    return np.asarray((nz > LEVEL) | (np.abs(nz) <= 0.5 * scallop / 0.1))
+    upright = np.abs(nz) <= 0.5 * scallop / 0.1
+    if tool.arcs is not None:
+        steepest = tool.arcs.end_sine if tool.arcs.bow > 0.0 else tool.arcs.join_sine
+        return np.asarray((np.sqrt(np.maximum(1.0 - nz * nz, 0.0)) <= steepest + 1e-9) | upright)
+    if tool.corner_radius > 0:
+        return np.ones(len(normals), np.bool_)
+    return np.asarray((nz > LEVEL) | upright)
 
 
 def preference(tool: ToolBody, form: AreaForm) -> tuple[float, float, float, float]:

@@ -47,6 +47,7 @@ def test_flutes_are_at_least_as_long_as_the_arcs_by_default():
 
 
 @pytest.mark.parametrize(("fields", "words"), [
+    ({**LENS, "diameter_mm": 1, "corner_radius_mm": 0.1}, ("diameter_mm 1 of a lens must be at least 1.5",)),
     ({**LENS, "profile_radius_mm": None}, ("a lens needs profile_radius_mm",)),
     ({**LENS, "profile_radius_mm": 5}, ("profile_radius_mm 5 of a lens", "half the diameter, 5", "kind ball")),
     ({**LENS, "corner_radius_mm": 5}, ("corner_radius_mm 5 of a lens", "less than half the diameter, 5", "kind ball")),
