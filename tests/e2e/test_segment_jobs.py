@@ -46,10 +46,11 @@ def test_all_are_proved(jobs):
 
 
 def test_passes_lie_apart_by_the_radius_at_the_contact(jobs):
-    """On a plane s = sqrt(8 h r): the slope takes the lens sqrt(12 / 2) times fewer passes than the ball."""
-    slope = {name: [z for z in r["zones"] if z["form"] == "shallow" and z["tool"] == "T2"] for name, r in jobs.items()}
-    ball, flat = (sum(z["passes"] for z in slope[name]) for name in ("ball", "lens"))
-    assert ball / flat == pytest.approx(math.sqrt(12.0 / 2.0), rel=0.2)
+    """On a plane s = sqrt(8 h r): on the slope the passes of the lens lie sqrt(12 / 2) times as far apart."""
+    step = {name: max(z["side_step_mm"] for z in r["zones"] if z["form"] == "shallow" and z["tool"] == "T2")
+            for name, r in jobs.items()}
+    assert step["lens"] / step["ball"] == pytest.approx(math.sqrt(12.0 / 2.0), rel=0.03)
+    assert step["lens"] == pytest.approx(2.0 * math.sqrt(2.0 * 12.0 * 0.008 - 0.008**2), rel=0.03)
 
 
 def test_a_barrel_takes_a_leaning_wall_in_fewer_levels(jobs):
