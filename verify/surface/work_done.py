@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 
 from geometry.mesh import F64, I32
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
+from geometry.mesh_queries.nearest import nearest
 from geometry.sampling import SurfaceSamples
 from geometry.tool_body import ToolBody
 from verify.findings import Source
@@ -46,6 +47,7 @@ MAX_WAY = 12.0  # mm, longest such way
 LIFT_SHARE = 0.1  # of h: distance at which a tool on an open face touches a sample
 CORNER_SHARE = 0.5  # of h: the same in a corner
 UPRIGHT = float(np.sin(np.radians(3.0)))  # share of the axis in the normal up to which a face counts as a wall
+SHARED = 0.02  # of the allowance: where its end is nearer to another face by more, that face has it too
 STEPS_WITHIN = 0.5  # mm: stock is even to the scallop height within this where steps are fine
 LEAST_NEAR = 4  # samples that must lie there
 MAX_AXES = 24
@@ -198,7 +200,7 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     far = np.flatnonzero(along >= measured.reach * (1.0 - 1e-9))
     along[far], mover[far] = cutting.way_through_stock(few.points[far], few.normals[far], cutting.farthest, OFF_FACETS)
     height = along - cutting.setup.stock_allowance
-    high = np.flatnonzero(height > limits.face)
+    high = np.flatnonzero((height > limits.face) & ~_shared(few, cutting, limits.error))
     left, why = np.zeros(len(tried), np.bool_), np.full(len(tried), LEFT, dtype=object)
     by, face = np.concatenate([measured.mover, mover]), np.concatenate([measured.samples.face, few.face])
     cutter = np.where(by >= 0, cutting.moves.tool[by], -1)
@@ -234,6 +236,19 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     height[rows], mover[rows], direction[rows] = (a[deep.found] for a in (deep.length, deep.mover, deep.direction))
     direction -= np.einsum("ij,ij->i", direction, few.normals)[:, None] * few.normals
     return StandingStock(np.where(np.isfinite(height), height, MAX_WAY), mover, direction), left, why
+
+
+def _shared(few: SurfaceSamples, cutting: Cutting, error: float) -> BOOL:
+    """Samples in a corner over which the allowances of two faces meet, (n,) bool; error : mm, of a residual.
+
+    The end of the allowance over such a place is nearer to the other face than the allowance is thick. What stands
+    there belongs to that face, too, and its places beside the corner tell how high it is.
+    """
+    allowance = cutting.setup.stock_allowance
+    if allowance <= 0.0 or not len(few):
+        return np.zeros(len(few), np.bool_)
+    ends = few.points + allowance * few.normals
+    return np.asarray(nearest(cutting.tree, ends)[0] < allowance - max(SHARED * allowance, 2.0 * error))
 
 
 def _in_fine_steps(few: SurfaceSamples, height: F64, rows: INT, limits: _Limits) -> BOOL:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
-from geometry.sampling import sample_surface
+from geometry.sampling import SurfaceSamples, sample_surface
+from tests.hand_parts import terraces
 from tests.pocket_case import DEPTH, SETUP, TOOL, block, program, text
 from verify.model import Asked, FindingKind, NcProgram, ScoredSamples
 from verify.moves import Moves
@@ -191,3 +192,16 @@ def test_faces_that_only_unread_lines_cut_are_asked():
     assert set(proof.work.faces) == {TOP, *WALLS, FLOOR}
     assert proof.counts.keys() == {"stock_left"} and {f.face for f in of(proof)} >= {f"F{FLOOR}"}
     assert run(stray, faces={TOP}, whole=whole).work.faces == (TOP,), "faces that are named are the faces"
+
+
+@pytest.mark.parametrize("allowance", [0.1, 0.5])
+def test_samples_in_a_corner_that_two_allowances_share_do_not_count(allowance):
+    step = TriangleTree(terraces([0, 8, 16], [0, 12], [[3.0, 6.0]], 0.0))  # floor at 3 up to the wall x = 8
+    x = 8.0 - allowance * np.array([0.5, 0.97, 0.999, 1.5])
+    points = np.column_stack([x, np.full(4, 6.0), np.full(4, 3.0)])
+    few = SurfaceSamples(points, np.tile([0.0, 0.0, 1.0], (4, 1)), np.ones(4), np.ones(4, np.int32),
+                         np.zeros(4, np.int32))
+    for given, shared in ((allowance, [True, True, False, False]), (0.0, [False] * 4)):
+        cutting = Cutting(step, replace(SETUP, stock_allowance=given), Moves(*np.zeros((2, 0, 3)), np.zeros(0, bool),
+                                                                             np.zeros(0, np.int32)), [])
+        assert work_done._shared(few, cutting, 1e-4).tolist() == shared
