@@ -3,7 +3,7 @@
 A fixture is a box. A cutting part, neck, shank or holder is taken as the convex hull of its outline turned about the
 axis, and a piece of a move as the convex hull of the body at both its ends. Two convex bodies A and B are apart where a
 direction n has h_A(n) + h_B(-n) < 0, with h the support function of each; otherwise the least of that sum over all n is
-the way by which one would have to move to be free of the other: the depth of the contact [vandenBergen2001].
+the way by which one would have to move to be free of the other: the depth of the contact [Bergen2001].
 
 Points are float64, mm, in the setup frame.
 """
