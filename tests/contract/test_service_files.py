@@ -136,7 +136,7 @@ def test_what_the_service_can_do(make_client, bearer):
     told = client.get("/v1/capabilities", headers=ada).json()
     assert [d["name"] for d in told["dialects"]] == ["linuxcnc", "fanuc", "haas", "siemens", "heidenhain"]
     assert told["dialects"][3]["extension"] == "mpf" and told["kinds"] == ["plan", "zones", "verify"]
-    assert told["tools"] == ["ball", "flat", "bull", "tapered_ball", "tapered_bull", "tapered_flat"]
+    assert told["tools"] == ["ball", "flat", "bull", "tapered_ball", "tapered_bull", "tapered_flat", "lens", "barrel"]
     assert told["machines"] == ["3-axis", "5-axis"]
     assert "table-table-AC" in told["kinematics"] and "Ti-6Al-4V" in told["materials"] and "step" in told["stock"]
     assert told["principal"] == "ada" and told["scopes"] == ["submit"] and told["webhooks"] is False
