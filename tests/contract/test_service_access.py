@@ -18,13 +18,13 @@ def test_a_setup_refers_to_the_library_and_keeps_what_it_found(client, post, fin
     assert client.put("/v1/machines/mill", json={"max_rpm": 12000}).status_code == 201
     steel = {"name": "1.2379", "cutting_speed_m_min": 70,
              "feed_per_tooth": [{"diameter_mm": 4, "feed_per_tooth_mm": 0.01}]}
-    assert client.put("/v1/materials/d2", json=steel).status_code == 201
-    setup = {"tools": ["lib:finisher"], "machine": "lib:mill", "material": "lib:d2"}
+    assert client.put("/v1/materials/house-steel", json=steel).status_code == 201
+    setup = {"tools": ["lib:finisher"], "machine": "lib:mill", "material": "lib:house-steel"}
     job = finish(client, post(client, setup=setup).json())
     assert client.get(job["links"]["report"]).json()["tools"] == [{"id": "T7"}]
     client.put("/v1/tools/finisher", json={**TOOL, "diameter_mm": 5})
     assert post(client, setup=setup).json()["setup_sha256"] != job["setup_sha256"]
-    for path in ("/v1/tools/finisher", "/v1/machines/mill", "/v1/materials/d2"):
+    for path in ("/v1/tools/finisher", "/v1/machines/mill", "/v1/materials/house-steel"):
         assert client.delete(path).status_code == 204
         assert client.delete(path).json()["code"] == client.get(path).json()["code"] == "no_such_entry"
     assert post(client, setup=setup).json()["code"] == "bad_setup"

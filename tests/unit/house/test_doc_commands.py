@@ -253,6 +253,7 @@ def given(checkouts: Path) -> Path:
     # The service takes the form of a job with a blank. This one is too small: the job ends once both are read.
     shutil.copy(folder / "small.step", folder / "casting.step")
     blank = {"kind": "step", "step_file": "casting.step"}
+    (folder / "tools.csv").write_text("id,kind,diameter_mm,flute_length_mm\nT1,ball,3,9\n")
     (folder / "casting.setup.json").write_text(json.dumps({**json.loads(setup.read_text()), "stock": blank}))
     return folder
 
@@ -353,7 +354,7 @@ def test_pages_do_what_they_say_with_real_jobs(page: Path, checkouts: Path, give
 
 
 STANDS_FOR = {"PART": "part.step", "SETUP.json": "setup.json", "DIR": "out/part", "NAME": "mes", "ID": "KEY",
-              "zonemill.db": "data/zonemill.db", "COPY": "copy.db"}
+              "zonemill.db": "data/zonemill.db", "COPY": "copy.db", "FILE": "tools.csv"}
 """What a reader puts in the place of the words of running text; KEY is the id of a key."""
 
 
