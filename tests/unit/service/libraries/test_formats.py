@@ -110,10 +110,14 @@ class TestFusion:
         assert entry.tool.diameter_mm == 152.4 and entry.tool.cutting_data[0].feed_mm_min == 254
         assert "the library states H 14 for T 4; programs use 4 for both" in entry.notes
 
-    @pytest.mark.parametrize("kind", ["lollipop mill", "circle segment barrel", "dovetail mill", "slot mill", "probe",
-                                      "tap left hand", "reamer", "holder"])
+    @pytest.mark.parametrize("kind", ["lollipop mill", "dovetail mill", "slot mill", "probe", "tap left hand", "reamer",
+                                      "holder"])
     def test_other_kinds_are_left_out_by_name(self, kind):
         assert only(read(fusion(type=kind))).reason == f"kind '{kind}' is not available"
+
+    def test_a_barrel_of_fusion_is_left_out_for_its_upper_radius(self):
+        reason = only(read(fusion(type="circle segment barrel"))).reason
+        assert reason == "kind 'circle segment barrel' has an upper radius, which is not available"
 
     def test_a_profile_of_the_shaft_becomes_a_shank_of_its_widest_diameter(self):
         shaft = {"segments": [{"height": 5, "lower-diameter": 4, "upper-diameter": 8}]}
