@@ -31,7 +31,7 @@ def cone(flutes):
 def test_flutes_that_end_at_the_cone_reach_to_it():
     tool = cone(4.0)
     assert tool.cone_height > 4.0
-    assert cutter_table([tool])[0].tolist() == [4.0, 4.0, tool.cone_height, tool.cone_height, 0.0, 0.0]
+    assert cutter_table([tool])[0].tolist() == [4.0, 4.0, tool.cone_height, tool.cone_height, *[0.0] * 5]
     with pytest.raises(SetupError) as short:
         cutter_table([cone(3.99)])
     assert short.value.code == "flute_too_short" and short.value.subjects == ("T4",) and short.value.measured == 3.99
