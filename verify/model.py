@@ -207,12 +207,14 @@ class Touch(Protocol):
         """
         ...
 
-    def on_ways(self, samples: SurfaceSamples, tools: Sequence[ToolBody], axes: F64, lift: float) -> NDArray[np.bool_]:
+    def on_ways(self, samples: SurfaceSamples, tools: Sequence[ToolBody], axes: F64, lift: float,
+                stepped: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Samples that a mill touches where its own feed moves take it, as low as part and fixtures let it go.
 
         samples : SurfaceSamples, frame of the proof
         axes    : (k, 3) float64, unit, tip to spindle, frame of the proof
         lift    : mm, distance from the sample within which a touch counts, over the allowance
+        stepped : (n,) bool, whether the sharp edge of a flat end counts on a slope, which it finishes in steps alone
 
         Returns (n,) bool.
         """

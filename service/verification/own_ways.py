@@ -59,33 +59,31 @@ def mill_ways(program: Program, tools: Sequence[ToolBody]) -> dict[int, MillWays
     return out
 
 
-def touched_on_ways(tree: TriangleTree, points: F64, tool: ToolBody, ways: MillWays, axes: F64, clear: Clearances,
+def touched_on_ways(tree: TriangleTree, points: F64, tool: ToolBody, ways: MillWays, axis: F64, clear: Clearances,
                     lift: float, grow: float) -> BOOL:
     """Places that a mill touches where its own feed moves take it, as low as the tree lets it go.
 
     points : (n, 3) float64, mm, frame of the tree
-    axes   : (k, 3) float64, unit, frame of the tree, tip to spindle
+    axis   : (3,) float64, unit, frame of the tree, tip to spindle; ways along others do not count
     lift   : mm, distance within which a touch counts, and by which the mill may enter walls, at most a quarter of its
              radius: facets of a slot of its own width stand in, and its ways are rounded
     grow   : mm, allowance that stays on the part
 
     Returns (n,) bool.
     """
-    out = np.zeros(len(points), np.bool_)
-    for axis in axes:
-        rows, mine = np.flatnonzero(~out), np.flatnonzero(ways.axis @ axis >= SAME_AXIS)
-        if not len(rows) or not len(mine):
-            continue
-        frame = axis_frames(axis[None])[0]
-        turn = np.eye(4)
-        turn[:3, :3] = frame
-        there = tree if np.array_equal(frame, np.eye(3)) else TriangleTree(tree.mesh.transformed(turn))
-        at, a, b = points[rows] @ frame.T, (ways.start[mine] @ frame.T)[:, :2], (ways.end[mine] @ frame.T)[:, :2]
-        xy, row = _near_places(at[:, :2], a, b, tool.radius)
-        narrow = _narrower(tool, clear, min(lift, 0.25 * tool.radius))
-        tips = drop_turned(there, xy, narrow) + grow
-        near = _distance(tool, np.linalg.norm(at[row, :2] - xy, axis=1), at[row, 2] - tips) <= lift + grow
-        out[rows[row[near & np.isfinite(tips)]]] = True
+    out, mine = np.zeros(len(points), np.bool_), np.flatnonzero(ways.axis @ axis >= SAME_AXIS)
+    if not len(points) or not len(mine):
+        return out
+    frame = axis_frames(axis[None])[0]
+    turn = np.eye(4)
+    turn[:3, :3] = frame
+    there = tree if np.array_equal(frame, np.eye(3)) else TriangleTree(tree.mesh.transformed(turn))
+    at, a, b = points @ frame.T, (ways.start[mine] @ frame.T)[:, :2], (ways.end[mine] @ frame.T)[:, :2]
+    xy, row = _near_places(at[:, :2], a, b, tool.radius)
+    narrow = _narrower(tool, clear, min(lift, 0.25 * tool.radius))
+    tips = drop_turned(there, xy, narrow) + grow
+    near = _distance(tool, np.linalg.norm(at[row, :2] - xy, axis=1), at[row, 2] - tips) <= lift + grow
+    out[row[near & np.isfinite(tips)]] = True
     return out
 
 

@@ -29,6 +29,8 @@ from zones.reach.index_orientations import AxisCoverage
 from zones.remainder.obstructions import SKIN
 from zones.remainder.reasons import Reason
 
+UPRIGHT = float(np.sin(np.radians(3.0)))  # share of the axis in the normal up to which a face is a wall
+LEVEL = float(np.cos(np.radians(3.0)))  # share from which it is a floor; slopes lie between
 MAX_REASONED = 3000  # samples whose reason is looked for one by one; the others share that of the nearest in order
 BOOL = NDArray[np.bool_]
 
@@ -96,19 +98,25 @@ class ToolTouch:
                                  self.inputs.quality.stock_allowance_mm).any(axis=1)
         return out
 
-    def on_ways(self, samples: SurfaceSamples, tools: Sequence[ToolBody], axes: F64, lift: float) -> BOOL:
+    def on_ways(self, samples: SurfaceSamples, tools: Sequence[ToolBody], axes: F64, lift: float,
+                stepped: BOOL) -> BOOL:
         """Samples that a mill touches where its own feed moves take it, as low as part and fixtures let it go.
 
         samples : SurfaceSamples, frame of the proof
         axes    : (k, 3) float64, unit, tip to spindle, frame of the proof
         lift    : mm, distance from the sample within which a touch counts, over the allowance
+        stepped : (n,) bool, whether the sharp edge of a flat end counts on a slope, which it finishes in steps alone
 
         Returns (n,) bool.
         """
         out = np.zeros(len(samples), np.bool_)
-        for tool in (t for t in tools if t.number in self.ways):
-            rows = np.flatnonzero(~out)
-            out[rows] = touched_on_ways(self.obstacles, samples.points[rows], tool, self.ways[tool.number], axes,
+        for tool, axis in ((t, a) for t in tools if t.number in self.ways for a in axes):
+            may = ~out
+            if tool.tip_curvature <= 0.0:
+                up = np.abs(samples.normals @ axis)
+                may &= stepped | (up <= UPRIGHT) | (up >= LEVEL)
+            rows = np.flatnonzero(may)
+            out[rows] = touched_on_ways(self.obstacles, samples.points[rows], tool, self.ways[tool.number], axis,
                                         self.inputs.clearances, lift, self.inputs.quality.stock_allowance_mm)
         return out
 

@@ -213,9 +213,9 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     tight = high[~left[high]]
     touched = tight[reached(tight, limits.near, 0.0)]
     beyond = np.setdiff1d(tight, touched)
-    touched = np.union1d(touched, beyond[asked.touch.on_ways(few.subset(beyond), tools, axes, limits.near)])
-    beyond = np.setdiff1d(tight, touched)
-    stepped = beyond[(mover[beyond] >= 0) & _in_fine_steps(few, height, beyond, limits)]
+    fine = (mover[beyond] >= 0) & _in_fine_steps(few, height, beyond, limits)
+    touched = np.union1d(touched, beyond[asked.touch.on_ways(few.subset(beyond), tools, axes, limits.near, fine)])
+    stepped = np.setdiff1d(beyond[fine], touched)
     touched = np.union1d(touched, stepped[asked.touch.edges(few.subset(stepped), tools, axes, limits.near)])
     beyond = np.setdiff1d(beyond, touched)
     why[beyond] = asked.touch.reasons(few.subset(beyond), tools, axes)

@@ -11,7 +11,7 @@ from tests.hand_parts import prism, terraces, tool
 from zones.reach.assembly import Clearances
 
 CLEAR = Clearances(0.0, 0.0, 0.0, 0.0)
-UP = np.array([[0.0, 0.0, 1.0]])
+UP = np.array([0.0, 0.0, 1.0])
 SLOT = TriangleTree(terraces([0, 6, 10, 16], [0, 12], [[6.0, 3.0, 6.0]], 0.0))  # 4 wide, floor at 3, along Y
 
 

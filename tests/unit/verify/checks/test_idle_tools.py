@@ -26,7 +26,7 @@ class Nothing:
     def edges(self, samples, tools, axes, lift):
         return np.zeros(len(samples), dtype=bool)
 
-    def on_ways(self, samples, tools, axes, lift):
+    def on_ways(self, samples, tools, axes, lift, stepped):
         return np.zeros(len(samples), dtype=bool)
 
     def reasons(self, samples, tools, axes):
