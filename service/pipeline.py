@@ -187,7 +187,7 @@ def verify_program(part_path: Path, setup: Setup, program_text: str, progress: P
 
     The program is read before the part. The part is not decomposed: no zone answers for a sample here. Stock that is
     left is a finding where the tools of the program can touch the part, on the faces that the setup names or that the
-    program works on (``verify.surface.work_done``).
+    program works on (``verify.work.work_done``).
 
     access       : in whose frame the program is read; None: the first access, or the setup frame on a machine with
                    rotary axes

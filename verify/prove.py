@@ -71,15 +71,15 @@ from verify.program.arc_chords import CHORD
 from verify.program.move_times import minutes_of, spent
 from verify.program.program import Program
 from verify.progress import Report, StageProgress
-from verify.surface.asked_faces import Cutting, Measured
 from verify.surface.between_samples import settled_samples
 from verify.surface.cutter_ends import rapid_presses
 from verify.surface.sample_scores import RAY_ERROR, face_proofs, proved_samples, zone_proofs
 from verify.surface.surface_cuts import SurfaceCuts, reach_of, surface_cuts
-from verify.surface.unread_work import unread_work
 from verify.surface.wall_support import supported
 from verify.surface.ways_in import deep_findings, slot_findings
-from verify.surface.work_done import work_done
+from verify.work.asked_faces import Cutting, Measured
+from verify.work.unread_work import unread_work
+from verify.work.work_done import work_done
 
 # shares of the work done: read, places between samples settled, residuals, support, contacts known
 READ, SETTLED, CUT, HELD, MET = 0.12, 0.15, 0.48, 0.52, 0.97

@@ -73,7 +73,7 @@ def planned(seed: int, dogleg: bool) -> dict[str, Any]:
 def run(seed: int, dogleg: bool) -> dict[str, Any]:
     """One plan in a process of its own."""
     one = f"{seed}:{'dogleg' if dogleg else 'straight'}"
-    done = subprocess.run([sys.executable, __file__, "--one", one], capture_output=True, text=True)
+    done = subprocess.run([sys.executable, __file__, f"--one={one}"], capture_output=True, text=True)
     lines = done.stdout.splitlines()
     row = json.loads(lines[-1]) if done.returncode == 0 and lines else {
         "state": "error", "message": done.stderr[-400:], "time": math.nan, "coverage": math.nan}

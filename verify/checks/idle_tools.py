@@ -19,9 +19,9 @@ from verify.findings import Source
 from verify.material.stock_pass import along_axis
 from verify.model import Asked, Finding, FindingKind
 from verify.moves import Moves
-from verify.surface.asked_faces import OFF_FACETS, Cutting, thinned
 from verify.surface.guard_points import convex_edges
 from verify.surface.removal import residual_on_normals
+from verify.work.asked_faces import OFF_FACETS, Cutting, thinned
 
 MAX_RAYS = 100_000  # samples that a tool is looked for at; and as many places on edges, and of its tip
 SAME_AXIS = 1e-4  # of the coordinates of a unit vector: closer axes are one

@@ -24,8 +24,8 @@ from verify.blank.blank import stock_on_normals
 from verify.findings import Source, excluded_findings
 from verify.model import Finding, ProofSetup
 from verify.moves import Moves
-from verify.surface.asked_faces import OFF_FACETS
 from verify.surface.sample_scores import RAY_ERROR
+from verify.work.asked_faces import OFF_FACETS
 
 SLACK = 0.2  # of the tool radius, by which a pass may run over the border of its face
 INT = NDArray[np.int64]

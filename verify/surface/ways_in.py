@@ -16,8 +16,8 @@ from geometry.mesh_queries.rays import first_hits
 from geometry.sampling import SurfaceSamples
 from verify.findings import Source
 from verify.model import Finding, FindingKind
-from verify.surface.asked_faces import ASIDE, ASIDE_ROOM, Cutting, distance_aside, thinned
 from verify.surface.removal import residual_on_normals
+from verify.work.asked_faces import ASIDE, ASIDE_ROOM, Cutting, distance_aside, thinned
 
 INSET = 1e-3  # mm below the surface, where ways begin
 MAX_OF_FACE, MAX_ALL = 150, 1500  # samples whose ways are looked for

@@ -12,9 +12,9 @@ from tests.pocket_case import SETUP, TOOL, block
 from verify.findings import Source
 from verify.model import Finding, FindingKind
 from verify.moves import Moves
-from verify.surface.asked_faces import Cutting
 from verify.surface.removal import residual_on_normals
 from verify.surface.ways_in import deep_findings, slot_findings
+from verify.work.asked_faces import Cutting
 
 TOP = 2
 

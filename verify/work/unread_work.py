@@ -13,8 +13,8 @@ import numpy as np
 from geometry.tool_body import ToolBody
 from verify.checks.program_sequence import FramedProgram, counted, moves_of
 from verify.program.program import Program
-from verify.surface.asked_faces import Cutting, Measured, worked_faces
 from verify.surface.removal import residual_on_normals
+from verify.work.asked_faces import Cutting, Measured, worked_faces
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import pytest
 from geometry.sampling import SurfaceSamples
 from tests.pocket_case import SETUP
 from verify.findings import Source
-from verify.surface.stock_places import StandingStock, stock_findings
+from verify.work.stock_places import StandingStock, stock_findings
 
 SOURCE = Source(("p.ngc",), np.zeros(1, np.int32), np.ones(1, np.int32), np.ones(1, np.int32))
 

@@ -24,7 +24,8 @@ from geometry.tool_body import ToolBody
 from verify.findings import Source
 from verify.model import Asked, Finding, FindingKind, ProofSetup, WorkDone
 from verify.moves import Moves
-from verify.surface.asked_faces import (
+from verify.surface.sample_scores import proved_samples
+from verify.work.asked_faces import (
     ASIDE,
     ASIDE_ROOM,
     OFF_FACETS,
@@ -35,10 +36,11 @@ from verify.surface.asked_faces import (
     thinned,
     worked_faces,
 )
-from verify.surface.sample_scores import proved_samples
-from verify.surface.stock_places import StandingStock, stock_findings
-from verify.surface.unread_work import UnreadWork
-from verify.surface.ways_out import ROUNDING, WaysOut, ways_out
+from verify.work.own_poses import poses_at
+from verify.work.standing_room import fixture_sides, stands_free
+from verify.work.stock_places import StandingStock, stock_findings
+from verify.work.unread_work import UnreadWork
+from verify.work.ways_out import ROUNDING, WaysOut, ways_out
 
 MAX_TRIED = 12_000  # samples with stock that tools are tried on; the others share the answer of their neighbour
 LEAST_TRIED = 50  # of them on each face
@@ -52,7 +54,8 @@ STEPS_WITHIN = 0.5  # mm: stock is even to the scallop height within this where 
 LEAST_NEAR = 4  # samples that must lie there
 MAX_AXES = 24
 SAME_AXIS = float(np.radians(0.01))
-NOT_IN_PROGRAM, LEFT = "not_in_program", "pass"  # words of the remainder
+NOT_IN_PROGRAM, LEFT, UNDERCUT = "not_in_program", "pass", "undercut"  # words of the remainder
+MAX_BELOW = 60  # samples of a face below an overhang that poses are tried on
 BOOL = NDArray[np.bool_]
 INT = NDArray[np.int64]
 
@@ -219,6 +222,9 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     touched = np.union1d(touched, stepped[asked.touch.edges(few.subset(stepped), tools, axes, limits.near)])
     beyond = np.setdiff1d(beyond, touched)
     why[beyond] = asked.touch.reasons(few.subset(beyond), tools, axes)
+    below = beyond[(why[beyond] == UNDERCUT) & (height[beyond] > limits.corner)]
+    moved_on = _left_below(few.subset(below), along[below], mover[below], axes, limits, cutting)
+    touched = np.union1d(touched, below[moved_on])
     deep = _missing_depths(few, touched, mover, axes, limits.lift, cutting)
     corner = np.zeros(len(tried), np.bool_)
     corner[touched[np.where(deep.found, deep.length, height[touched]) > limits.corner]] = True
@@ -236,6 +242,33 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     height[rows], mover[rows], direction[rows] = (a[deep.found] for a in (deep.length, deep.mover, deep.direction))
     direction -= np.einsum("ij,ij->i", direction, few.normals)[:, None] * few.normals
     return StandingStock(np.where(np.isfinite(height), height, MAX_WAY), mover, direction), left, why
+
+
+def _left_below(few: SurfaceSamples, along: F64, mover: I32, axes: F64, limits: _Limits, cutting: Cutting) -> BOOL:
+    """Samples below an overhang that a tool of the program touches, moved on from where it left them, (n,) bool.
+
+    along : (n,) float64, mm of stock on their normals; mover : (n,) int32, index, the move that left it
+
+    Each is tried along its normal and along its shortest way out. Of more than ``MAX_BELOW`` on a face an even share is
+    tried; each other one shares the answer of the nearest, unless more stands on it.
+    """
+    out = np.zeros(len(few), np.bool_)
+    sides = np.concatenate([cutting.tree.mesh.triangles, fixture_sides(cutting.setup)])
+    for face in np.unique(few.face):
+        rows = np.flatnonzero(few.face == face)
+        tried = thinned(rows, MAX_BELOW)
+        near, answer = few.subset(tried), np.zeros(len(tried), np.bool_)
+        ways = ways_out(near.points, near.normals, axes, limits.lift, MAX_WAY, cutting)
+        for way, left, by in ((near.normals, along[tried], mover[tried]), (ways.direction, ways.length, ways.mover)):
+            poses = poses_at(near.points, way, left, by, cutting.moves, cutting.tools, cutting.setup.stock_allowance)
+            for k in np.unique(poses.tool):
+                mine = np.flatnonzero((poses.tool == k) & ~answer[poses.row])
+                free = stands_free(sides, cutting.tools[k], cutting.setup, poses.tips[mine], poses.axes[mine],
+                                   poses.shift[mine], limits.near)
+                answer[poses.row[mine[free]]] = True
+        of = cKDTree(near.points).query(few.points[rows])[1]
+        out[rows] = answer[of] & (along[rows] <= along[tried[of]] + limits.h)
+    return out
 
 
 def _shared(few: SurfaceSamples, cutting: Cutting, error: float) -> BOOL:

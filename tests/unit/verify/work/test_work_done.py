@@ -14,10 +14,10 @@ from verify.moves import Moves
 from verify.program_reading import read_one
 from verify.prove import prove
 from verify.surface import work_done
-from verify.surface.asked_faces import Cutting, thinned
-from verify.surface.ways_out import ways_out
-from verify.surface.work_done import cutting_axes
 from verify.tool_axes import ToolAxes
+from verify.work.asked_faces import Cutting, thinned
+from verify.work.ways_out import ways_out
+from verify.work.work_done import cutting_axes
 
 FLOOR, TOP, WALLS = 11, 6, (7, 8, 9, 10)
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.mesh import F64, I32
-from verify.surface.asked_faces import Cutting
 from verify.tool_axes import square_to
+from verify.work.asked_faces import Cutting
 
 AROUND = 8  # directions round the normal, at each slope
 SLOPES = (0.0, math.radians(45.0))  # over the tangent plane

@@ -1,0 +1,155 @@
+"""Poses of a program's own tools, moved on to places that it left below an overhang.
+
+No axis looks at such a place, so what tools can touch there is not known from the part alone: a slot cutter with a
+thin neck comes in from the side. The program shows the way. The move that left the stock carried its tool past the
+place; moved on by the height of the stock, the same point of the tool touches the part. Where the whole tool stands
+free there, and on its way there, the place could have been cut.
+
+Coordinates are float64, mm, in the frame of the proof.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64, I32
+from geometry.tool_body import ToolBody
+from verify.moves import Moves
+
+CHORDS = 32  # of a round corner
+PLACES = 64  # parts of a move in which the place of the tool is looked for, and again of two of them
+ON_TOOL = 0.02  # mm: a point farther from the cutting part was left by another move
+SIDE = 0.1  # share of the axis in the normal of a side
+MAX_LEAN = math.radians(10.0)  # by which the axis may turn towards the face
+INT = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """Poses of tools, k of them.
+
+    row   : (k,) int64, index, place that the pose touches
+    tool  : (k,) int64, index, place in the sequence of tools
+    tips  : (k, 3) float64, mm; axes : (k, 3) float64, unit, tip to spindle
+    shift : (k, 3) float64, mm, from where the program had the tool
+    """
+
+    row: INT
+    tool: INT
+    tips: F64
+    axes: F64
+    shift: F64
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+
+def poses_at(points: F64, ways: F64, left: F64, mover: I32, moves: Moves, tools: Sequence[ToolBody],
+             allowance: float) -> Poses:
+    """The tool of a move, carried on to the places where the move left stock.
+
+    points : (n, 3) float64, mm, on the part
+    ways   : (n, 3) float64, unit, from the places to where the move has cut
+    left   : (n,) float64, mm of stock on them; places where it is inf, or longer than the tool is wide, have no pose
+    mover  : (n,) int32, index, the move; -1 for none
+    allowance : mm that may stay
+
+    Returns Poses. Where axes turn in the program, a place has a second one, with the tool turned about the point that
+    touches until its side lies against the way, by 10 degrees at most: a side that leans too little has left a wedge.
+    It has a third one a little farther up, since the end swings.
+    """
+    out = []
+    for row in np.flatnonzero((mover >= 0) & np.isfinite(left)).tolist():
+        tool = tools[int(moves.tool[mover[row]])]
+        if tool.named or left[row] > 2.0 * tool.widest_radius:
+            continue
+        way, on = ways[row], max(float(left[row]) - allowance, 0.0)
+        tip, axis, side = _at(points[row] + left[row] * way, int(mover[row]), moves, tool)
+        if side is None:
+            continue
+        out.append((row, tip - on * way, axis, -on * way))
+        if moves.axes is not None and (turn := _turn(side, -way)) is not None:
+            touch, leaning = points[row] + left[row] * way, turn @ axis
+            turned = touch + turn @ (tip - touch) - on * way
+            out.append((row, turned, leaning, -on * way))
+            # the end has swung towards a floor below: a side touches as well farther up
+            lift = 2.0 * tool.widest_radius * float(np.linalg.norm(leaning - axis))
+            if abs(side @ axis) < SIDE and (touch - tip) @ axis > tool.end_height + lift:
+                out.append((row, turned + lift * leaning, leaning, -on * way))
+    if not out:
+        return Poses(np.zeros(0, np.int64), np.zeros(0, np.int64), *(np.zeros((0, 3)) for _ in range(3)))
+    rows = np.array([p[0] for p in out], np.int64)
+    tips, axes, shift = (np.array([p[k] for p in out], np.float64) for k in (1, 2, 3))
+    return Poses(rows, moves.tool[mover[rows]].astype(np.int64), tips, axes, shift)
+
+
+def _at(point: F64, move: int, moves: Moves, tool: ToolBody) -> tuple[F64, F64, F64 | None]:
+    """Tip, axis and outward normal of a tool where its move brought its cutting part nearest to a point.
+
+    The normal is None where that is farther than ``ON_TOOL``.
+    """
+    low, high = 0.0, 1.0
+    outline = np.array(tool.cutting_profile(CHORDS))
+    for _ in range(2):
+        share = np.linspace(low, high, PLACES + 1)
+        tips = moves.start[move] + share[:, None] * (moves.end[move] - moves.start[move])
+        axes = _axes(moves, move, share)
+        d = point - tips
+        height = np.einsum("ij,ij->i", d, axes)
+        aside = d - height[:, None] * axes
+        rho = np.linalg.norm(aside, axis=1)
+        away, slope = _off_outline(outline, rho, height)
+        best = int(np.argmin(away))
+        step = (high - low) / PLACES
+        low, high = max(share[best] - step, 0.0), min(share[best] + step, 1.0)
+    if away[best] > ON_TOOL:
+        return tips[best], axes[best], None
+    out = aside[best] / max(rho[best], 1e-12)
+    return tips[best], axes[best], slope[best, 0] * out + slope[best, 1] * axes[best]
+
+
+def _axes(moves: Moves, move: int, share: F64) -> F64:
+    """Unit axes (k, 3) at shares (k,) of a move."""
+    if moves.axes is None:
+        return np.tile([0.0, 0.0, 1.0], (len(share), 1))
+    own = moves.axes.only(np.array([move]))
+    angle = (share * own.angle[0])[:, None]
+    return np.asarray(np.cos(angle) * own.axis[0] + np.sin(angle) * np.cross(own.about[0], own.axis[0]))
+
+
+def _off_outline(outline: F64, rho: F64, height: F64) -> tuple[F64, F64]:
+    """Distance of places from an outline, (n,) mm, and the outward normal of its nearest line, (n, 2): aside and up."""
+    best, normal = np.full(len(rho), np.inf), np.zeros((len(rho), 2))
+    place = np.column_stack([rho, height])
+    for a, b in zip(outline[:-1], outline[1:], strict=True):
+        d, long = b - a, float(np.linalg.norm(b - a))
+        if long < 1e-12:
+            continue
+        along = np.clip((place - a) @ d / long**2, 0.0, 1.0)
+        away = np.linalg.norm(place - a - along[:, None] * d, axis=1)
+        nearer = away < best
+        best[nearer], normal[nearer] = away[nearer], (d[1] / long, -d[0] / long)
+    top = outline[-1]
+    away = np.hypot(np.clip(rho - top[0], 0.0, None), height - top[1])
+    nearer = away < best  # the upper end of the flutes
+    best[nearer], normal[nearer] = away[nearer], (0.0, 1.0)
+    return best, normal
+
+
+def _turn(side: F64, wanted: F64) -> F64 | None:
+    """Rotation (3, 3) that takes a unit vector to another by the least turn; None where that is no or too much turn."""
+    axis = np.cross(side, wanted)
+    sine, cosine = float(np.linalg.norm(axis)), float(side @ wanted)
+    if sine < 1e-6 or cosine < math.cos(MAX_LEAN):
+        return None
+    x, y, z = axis / sine
+    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + sine * k + (1.0 - cosine) * (k @ k))
+
+
+__all__ = ["Poses", "poses_at"]

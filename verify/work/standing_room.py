@@ -1,0 +1,108 @@
+"""Whether a whole tool stands free of part and fixtures, the thin neck under the end of its flutes included.
+
+Kernels of reach take every body as going on upwards without end, since tools come from above. A slot cutter below an
+overhang does not: its neck is free where its flutes would not be. Here the tool stands as it is, up to the top of its
+holder or of the spindle.
+
+Points of the surface decide, ``APART`` from each other at most. A body of radius r that enters a flat wall by t leaves
+a mark as wide as 2 sqrt(2 r t): 0.2 mm for 5 um and 1 mm. Coordinates are float64, mm, in the frame of the proof.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.mesh import F64
+from geometry.tool_body import ToolBody
+from verify.model import ProofSetup
+from verify.tool_bodies import Bodies
+
+CHORDS = 32  # of a round corner
+APART = 0.1  # mm between points of the surface
+MAX_POINTS = 300_000  # where more are near, they are farther apart
+WAY_STEP = 0.5  # mm between places on the way
+MAX_STEPS = 8
+# the corners of a box by bits, and its sides as triangles
+SIDES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6],
+                  [0, 6, 4], [1, 5, 7], [1, 7, 3]])
+BOOL = NDArray[np.bool_]
+
+
+def stands_free(triangles: F64, tool: ToolBody, setup: ProofSetup, tips: F64, axes: F64, shift: F64,
+                slack: float) -> BOOL:
+    """Whether a tool stands free at poses and on the straight ways there.
+
+    triangles : (t, 3, 3) float64, mm, of the part and of ``fixture_sides``
+    tips  : (n, 3) float64, mm; axes : (n, 3) float64, unit, tip to spindle
+    shift : (n, 3) float64, mm, the ways: they begin at tips - shift
+    slack : mm by which the cutting part may enter the surface, for facets and rounding; the stock allowance is kept
+
+    Returns (n,) bool.
+    """
+    if not len(tips):
+        return np.zeros(0, np.bool_)
+    frusta = _frusta(tool, setup, setup.stock_allowance - slack)
+    low, high, wide = float(frusta[:, 0].min()), float(frusta[:, 1].max()), float(frusta[:, 2:].max())
+    ends = np.stack([tips + z * axes - s * shift for z in (low, high) for s in (0.0, 1.0)])
+    points = _points_in(triangles, ends.min(axis=(0, 1)) - wide, ends.max(axis=(0, 1)) + wide)
+    out = np.ones(len(tips), np.bool_)
+    for k, (tip, axis, way) in enumerate(zip(tips, axes, shift, strict=True)):
+        steps = min(max(round(float(np.linalg.norm(way)) / WAY_STEP), 1), MAX_STEPS)
+        out[k] = not any(_meets(frusta, points, tip - s * way, axis) for s in np.arange(steps) / steps)
+    return out
+
+
+def fixture_sides(setup: ProofSetup) -> F64:
+    """Sides of the fixtures as triangles, (t, 3, 3) float64, mm."""
+    corners = [[[box[k >> i & 1][i] for i in range(3)] for k in range(8)] for box in setup.fixtures]
+    return np.array(corners, np.float64).reshape(-1, 8, 3)[:, SIDES].reshape(-1, 3, 3)
+
+
+def _frusta(tool: ToolBody, setup: ProofSetup, grow: float) -> F64:
+    """Rows of the whole tool, (k, 4): lower and upper end over the tip, and the radii there, mm, clearances included.
+
+    grow : mm by which the cutting part is larger, or smaller where it is negative
+    """
+    outline = [(rho + grow if rho > 0.0 else 0.0, z) for rho, z in tool.cutting_profile(CHORDS)]
+    outline = [(max(rho, 0.0), z - grow if z < tool.flute_length else z + grow) for rho, z in outline]
+    cutter = [(a[1], b[1], a[0], b[0]) for a, b in pairwise(outline) if b[1] > a[1]]
+    return np.array([*cutter, *Bodies.of([tool], setup).rows[:, :4].tolist()])
+
+
+def _meets(frusta: F64, points: F64, tip: F64, axis: F64) -> bool:
+    """Whether a tool with its tip at a place and an axis, (3,) each, takes in some of the points, (n, 3)."""
+    d = points - tip
+    height = d @ axis
+    rows = np.flatnonzero((height > frusta[:, 0].min()) & (height < frusta[:, 1].max()))
+    h, rho = height[rows], np.linalg.norm(d[rows] - height[rows, None] * axis, axis=1)
+    near = rho < frusta[:, 2:].max()
+    h, rho = h[near], rho[near]
+    return any(bool(((h > z0) & (h < z1) & (rho < r0 + (r1 - r0) * (h - z0) / (z1 - z0))).any())
+               for z0, z1, r0, r1 in frusta)
+
+
+def _points_in(triangles: F64, low: F64, high: F64) -> F64:
+    """Points of triangles (t, 3, 3) within a box, (n, 3), ``APART`` from each other or as near as ``MAX_POINTS`` lets.
+
+    The longest side of each triangle is halved until it is as short as that; what lies outside of the box goes first.
+    """
+    found, rest, apart = list[F64](), triangles, APART
+    while len(rest):
+        rest = rest[((rest.max(axis=1) >= low) & (rest.min(axis=1) <= high)).all(axis=1)]
+        if len(rest) + sum(map(len, found)) > MAX_POINTS:
+            apart *= 2.0
+        sides = np.linalg.norm(rest - np.roll(rest, -1, axis=1), axis=2)
+        done = sides.max(axis=1) <= apart
+        found.append(rest[done].reshape(-1, 3))
+        rest, first = rest[~done], sides[~done].argmax(axis=1)
+        row = np.arange(len(rest))
+        a, b, c = (rest[row, (first + k) % 3] for k in range(3))
+        middle = 0.5 * (a + b)
+        rest = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+    return np.concatenate([np.zeros((0, 3)), *found])
+
+
+__all__ = ["fixture_sides", "stands_free"]
