@@ -104,7 +104,7 @@ def ceilings_worked(mesh: TriangleMesh, tools: Sequence[ToolBody], ways: Mapping
     A ceiling is square to the axis, to 3 degrees. It counts where, over a fifth of it, the flutes end below it by less
     than they are wide.
     """
-    out = []
+    out = list[int]()
     for tool in (t for t in tools if t.number in ways and t.widest_radius - 0.5 * t.neck_diameter >= RELIEF):
         own = ways[tool.number]
         for axis in np.unique(np.round(own.axis, 6), axis=0):

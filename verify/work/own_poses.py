@@ -53,8 +53,8 @@ def poses_at(points: F64, ways: F64, left: F64, mover: I32, moves: Moves, tools:
              allowance: float) -> Poses:
     """The tool of a move, carried on to the places where the move left stock.
 
-    points : (n, 3) float64, mm, on the part
-    ways   : (n, 3) float64, unit, from the places to where the move has cut
+    points : (n, 3) float64, mm, setup frame, on the part
+    ways   : (n, 3) float64, unit, setup frame, from the places to where the move has cut
     left   : (n,) float64, mm of stock on them; places where it is inf, or longer than the tool is wide, have no pose
     mover  : (n,) int32, index, the move; -1 for none
     allowance : mm that may stay

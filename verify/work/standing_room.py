@@ -35,9 +35,9 @@ def stands_free(triangles: F64, tool: ToolBody, setup: ProofSetup, tips: F64, ax
                 slack: float) -> BOOL:
     """Whether a tool stands free at poses and on the straight ways there.
 
-    triangles : (t, 3, 3) float64, mm, of the part and of ``fixture_sides``
-    tips  : (n, 3) float64, mm; axes : (n, 3) float64, unit, tip to spindle
-    shift : (n, 3) float64, mm, the ways: they begin at tips - shift
+    triangles : (t, 3, 3) float64, mm, setup frame, of the part and of ``fixture_sides``
+    tips  : (n, 3) float64, mm, setup frame; axes : (n, 3) float64, unit, setup frame, tip to spindle
+    shift : (n, 3) float64, mm, setup frame, the ways: they begin at tips - shift
     slack : mm by which the cutting part may enter the surface, for facets and rounding; the stock allowance is kept
 
     Returns (n,) bool.
@@ -56,7 +56,7 @@ def stands_free(triangles: F64, tool: ToolBody, setup: ProofSetup, tips: F64, ax
 
 
 def fixture_sides(setup: ProofSetup) -> F64:
-    """Sides of the fixtures as triangles, (t, 3, 3) float64, mm."""
+    """Sides of the fixtures as triangles, (t, 3, 3) float64, mm, setup frame."""
     corners = [[[box[k >> i & 1][i] for i in range(3)] for k in range(8)] for box in setup.fixtures]
     return np.array(corners, np.float64).reshape(-1, 8, 3)[:, SIDES].reshape(-1, 3, 3)
 
