@@ -13,8 +13,8 @@ from verify.model import Asked, FindingKind, NcProgram, ScoredSamples
 from verify.moves import Moves
 from verify.program_reading import read_one
 from verify.prove import prove
-from verify.surface import work_done
 from verify.tool_axes import ToolAxes
+from verify.work import work_done
 from verify.work.asked_faces import Cutting, thinned
 from verify.work.ways_out import ways_out
 from verify.work.work_done import cutting_axes
