@@ -17,14 +17,15 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
+from verify.kernels.surface.standing import first_inside
 from verify.model import ProofSetup
 from verify.tool_bodies import Bodies
 
 CHORDS = 32  # of a round corner
 APART = 0.1  # mm between points of the surface
 MAX_POINTS = 300_000  # where more are near, they are farther apart
-WAY_STEP = 0.5  # mm between places on the way
-MAX_STEPS = 8
+WAY_STEP = 0.1  # mm between places on the way
+MAX_STEPS = 10
 # the corners of a box by bits, and its sides as triangles
 SIDES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6],
                   [0, 6, 4], [1, 5, 7], [1, 7, 3]])
@@ -48,10 +49,14 @@ def stands_free(triangles: F64, tool: ToolBody, setup: ProofSetup, tips: F64, ax
     low, high, wide = float(frusta[:, 0].min()), float(frusta[:, 1].max()), float(frusta[:, 2:].max())
     ends = np.stack([tips + z * axes - s * shift for z in (low, high) for s in (0.0, 1.0)])
     points = _points_in(triangles, ends.min(axis=(0, 1)) - wide, ends.max(axis=(0, 1)) + wide)
-    out = np.ones(len(tips), np.bool_)
+    out, hint = np.ones(len(tips), np.bool_), -1
     for k, (tip, axis, way) in enumerate(zip(tips, axes, shift, strict=True)):
         steps = min(max(round(float(np.linalg.norm(way)) / WAY_STEP), 1), MAX_STEPS)
-        out[k] = not any(_meets(frusta, points, tip - s * way, axis) for s in np.arange(steps) / steps)
+        for share in np.arange(steps) / steps:
+            met = first_inside(points, frusta, tip - share * way, axis, hint)
+            if met >= 0:
+                out[k], hint = False, met
+                break
     return out
 
 
@@ -70,18 +75,6 @@ def _frusta(tool: ToolBody, setup: ProofSetup, grow: float) -> F64:
     outline = [(max(rho, 0.0), z - grow if z < tool.flute_length else z + grow) for rho, z in outline]
     cutter = [(a[1], b[1], a[0], b[0]) for a, b in pairwise(outline) if b[1] > a[1]]
     return np.array([*cutter, *Bodies.of([tool], setup).rows[:, :4].tolist()])
-
-
-def _meets(frusta: F64, points: F64, tip: F64, axis: F64) -> bool:
-    """Whether a tool with its tip at a place and an axis, (3,) each, takes in some of the points, (n, 3)."""
-    d = points - tip
-    height = d @ axis
-    rows = np.flatnonzero((height > frusta[:, 0].min()) & (height < frusta[:, 1].max()))
-    h, rho = height[rows], np.linalg.norm(d[rows] - height[rows, None] * axis, axis=1)
-    near = rho < frusta[:, 2:].max()
-    h, rho = h[near], rho[near]
-    return any(bool(((h > z0) & (h < z1) & (rho < r0 + (r1 - r0) * (h - z0) / (z1 - z0))).any())
-               for z0, z1, r0, r1 in frusta)
 
 
 def _points_in(triangles: F64, low: F64, high: F64) -> F64:

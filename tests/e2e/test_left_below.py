@@ -1,0 +1,85 @@
+"""Stock that programs leave below overhangs where their own tools could have cut it; depths in closed form."""
+
+import json
+import math
+
+import pytest
+
+from service.from_wire import parse_setup
+from service.stages.job_part import read_job_part
+from service.verification.program_first import read_first
+from service.verification.program_proof import proved_program
+from tests.step_files import write_step
+
+CUTTER = {"id": "T1", "number": 1, "kind": "flat", "diameter_mm": 8, "flute_length_mm": 1, "neck_diameter_mm": 3,
+          "neck_length_mm": 20, "shank_diameter_mm": 8, "stickout_mm": 30}
+BLOCK = {"tools": [CUTTER], "stock": {"kind": "box", "box_mm": [[0, 0, 0], [16, 12, 6]], "uncertainty_mm": 0.0}}
+LEAN = math.radians(20.0)
+MILL = {"id": "T1", "number": 1, "kind": "flat", "diameter_mm": 4, "flute_length_mm": 8, "stickout_mm": 40,
+        "gauge_length_mm": 80}
+
+
+def proof(folder, shape, setup, lines, stock=None):
+    wanted = parse_setup(json.dumps(setup))
+    job = read_job_part(write_step(shape, folder / "part.step"), wanted, lambda _stage, _share: None, stock)
+    return proved_program(job, read_first(wanted, "\n".join(lines) + "\n", ending=".ngc"), lambda _s: None).report
+
+
+def side_groove(folder, high, deep, levels):
+    """A groove 2 deep and ``high`` high in the side y = 0, cut ``deep`` deep by a cutter 1 mm high at some levels."""
+    cq = pytest.importorskip("cadquery")
+    shape = cq.Workplane().box(16, 12, 6, centered=False)
+    shape = shape.cut(cq.Workplane().box(16, 2, high, centered=False).translate((0, 0, 3)))
+    lines = ["G21 G17 G90 G94 G40 G49 G80 G64 P0.001", "G54", "T1 M6", "S3000 M3", "G0 X-8 Y-6", "G43 H1 Z30", "G0 Z8"]
+    for z in levels:
+        lines += ["G0 X-8 Y-6", f"G0 Z{z}", f"G1 Y{deep - 4.0} F300", "G1 X24", "G1 Y-6", "G0 Z8"]
+    return proof(folder, shape, BLOCK, [*lines, "G0 Z30", "M5", "G53 G0 Z0", "M2"])
+
+
+def heights(report):
+    return {f["face"]: f["depth"] for f in report["findings"] if f["kind"] == "stock_left"}
+
+
+@pytest.mark.parametrize(("high", "levels"), [(1.0, (3.0,)), (1.4, (3.0, 3.4))])
+def test_a_groove_cut_to_its_depth_is_proved(tmp_path, high, levels):
+    report = side_groove(tmp_path, high, 2.0, levels)
+    assert report["state"] == "proved" and report["coverage"] > 0.99
+
+
+@pytest.mark.parametrize(("high", "levels"), [(1.0, (3.0,)), (1.4, (3.0, 3.4))])
+def test_a_groove_cut_to_half_its_depth_leaves_the_other_half(tmp_path, high, levels):
+    report = side_groove(tmp_path, high, 1.0, levels)
+    assert report["state"] == "clean" and len(heights(report)) >= 2
+    assert all(depth == pytest.approx(1.0, rel=0.01) for depth in heights(report).values())
+
+
+def test_a_ceiling_that_is_left_too_low_is_told(tmp_path):
+    report = side_groove(tmp_path, 1.4, 2.0, (3.0, 3.2))
+    assert report["state"] == "clean"
+    assert list(heights(report).values()) == [pytest.approx(0.2, abs=0.002)]
+
+
+@pytest.mark.parametrize(("lean", "state"), [(20.0, "proved"), (19.3, "clean")])
+def test_a_flank_that_leans_too_little_leaves_a_wedge(tmp_path, lean, state):
+    """A wall leans 20 degrees over its foot and has 0.2 mm of stock; the flank touches its upper edge."""
+    cq = pytest.importorskip("cadquery")
+
+    def wall(stock):
+        top = 6.0 - 4.0 * math.tan(LEAN) - stock
+        outline = [(0, 0), (10, 0), (10, 6), (top, 6), (6.0 - stock, 2), (0, 2)]
+        return cq.Workplane("YZ").polyline(outline).close().extrude(8)
+
+    blank = write_step(wall(0.2 / math.cos(LEAN)), tmp_path / "blank.step")
+    a = math.radians(lean)
+    z = 2.0 + 2.0 * math.sin(a) + 0.005
+    y = 6.0 - 4.0 * math.tan(LEAN) - (2.0 - (6.0 - z) * math.sin(a)) / math.cos(a)
+    setup = {"tools": [MILL], "stock": {"kind": "step", "step_file": str(blank), "uncertainty_mm": 0.0},
+             "machine": {"kind": "5-axis", "kinematics": "table-table-AC", "dialects": ["linuxcnc"], "iso_axes": []}}
+    lines = ["G21 G90 G17 G94 G40 G49 G54 G61", "G53 G0 Z0", "G0 A0 C0", "T1 M6", "S8000 M3", "G0 X-6 Y-6",
+             "G43 H1 Z60", "M428", f"G0 A-{lean} C0", f"G0 X-6 Y-8 Z{z:.4f}", f"G0 Y{y:.5f}", "G1 X14 F150",
+             "G1 Y-8 F400", "G0 Z60", "G0 A0 C0", "M429", "G53 G0 Z0", "M5", "M30"]
+    report = proof(tmp_path, wall(0.0), setup, lines, blank)
+    assert report["state"] == state
+    if state == "clean":
+        lowest = 4.0 * math.tan(LEAN - a) / math.cos(LEAN)  # at the foot; the end of the tool stays a little above
+        assert all(0.6 * lowest < depth < lowest + 0.003 for depth in heights(report).values()) and heights(report)
