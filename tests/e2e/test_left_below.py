@@ -25,14 +25,17 @@ def proof(folder, shape, setup, lines, stock=None):
     return proved_program(job, read_first(wanted, "\n".join(lines) + "\n", ending=".ngc"), lambda _s: None).report
 
 
-def side_groove(folder, high, deep, levels):
-    """A groove 2 deep and ``high`` high in the side y = 0, cut ``deep`` deep by a cutter 1 mm high at some levels."""
+def side_groove(folder, high, deep, levels, to=24.0):
+    """A groove 2 deep and ``high`` high in the side y = 0, cut ``deep`` deep as far as X ``to``.
+
+    By a cutter 1 mm high at some levels.
+    """
     cq = pytest.importorskip("cadquery")
     shape = cq.Workplane().box(16, 12, 6, centered=False)
     shape = shape.cut(cq.Workplane().box(16, 2, high, centered=False).translate((0, 0, 3)))
     lines = ["G21 G17 G90 G94 G40 G49 G80 G64 P0.001", "G54", "T1 M6", "S3000 M3", "G0 X-8 Y-6", "G43 H1 Z30", "G0 Z8"]
     for z in levels:
-        lines += ["G0 X-8 Y-6", f"G0 Z{z}", f"G1 Y{deep - 4.0} F300", "G1 X24", "G1 Y-6", "G0 Z8"]
+        lines += ["G0 X-8 Y-6", f"G0 Z{z}", f"G1 Y{deep - 4.0} F300", f"G1 X{to}", "G1 Y-6", "G0 Z8"]
     return proof(folder, shape, BLOCK, [*lines, "G0 Z30", "M5", "G53 G0 Z0", "M2"])
 
 
@@ -51,6 +54,12 @@ def test_a_groove_cut_to_half_its_depth_leaves_the_other_half(tmp_path, high, le
     report = side_groove(tmp_path, high, 1.0, levels)
     assert report["state"] == "clean" and len(heights(report)) >= 2
     assert all(depth == pytest.approx(1.0, rel=0.01) for depth in heights(report).values())
+
+
+@pytest.mark.parametrize("to", [4.0, 11.0])
+def test_a_groove_cut_along_a_part_of_its_length_leaves_the_rest(tmp_path, to):
+    report = side_groove(tmp_path, 1.0, 2.0, (3.0,), to)
+    assert report["state"] == "clean" and max(heights(report).values()) == pytest.approx(2.0, abs=0.01)
 
 
 def test_a_ceiling_that_is_left_too_low_is_told(tmp_path):

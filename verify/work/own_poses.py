@@ -2,8 +2,9 @@
 
 No axis looks at such a place, so what tools can touch there is not known from the part alone: a slot cutter with a
 thin neck comes in from the side. The program shows the way. The move that left the stock carried its tool past the
-place; moved on by the height of the stock, the same point of the tool touches the part. Where the whole tool stands
-free there, and on its way there, the place could have been cut.
+place; moved on by the height of the stock, the same point of the tool touches the part. Or a move finished another
+place of the same face, and its tool slides on from there. Where the whole tool stands free, and on its way, the place
+could have been cut.
 
 Coordinates are float64, mm, in the frame of the proof.
 """
@@ -48,6 +49,10 @@ class Poses:
     def __len__(self) -> int:
         return len(self.row)
 
+    def only(self, chosen: NDArray[np.bool_] | INT) -> Poses:
+        """The poses of a mask or of rows."""
+        return Poses(self.row[chosen], self.tool[chosen], self.tips[chosen], self.axes[chosen], self.shift[chosen])
+
 
 def poses_at(points: F64, ways: F64, left: F64, mover: I32, moves: Moves, tools: Sequence[ToolBody],
              allowance: float) -> Poses:
@@ -86,6 +91,39 @@ def poses_at(points: F64, ways: F64, left: F64, mover: I32, moves: Moves, tools:
     rows = np.array([p[0] for p in out], np.int64)
     tips, axes, shift = (np.array([p[k] for p in out], np.float64) for k in (1, 2, 3))
     return Poses(rows, moves.tool[mover[rows]].astype(np.int64), tips, axes, shift)
+
+
+def slid_poses(points: F64, normals: F64, touched: Poses, places: F64, place_normals: F64,
+               tools: Sequence[ToolBody]) -> Poses:
+    """Poses of ``touched``, each slid from the place that it touches to another place of the same face.
+
+    points, normals : (n, 3) float64, mm and unit, setup frame, on the part: where to, one for each pose
+    touched : Poses, n of them; row is the place in ``places``
+    places, place_normals : (g, 3) float64, mm and unit, setup frame, on the part
+
+    Returns Poses, n of them, whose row is that of the point.
+
+    The tool keeps its axis. Where both normals lean from it, the tool goes round its axis as the normal does, so the
+    same circle of it touches. A straight side touches as high as it is: it keeps its height as far as the flutes reach.
+    """
+    from_, axes = places[touched.row], touched.axes
+    arm = touched.tips - from_
+    one, other = (v - np.einsum("ij,ij->i", v, axes)[:, None] * axes for v in (place_normals[touched.row], normals))
+    long = np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1)
+    leans = long > SIDE**2
+    long = np.where(leans, long, 1.0)
+    cosine = np.where(leans, np.einsum("ij,ij->i", one, other) / long, 1.0)[:, None]
+    sine = np.where(leans, np.einsum("ij,ij->i", np.cross(one, other), axes) / long, 0.0)[:, None]
+    up = np.einsum("ij,ij->i", arm, axes)[:, None] * axes
+    aside = arm - up
+    tips = points + up + cosine * aside + sine * np.cross(axes, aside)
+    lowest, highest = np.array([(t.corner_end[1], t.flute_length if t.taper <= 0.0 and t.arcs is None else -1.0)
+                                for t in tools])[touched.tool].T
+    rise = np.einsum("ij,ij->i", tips - touched.tips, axes)
+    at = rise - np.einsum("ij,ij->i", arm, axes)  # height of the touch over the tip, once that does not rise
+    level = (np.abs(np.einsum("ij,ij->i", normals, axes)) < SIDE) & (at >= lowest) & (at <= highest)
+    tips = tips - np.where(level, rise, 0.0)[:, None] * axes
+    return Poses(np.arange(len(points)), touched.tool, tips, axes, tips - touched.tips)
 
 
 def _at(point: F64, move: int, moves: Moves, tool: ToolBody) -> tuple[F64, F64, F64 | None]:
@@ -152,4 +190,4 @@ def _turn(side: F64, wanted: F64) -> F64 | None:
     return np.asarray(np.eye(3) + sine * k + (1.0 - cosine) * (k @ k))
 
 
-__all__ = ["Poses", "poses_at"]
+__all__ = ["Poses", "poses_at", "slid_poses"]

@@ -36,7 +36,7 @@ from verify.work.asked_faces import (
     thinned,
     worked_faces,
 )
-from verify.work.own_poses import poses_at
+from verify.work.own_poses import Poses, poses_at, slid_poses
 from verify.work.standing_room import fixture_sides, stands_free
 from verify.work.stock_places import StandingStock, stock_findings
 from verify.work.unread_work import UnreadWork
@@ -55,6 +55,7 @@ LEAST_NEAR = 4  # samples that must lie there
 MAX_AXES = 24
 SAME_AXIS = float(np.radians(0.01))
 NOT_IN_PROGRAM, LEFT, UNDERCUT = "not_in_program", "pass", "undercut"  # words of the remainder
+SLID_FROM = 4  # finished samples of its face that a tool is slid from to each of them
 MAX_BELOW = 60  # samples of a face below an overhang that poses are tried on
 BOOL = NDArray[np.bool_]
 INT = NDArray[np.int64]
@@ -223,7 +224,7 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     beyond = np.setdiff1d(beyond, touched)
     why[beyond] = asked.touch.reasons(few.subset(beyond), tools, axes)
     below = beyond[(why[beyond] == UNDERCUT) & (height[beyond] > limits.corner)]
-    moved_on = _left_below(few.subset(below), along[below], mover[below], axes, limits, cutting)
+    moved_on = _left_below(measured, few.subset(below), along[below], mover[below], axes, limits, cutting)
     touched = np.union1d(touched, below[moved_on])
     deep = _missing_depths(few, touched, mover, axes, limits.lift, cutting)
     corner = np.zeros(len(tried), np.bool_)
@@ -244,31 +245,52 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     return StandingStock(np.where(np.isfinite(height), height, MAX_WAY), mover, direction), left, why
 
 
-def _left_below(few: SurfaceSamples, along: F64, mover: I32, axes: F64, limits: _Limits, cutting: Cutting) -> BOOL:
-    """Samples below an overhang that a tool of the program touches, moved on from where it left them, (n,) bool.
+def _left_below(measured: Measured, few: SurfaceSamples, along: F64, mover: I32, axes: F64, limits: _Limits,
+                cutting: Cutting) -> BOOL:
+    """Samples below an overhang that a tool of the program touches, moved on from where it cut, (n,) bool.
 
     along : (n,) float64, mm of stock on their normals; mover : (n,) int32, index, the move that left it
 
-    Each is tried along its normal and along its shortest way out. Of more than ``MAX_BELOW`` on a face an even share is
-    tried; each other one shares the answer of the nearest, unless more stands on it.
+    Each is tried along its normal, along its shortest way out, and from places of its face that are finished. Of more
+    than ``MAX_BELOW`` on a face an even share is tried; each other one shares the answer of the nearest, unless more
+    stands on it.
     """
-    out = np.zeros(len(few), np.bool_)
+    out, s = np.zeros(len(few), np.bool_), measured.samples
     sides = np.concatenate([cutting.tree.mesh.triangles, fixture_sides(cutting.setup)])
+    finished = proved_samples(measured.residual, cutting.setup) & (measured.mover >= 0)
     for face in np.unique(few.face):
         rows = np.flatnonzero(few.face == face)
         tried = thinned(rows, MAX_BELOW)
         near, answer = few.subset(tried), np.zeros(len(tried), np.bool_)
+
+        def ask(poses: Poses, answer: BOOL = answer) -> None:
+            for k in np.unique(poses.tool):
+                mine = poses.only((poses.tool == k) & ~answer[poses.row])
+                answer[mine.row[stands_free(sides, cutting.tools[k], cutting.setup, mine.tips, mine.axes, mine.shift,
+                                            limits.near)]] = True
+
         ways = ways_out(near.points, near.normals, axes, limits.lift, MAX_WAY, cutting)
         for way, left, by in ((near.normals, along[tried], mover[tried]), (ways.direction, ways.length, ways.mover)):
-            poses = poses_at(near.points, way, left, by, cutting.moves, cutting.tools, cutting.setup.stock_allowance)
-            for k in np.unique(poses.tool):
-                mine = np.flatnonzero((poses.tool == k) & ~answer[poses.row])
-                free = stands_free(sides, cutting.tools[k], cutting.setup, poses.tips[mine], poses.axes[mine],
-                                   poses.shift[mine], limits.near)
-                answer[poses.row[mine[free]]] = True
+            ask(poses_at(near.points, way, left, by, cutting.moves, cutting.tools, cutting.setup.stock_allowance))
+        good = thinned(np.flatnonzero(finished & (s.face == face)), MAX_BELOW)
+        for poses in _slid(measured, good, near, cutting):
+            ask(poses)
         of = cKDTree(near.points).query(few.points[rows])[1]
         out[rows] = answer[of] & (along[rows] <= along[tried[of]] + limits.h)
     return out
+
+
+def _slid(measured: Measured, good: INT, near: SurfaceSamples, cutting: Cutting) -> list[Poses]:
+    """Poses at samples, slid there from the nearest finished ones of the face, (g,) index, that a tool touched."""
+    s = measured.samples.subset(good)
+    left, by = np.maximum(measured.residual[good], 0.0), measured.mover[good]
+    touched = poses_at(s.points, s.normals, left, by, cutting.moves, cutting.tools, cutting.setup.stock_allowance)
+    touched = touched.only(np.unique(touched.row, return_index=True)[1])
+    if not len(touched):
+        return []
+    of = cKDTree(s.points[touched.row]).query(near.points, k=min(SLID_FROM, len(touched)))[1].reshape(len(near), -1)
+    return [slid_poses(near.points, near.normals, touched.only(column), s.points, s.normals, cutting.tools)
+            for column in of.T]
 
 
 def _shared(few: SurfaceSamples, cutting: Cutting, error: float) -> BOOL:

@@ -9,7 +9,7 @@ from geometry.tool_body import ToolBody
 from tests.hand_parts import ball, tool
 from verify.moves import Moves
 from verify.tool_axes import ToolAxes
-from verify.work.own_poses import poses_at
+from verify.work.own_poses import poses_at, slid_poses
 
 SLOT = ToolBody("T1", 1, 8.0, 0.0, 1.0, 3.0, 20.0, 8.0, 30.0)
 
@@ -82,3 +82,23 @@ def test_a_side_that_leans_too_little_turns_about_what_it_touches():
         assert side == pytest.approx(2.0, abs=0.001)
     assert (got.tips[2] - got.tips[1]) @ got.axes[1] > 0.0
     assert len(at([touch - 0.05 * normal], [normal], [0.05], moves(tip - [20, 0, 0], tip + [20, 0, 0]), [mill])) <= 1
+
+
+def test_a_tool_slides_to_another_place_of_a_wall_and_keeps_its_height_there():
+    """A slot cutter 1 mm high touched the wall y = 0 at x = 0, z = 3.4: at x = 7, z = 3.9 it touches as it stands."""
+    touched = at([[0.0, 0.0, 3.4]], [[0.0, -1.0, 0.0]], [0.0], moves((-8, -4, 3), (24, -4, 3)), [SLOT])
+    got = slid_poses(np.array([[7.0, 0.0, 3.9]]), np.array([[0.0, -1.0, 0.0]]), touched, np.array([[0.0, 0.0, 3.4]]),
+                     np.array([[0.0, -1.0, 0.0]]), [SLOT])
+    assert got.tips[0] == pytest.approx([7.0, -4.0, 3.0], abs=0.02)
+    assert got.shift[0] == pytest.approx([7.0, 0.0, 0.0], abs=1e-9)
+    beyond = slid_poses(np.array([[7.0, 0.0, 4.5]]), np.array([[0.0, -1.0, 0.0]]), touched, np.array([[0.0, 0.0, 3.4]]),
+                        np.array([[0.0, -1.0, 0.0]]), [SLOT])
+    assert beyond.tips[0] == pytest.approx([7.0, -4.0, 4.1], abs=0.02), "higher than the flutes: it rises"
+
+
+def test_a_tool_goes_round_its_axis_as_the_normal_does():
+    """In a round groove of 10 mm, a quarter round from where it touched."""
+    touched = at([[10.0, 0.0, 3.4]], [[-1.0, 0.0, 0.0]], [0.0], moves((6, -1, 3), (6, 1, 3)), [SLOT])
+    got = slid_poses(np.array([[0.0, 10.0, 3.4]]), np.array([[0.0, -1.0, 0.0]]), touched, np.array([[10.0, 0.0, 3.4]]),
+                     np.array([[-1.0, 0.0, 0.0]]), [SLOT])
+    assert got.tips[0] == pytest.approx([0.0, 6.0, 3.0], abs=0.02)
