@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Protocol
@@ -239,12 +239,16 @@ class Asked:
     touch : Touch, what the tools of the program can touch
     facet : mm, largest distance of the facets of the part from its exact surface
     whole : the only program of the proof, read on through an end before its last lines; None where nothing follows
+    hidden : numbers of faces that no axis sees; those that the program works on get samples and are judged
+    sample : samples of mesh triangles, (k,) int64, index, frame of the proof; None where no face is hidden
     """
 
     faces: frozenset[int] | None
     touch: Touch
     facet: float = 0.0
     whole: Program | None = None
+    hidden: frozenset[int] = frozenset()
+    sample: Callable[[NDArray[np.int64]], SurfaceSamples] | None = None
 
 
 @dataclass(frozen=True, eq=False)

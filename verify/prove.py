@@ -79,7 +79,7 @@ from verify.surface.wall_support import supported
 from verify.surface.ways_in import deep_findings, slot_findings
 from verify.work.asked_faces import Cutting, Measured
 from verify.work.unread_work import unread_work
-from verify.work.work_done import work_done
+from verify.work.work_done import with_hidden, work_done
 
 # shares of the work done: read, places between samples settled, residuals, support, contacts known
 READ, SETTLED, CUT, HELD, MET = 0.12, 0.15, 0.48, 0.52, 0.97
@@ -132,12 +132,13 @@ def prove(programs: Sequence[Given], part: Part, tools: Sequence[ToolBody], setu
     setup = replace(setup, tap_holes=holes)
     moves, source = moves_of(framed, tools)
     moves = replace(moves, stray=strays_of(framed, tools, setup))
+    tree = TriangleTree(part.mesh)
     if asked is not None:
         scored = _settled(scored, part, tools, setup, moves, threads, stages.span(READ, SETTLED))
+        scored = with_hidden(scored, asked, Cutting(tree, setup, moves, tools, threads))
     cuts = surface_cuts(part, tools, setup, scored, moves, source, threads,
                         stages.span(READ if asked is None else SETTLED, CUT))
     stages.tell(CUT)
-    tree = TriangleTree(part.mesh)
     support, unheld = supported(tree, scored, setup, moves, tools, source, zone_ids, threads,
                                 stages.span(CUT, HELD))
     slides = slides_of(framed, tools, setup)

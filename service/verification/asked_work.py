@@ -13,7 +13,7 @@ from service.stages.preparation import machinable_triangles, table_height
 from service.stages.proof_samples import proof_samples
 from service.stages.sample_spacing import coarse_spacing
 from service.verification.named_touch import axis_lines
-from service.verification.own_ways import ceilings_worked, mill_ways
+from service.verification.own_ways import mill_ways
 from service.verification.tool_touch import ToolTouch
 from verify.model import Asked
 from verify.program.move_kinds import FEED
@@ -31,8 +31,8 @@ def asked_work(job: JobPart, frame: ProofFrame, program: Program,
     frame   : of the proof; program : as it was read
     whole   : the same program read on through an end before its last lines, or None
 
-    The machinable area is what the accesses of the setup see, and what the tool axes of the program see. Ceilings that
-    its mills with thin necks pass below belong to it, too.
+    The machinable area is what the accesses of the setup see, and what the tool axes of the program see. Faces that
+    none of them sees are hidden.
 
     Raises
     ------
@@ -46,11 +46,6 @@ def asked_work(job: JobPart, frame: ProofFrame, program: Program,
     first = turned(job.part, given[0])
     seat = (np.flatnonzero(seat_of(first)) + 1).tolist()
     triangles = machinable_triangles(first, seat, inputs, directions @ given[0].T)
-    ways = mill_ways(program, inputs.bodies)
-    if ops.faces is None:
-        hung = np.isin(frame.part.mesh.face_ids, ceilings_worked(frame.part.mesh, inputs.bodies, ways))
-        hung &= ~np.isin(frame.part.mesh.face_ids, [*seat, *face_numbers(ops.exclude_faces)])
-        triangles = np.union1d(triangles, np.flatnonzero(hung))
     wide = coarse_spacing(frame.part, inputs, directions @ frame.rotation.T) if program.poses is None else {}
     fine = triangles[~np.isin(first.mesh.face_ids[triangles], list(wide))]
     samples = turned_samples(proof_samples(first, fine, {}), frame.rotation @ given[0].T)
@@ -59,8 +54,13 @@ def asked_work(job: JobPart, frame: ProofFrame, program: Program,
     table = table_height(inputs, job.blank) if inputs.turns else None
     asked = frozenset[int]() if not ops.finishing else None if ops.faces is None else frozenset(face_numbers(ops.faces))
     touch = ToolTouch(job.part, inputs, frame.rotation, table, axis_lines(program, inputs.bodies),
-                      ways)
-    return samples, Asked(asked, touch, max(job.part.chord, job.part.deviation), whole)
+                      mill_ways(program, inputs.bodies))
+    hidden = frozenset[int]()
+    if ops.faces is None and asked is None:
+        seen = np.unique(first.mesh.face_ids[triangles])
+        hidden = frozenset(np.setdiff1d(first.mesh.face_ids, [*seen, *seat, *face_numbers(ops.exclude_faces)]).tolist())
+    return samples, Asked(asked, touch, max(job.part.chord, job.part.deviation), whole, hidden,
+                          lambda of: proof_samples(frame.part, of, {}))
 
 
 def _axes(program: Program) -> F64:

@@ -9,7 +9,7 @@ Coordinates are float64, mm, in the frame of the tree.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -17,22 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from geometry.mesh import F64, TriangleMesh
+from geometry.mesh import F64
 from geometry.mesh_queries.bvh import TriangleTree
 from geometry.mesh_queries.outline_drop import drop_turned
 from geometry.mesh_queries.revolved_outline import Outline, OutlineLine
 from geometry.mesh_queries.tilted_collision import axis_frames
-from geometry.sampling import sample_surface
 from geometry.tool_body import ToolBody
 from verify.program.move_kinds import FEED
 from verify.program.program import Program
 from zones.reach.assembly import Clearances, discs_of
 
 CHORDS = 32  # of a round corner
-HANGS = -np.cos(np.radians(3.0))  # share of the axis in the normal up to which a face is a ceiling
-RELIEF = 0.1  # mm by which a neck is thinner than the cutting part, in radius, for its upper end to cut ceilings
-HELD_SHARE = 0.2  # of the points of a ceiling, over which ways of its mill pass
-ON_CEILING = 200  # points of a ceiling that are looked at
 SAME_AXIS = np.cos(np.radians(0.01))
 STEP = 0.25  # radii between places along the ways
 MAX_PLACES = 400_000  # of a tool; more get a wider step
@@ -92,44 +87,6 @@ def touched_on_ways(tree: TriangleTree, points: F64, tool: ToolBody, ways: MillW
     return out
 
 
-def ceilings_worked(mesh: TriangleMesh, tools: Sequence[ToolBody], ways: Mapping[int, MillWays]) -> tuple[int, ...]:
-    """Faces that hang over the ways of a mill with a thin neck: the upper end of its flutes cuts them.
-
-    mesh : TriangleMesh of the part, in the frame of the ways
-
-    Returns face numbers, ascending.
-
-    Notes
-    -----
-    A ceiling is square to the axis, to 3 degrees. It counts where, over a fifth of it, the flutes end below it by less
-    than they are wide.
-    """
-    out = list[int]()
-    for tool in (t for t in tools if t.number in ways and t.widest_radius - 0.5 * t.neck_diameter >= RELIEF):
-        own = ways[tool.number]
-        for axis in np.unique(np.round(own.axis, 6), axis=0):
-            down = np.flatnonzero(mesh.normals @ axis <= HANGS)
-            for face in np.setdiff1d(np.unique(mesh.face_ids[down]), out):
-                mine = down[mesh.face_ids[down] == face]
-                points = sample_surface(mesh, ON_CEILING / float(mesh.areas[mine].sum()), triangles=mine).points
-                if _passed_under(points, tool, own, axis).mean() >= HELD_SHARE:
-                    out.append(int(face))
-    return tuple(sorted(out))
-
-
-def _passed_under(points: F64, tool: ToolBody, ways: MillWays, axis: F64) -> BOOL:
-    """Points (n, 3) of a ceiling below which the flutes of a mill end by less than they are wide, (n,) bool."""
-    mine, frame = np.flatnonzero(ways.axis @ axis >= SAME_AXIS), axis_frames(axis[None])[0]
-    at, start, end = points @ frame.T, ways.start[mine] @ frame.T, ways.end[mine] @ frame.T
-    tip = np.minimum(start[:, 2], end[:, 2])
-    under = (tip < at[:, 2].max()) & (tip + tool.flute_length > at[:, 2].min() - 2.0 * tool.widest_radius)
-    out = np.zeros(len(points), np.bool_)
-    if under.any():
-        xy, row = _near_places(at[:, :2], start[under, :2], end[under, :2], tool.widest_radius)
-        out[row[np.linalg.norm(at[row, :2] - xy, axis=1) <= tool.widest_radius]] = True
-    return out
-
-
 def _near_places(points: F64, start: F64, end: F64, radius: float) -> tuple[F64, NDArray[np.int64]]:
     """Places of ways that are near to points in plan, (c, 2), and the point of each, (c,), index.
 
@@ -176,4 +133,4 @@ def _distance(tool: ToolBody, rho: F64, height: F64) -> F64:
     return np.where(inside & (height >= 0.0), 0.0, out)
 
 
-__all__ = ["MillWays", "ceilings_worked", "mill_ways", "touched_on_ways"]
+__all__ = ["MillWays", "mill_ways", "touched_on_ways"]

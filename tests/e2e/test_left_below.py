@@ -65,20 +65,21 @@ def test_a_groove_cut_along_a_part_of_its_length_leaves_the_rest(tmp_path, to):
 def test_a_ceiling_that_is_left_too_low_is_told(tmp_path):
     report = side_groove(tmp_path, 1.4, 2.0, (3.0, 3.2))
     assert report["state"] == "clean"
-    assert list(heights(report).values()) == [pytest.approx(0.2, abs=0.002)]
+    assert heights(report) and all(depth == pytest.approx(0.2, abs=0.002) for depth in heights(report).values())
 
 
-@pytest.mark.parametrize(("lean", "state"), [(20.0, "proved"), (19.3, "clean")])
-def test_a_flank_that_leans_too_little_leaves_a_wedge(tmp_path, lean, state):
-    """A wall leans 20 degrees over its foot and has 0.2 mm of stock; the flank touches its upper edge."""
+@pytest.mark.parametrize(("lean", "state", "stock"),
+                         [(20.0, "proved", 0.2), (19.3, "clean", 0.2), (15.0, "clean", 1.0)])
+def test_a_flank_that_leans_too_little_leaves_a_wedge(tmp_path, lean, state, stock):
+    """A wall leans 20 degrees over its foot and has some stock; the flank touches its upper edge."""
     cq = pytest.importorskip("cadquery")
 
-    def wall(stock):
-        top = 6.0 - 4.0 * math.tan(LEAN) - stock
-        outline = [(0, 0), (10, 0), (10, 6), (top, 6), (6.0 - stock, 2), (0, 2)]
+    def wall(more):
+        top = 6.0 - 4.0 * math.tan(LEAN) - more
+        outline = [(0, 0), (10, 0), (10, 6), (top, 6), (6.0 - more, 2), (0, 2)]
         return cq.Workplane("YZ").polyline(outline).close().extrude(8)
 
-    blank = write_step(wall(0.2 / math.cos(LEAN)), tmp_path / "blank.step")
+    blank = write_step(wall(stock / math.cos(LEAN)), tmp_path / "blank.step")
     a = math.radians(lean)
     z = 2.0 + 2.0 * math.sin(a) + 0.005
     y = 6.0 - 4.0 * math.tan(LEAN) - (2.0 - (6.0 - z) * math.sin(a)) / math.cos(a)
@@ -91,4 +92,4 @@ def test_a_flank_that_leans_too_little_leaves_a_wedge(tmp_path, lean, state):
     assert report["state"] == state
     if state == "clean":
         lowest = 4.0 * math.tan(LEAN - a) / math.cos(LEAN)  # at the foot; the end of the tool stays a little above
-        assert all(0.6 * lowest < depth < lowest + 0.003 for depth in heights(report).values()) and heights(report)
+        assert all(0.5 * lowest < depth < lowest + 0.003 for depth in heights(report).values()) and heights(report)

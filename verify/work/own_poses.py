@@ -25,8 +25,10 @@ from verify.moves import Moves
 CHORDS = 32  # of a round corner
 PLACES = 64  # parts of a move in which the place of the tool is looked for, and again of two of them
 ON_TOOL = 0.02  # mm: a point farther from the cutting part was left by another move
+UPRIGHT, LEVEL = math.sin(math.radians(3.0)), math.cos(math.radians(3.0))  # between them a face is a slope
 SIDE = 0.1  # share of the axis in the normal of a side
-MAX_LEAN = math.radians(10.0)  # by which the axis may turn towards the face
+EDGE = math.cos(math.radians(6.0))  # between a face and the tool where it touches: chords of a corner turn by 3
+MAX_LEAN = math.radians(20.0)  # by which the axis may turn towards the face
 INT = NDArray[np.int64]
 
 
@@ -38,6 +40,7 @@ class Poses:
     tool  : (k,) int64, index, place in the sequence of tools
     tips  : (k, 3) float64, mm; axes : (k, 3) float64, unit, tip to spindle
     shift : (k, 3) float64, mm, from where the program had the tool
+    edge  : (k,) bool, whether it touches a slope with an edge, which finishes slopes in steps alone
     """
 
     row: INT
@@ -45,27 +48,29 @@ class Poses:
     tips: F64
     axes: F64
     shift: F64
+    edge: NDArray[np.bool_]
 
     def __len__(self) -> int:
         return len(self.row)
 
     def only(self, chosen: NDArray[np.bool_] | INT) -> Poses:
         """The poses of a mask or of rows."""
-        return Poses(self.row[chosen], self.tool[chosen], self.tips[chosen], self.axes[chosen], self.shift[chosen])
+        return Poses(self.row[chosen], self.tool[chosen], self.tips[chosen], self.axes[chosen], self.shift[chosen],
+                     self.edge[chosen])
 
 
-def poses_at(points: F64, ways: F64, left: F64, mover: I32, moves: Moves, tools: Sequence[ToolBody],
+def poses_at(points: F64, normals: F64, ways: F64, left: F64, mover: I32, moves: Moves, tools: Sequence[ToolBody],
              allowance: float) -> Poses:
     """The tool of a move, carried on to the places where the move left stock.
 
-    points : (n, 3) float64, mm, setup frame, on the part
+    points, normals : (n, 3) float64, mm and unit, setup frame, on the part
     ways   : (n, 3) float64, unit, setup frame, from the places to where the move has cut
     left   : (n,) float64, mm of stock on them; places where it is inf, or longer than the tool is wide, have no pose
     mover  : (n,) int32, index, the move; -1 for none
     allowance : mm that may stay
 
     Returns Poses. Where axes turn in the program, a place has a second one, with the tool turned about the point that
-    touches until its side lies against the way, by 10 degrees at most: a side that leans too little has left a wedge.
+    touches until its side lies against the way, by 20 degrees at most: a side that leans too little has left a wedge.
     It has a third one a little farther up, since the end swings.
     """
     out = []
@@ -77,20 +82,24 @@ def poses_at(points: F64, ways: F64, left: F64, mover: I32, moves: Moves, tools:
         tip, axis, side = _at(points[row] + left[row] * way, int(mover[row]), moves, tool)
         if side is None:
             continue
-        out.append((row, tip - on * way, axis, -on * way))
+        up = abs(float(normals[row] @ axis))
+        edge = UPRIGHT < up < LEVEL and float(side @ -normals[row]) < EDGE
+        out.append((row, tip - on * way, axis, -on * way, edge))
         if moves.axes is not None and (turn := _turn(side, -way)) is not None:
             touch, leaning = points[row] + left[row] * way, turn @ axis
             turned = touch + turn @ (tip - touch) - on * way
-            out.append((row, turned, leaning, -on * way))
+            edge = float((turn @ side) @ -normals[row]) < EDGE
+            out.append((row, turned, leaning, -on * way, edge))
             # the end has swung towards a floor below: a side touches as well farther up
             lift = 2.0 * tool.widest_radius * float(np.linalg.norm(leaning - axis))
             if abs(side @ axis) < SIDE and (touch - tip) @ axis > tool.end_height + lift:
-                out.append((row, turned + lift * leaning, leaning, -on * way))
+                out.append((row, turned + lift * leaning, leaning, -on * way, edge))
     if not out:
-        return Poses(np.zeros(0, np.int64), np.zeros(0, np.int64), *(np.zeros((0, 3)) for _ in range(3)))
+        none, nowhere = np.zeros(0, np.int64), np.zeros((0, 3))
+        return Poses(none, none, nowhere, nowhere, nowhere, np.zeros(0, np.bool_))
     rows = np.array([p[0] for p in out], np.int64)
     tips, axes, shift = (np.array([p[k] for p in out], np.float64) for k in (1, 2, 3))
-    return Poses(rows, moves.tool[mover[rows]].astype(np.int64), tips, axes, shift)
+    return Poses(rows, moves.tool[mover[rows]].astype(np.int64), tips, axes, shift, np.array([p[4] for p in out]))
 
 
 def slid_poses(points: F64, normals: F64, touched: Poses, places: F64, place_normals: F64,
@@ -123,7 +132,7 @@ def slid_poses(points: F64, normals: F64, touched: Poses, places: F64, place_nor
     at = rise - np.einsum("ij,ij->i", arm, axes)  # height of the touch over the tip, once that does not rise
     level = (np.abs(np.einsum("ij,ij->i", normals, axes)) < SIDE) & (at >= lowest) & (at <= highest)
     tips = tips - np.where(level, rise, 0.0)[:, None] * axes
-    return Poses(np.arange(len(points)), touched.tool, tips, axes, tips - touched.tips)
+    return Poses(np.arange(len(points)), touched.tool, tips, axes, tips - touched.tips, touched.edge)
 
 
 def _at(point: F64, move: int, moves: Moves, tool: ToolBody) -> tuple[F64, F64, F64 | None]:

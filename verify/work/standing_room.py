@@ -20,6 +20,8 @@ from geometry.tool_body import ToolBody
 from verify.kernels.surface.standing import first_inside
 from verify.model import ProofSetup
 from verify.tool_bodies import Bodies
+from verify.work.asked_faces import Cutting
+from verify.work.own_poses import Poses
 
 CHORDS = 32  # of a round corner
 APART = 0.1  # mm between points of the surface
@@ -30,6 +32,24 @@ MAX_STEPS = 10
 SIDES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6],
                   [0, 6, 4], [1, 5, 7], [1, 7, 3]])
 BOOL = NDArray[np.bool_]
+
+
+def free_poses(poses: Poses, cutting: Cutting, slack: float) -> BOOL:
+    """Poses of tools of a proof at which the whole tool stands free of part and fixtures, and on its way there.
+
+    slack : mm by which the cutting part may enter the surface
+
+    Returns (n,) bool.
+    """
+    out = np.zeros(len(poses), np.bool_)
+    if not len(poses):
+        return out
+    sides = np.concatenate([cutting.tree.mesh.triangles, fixture_sides(cutting.setup)])
+    for k in np.unique(poses.tool):
+        rows = np.flatnonzero(poses.tool == k)
+        out[rows] = stands_free(sides, cutting.tools[k], cutting.setup, poses.tips[rows], poses.axes[rows],
+                                poses.shift[rows], slack)
+    return out
 
 
 def stands_free(triangles: F64, tool: ToolBody, setup: ProofSetup, tips: F64, axes: F64, shift: F64,
@@ -98,4 +118,4 @@ def _points_in(triangles: F64, low: F64, high: F64) -> F64:
     return np.concatenate([np.zeros((0, 3)), *found])
 
 
-__all__ = ["fixture_sides", "stands_free"]
+__all__ = ["fixture_sides", "free_poses", "stands_free"]

@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.mesh import F64, I32
 from verify.tool_axes import square_to
@@ -35,13 +36,15 @@ class WaysOut:
     mover: I32
 
 
-def ways_out(points: F64, normals: F64, axes: F64, lift: float, most: float, cutting: Cutting) -> WaysOut:
+def ways_out(points: F64, normals: F64, axes: F64, lift: float, most: float, cutting: Cutting,
+             below: NDArray[np.bool_] | None = None) -> WaysOut:
     """The shortest ways that tools can come: from samples through the stock to a cut, or out of the blank.
 
     points, normals : (n, 3) float64, mm and unit, setup frame, on the surface of the part
     axes : (k, 3) float64, unit, setup frame, tip to spindle, axes of the tools, the most used first
     lift : mm, how far off the surface along the normal the ways begin; so much stock does not count
     most : mm; longer ways are not looked for
+    below : (n,) bool, samples to which a tool comes below an overhang: ways to a cut against the axes count; None: none
 
     Returns WaysOut.
 
@@ -67,9 +70,11 @@ def ways_out(points: F64, normals: F64, axes: F64, lift: float, most: float, cut
     length, mover = cutting.way_through_stock(np.ascontiguousarray(start.reshape(-1, 3)),
                                               np.ascontiguousarray(directions.reshape(-1, 3)), most, ROUNDING)
     length, mover = length.reshape(-1, n), mover.reshape(-1, n)
-    below = (directions @ axes.T).max(axis=2) < -BELOW
-    below[0] = False  # the normal is the way of whatever touches the sample
-    length[below] = np.inf
+    against = (directions @ axes.T).max(axis=2) < -BELOW
+    against[0] = False  # the normal is the way of whatever touches the sample
+    if below is not None:
+        against &= ~below | (mover < 0)
+    length[against] = np.inf
     best, row = np.argmin(length, axis=0), np.arange(n)
     return WaysOut(length[best, row], directions[best, row], mover[best, row])
 

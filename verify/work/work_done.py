@@ -19,10 +19,10 @@ from scipy.spatial import cKDTree
 from geometry.mesh import F64, I32
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
 from geometry.mesh_queries.nearest import nearest
-from geometry.sampling import SurfaceSamples
+from geometry.sampling import SurfaceSamples, joined
 from geometry.tool_body import ToolBody
 from verify.findings import Source
-from verify.model import Asked, Finding, FindingKind, ProofSetup, WorkDone
+from verify.model import Asked, Finding, FindingKind, ProofSetup, ScoredSamples, WorkDone
 from verify.moves import Moves
 from verify.surface.sample_scores import proved_samples
 from verify.work.asked_faces import (
@@ -36,8 +36,8 @@ from verify.work.asked_faces import (
     thinned,
     worked_faces,
 )
-from verify.work.own_poses import Poses, poses_at, slid_poses
-from verify.work.standing_room import fixture_sides, stands_free
+from verify.work.below_overhangs import MAX_WAY, left_below
+from verify.work.hidden_faces import hidden_work
 from verify.work.stock_places import StandingStock, stock_findings
 from verify.work.unread_work import UnreadWork
 from verify.work.ways_out import ROUNDING, WaysOut, ways_out
@@ -45,7 +45,6 @@ from verify.work.ways_out import ROUNDING, WaysOut, ways_out
 MAX_TRIED = 12_000  # samples with stock that tools are tried on; the others share the answer of their neighbour
 LEAST_TRIED = 50  # of them on each face
 MAX_WAYS = 1500  # samples whose shortest way out is looked for; the same for the others
-MAX_WAY = 12.0  # mm, longest such way
 LIFT_SHARE = 0.1  # of h: distance at which a tool on an open face touches a sample
 CORNER_SHARE = 0.5  # of h: the same in a corner
 UPRIGHT = float(np.sin(np.radians(3.0)))  # share of the axis in the normal up to which a face counts as a wall
@@ -55,8 +54,6 @@ LEAST_NEAR = 4  # samples that must lie there
 MAX_AXES = 24
 SAME_AXIS = float(np.radians(0.01))
 NOT_IN_PROGRAM, LEFT, UNDERCUT = "not_in_program", "pass", "undercut"  # words of the remainder
-SLID_FROM = 4  # finished samples of its face that a tool is slid from to each of them
-MAX_BELOW = 60  # samples of a face below an overhang that poses are tried on
 BOOL = NDArray[np.bool_]
 INT = NDArray[np.int64]
 
@@ -71,11 +68,11 @@ class _Limits:
     near: float
 
     @classmethod
-    def of(cls, setup: ProofSetup, measured: Measured, facet: float) -> _Limits:
-        """The limits of a proof; facet : mm, as in ``Asked``."""
+    def of(cls, setup: ProofSetup, error: float, facet: float) -> _Limits:
+        """The limits of a proof; error : mm, of a residual against the mesh; facet : mm, as in ``Asked``."""
         h = setup.scallop_height
         lift = max(1.5 * facet, LIFT_SHARE * h)
-        return cls(h, measured.error + facet, lift, max(CORNER_SHARE * h, lift))
+        return cls(h, error + facet, lift, max(CORNER_SHARE * h, lift))
 
     @property
     def face(self) -> float:
@@ -134,7 +131,7 @@ def work_done(asked: Asked, measured: Measured, cutting: Cutting, cut: BOOL, sou
     few = s.subset(tried)
     standing, left, why = _standing(asked, measured, cutting, few, tried, tools, cutting_axes(cutting.moves, used))
     found = np.flatnonzero(left)
-    face = _Limits.of(setup, measured, asked.facet).face
+    face = _Limits.of(setup, measured.error, asked.facet).face
 
     def stands(points: F64, normals: F64) -> BOOL:
         length, _ = cutting.way_through_stock(points, normals, cutting.farthest, OFF_FACETS)
@@ -146,6 +143,17 @@ def work_done(asked: Asked, measured: Measured, cutting: Cutting, cut: BOOL, sou
     near = KeyedPoints(few.face.astype(np.int64), few.points)
     reason[rows] = why[near.nearest(s.face[rows].astype(np.int64), s.points[rows])[:, 0]]
     return WorkDone(s, faces, reason), findings
+
+
+def with_hidden(scored: ScoredSamples, asked: Asked, cutting: Cutting) -> ScoredSamples:
+    """The samples, and those of hidden faces that the program works on; no zone answers for them."""
+    if asked.sample is None:
+        return scored
+    faces = hidden_work(asked.hidden, cutting, _Limits.of(cutting.setup, 0.0, asked.facet).near)
+    if not faces:
+        return scored
+    more = asked.sample(np.flatnonzero(np.isin(cutting.tree.mesh.face_ids, faces)))
+    return ScoredSamples(joined([scored.samples, more]), np.zeros(len(scored.samples) + len(more), np.int32))
 
 
 def _beside(cut: BOOL, source: Source) -> Finding:
@@ -199,7 +207,7 @@ def _tried(rows: INT, face: I32) -> INT:
 def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSamples, tried: INT,
               tools: Sequence[ToolBody], axes: F64) -> tuple[StandingStock, BOOL, NDArray[np.object_]]:
     """Stock on the tried samples, which of them are findings, and why the others are none."""
-    limits = _Limits.of(cutting.setup, measured, asked.facet)
+    limits = _Limits.of(cutting.setup, measured.error, asked.facet)
     along, mover = measured.residual[tried].copy(), measured.mover[tried].copy()
     far = np.flatnonzero(along >= measured.reach * (1.0 - 1e-9))
     along[far], mover[far] = cutting.way_through_stock(few.points[far], few.normals[far], cutting.farthest, OFF_FACETS)
@@ -224,14 +232,16 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     beyond = np.setdiff1d(beyond, touched)
     why[beyond] = asked.touch.reasons(few.subset(beyond), tools, axes)
     below = beyond[(why[beyond] == UNDERCUT) & (height[beyond] > limits.corner)]
-    moved_on = _left_below(measured, few.subset(below), along[below], mover[below], axes, limits, cutting)
-    touched = np.union1d(touched, below[moved_on])
+    fine = (mover[below] >= 0) & _in_fine_steps(few, height, below, limits)
+    below = below[left_below(measured, few.subset(below), along[below], mover[below], fine, axes, limits.h, limits.lift,
+                             limits.near, cutting)]
+    touched = np.union1d(touched, below)
     deep = _missing_depths(few, touched, mover, axes, limits.lift, cutting)
     corner = np.zeros(len(tried), np.bool_)
     corner[touched[np.where(deep.found, deep.length, height[touched]) > limits.corner]] = True
     left |= corner
     rows, aside = _sides(measured, few, tried, height, np.flatnonzero(left), corner, cutting.setup)
-    ways = _ways(few, rows, axes, cutting.setup.stock_allowance + limits.h, cutting)
+    ways = _ways(few, rows, np.isin(rows, below), axes, cutting.setup.stock_allowance + limits.h, cutting)
     way, drilled = ways.length, np.isin(rows, touched[deep.found])
     nearer = (way < height[rows]) & (aside <= ASIDE * way + ASIDE_ROOM)
     left[rows[~drilled & ((nearer & (way <= limits.face)) | (corner[rows] & (way <= limits.corner)))]] = False
@@ -243,54 +253,6 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     height[rows], mover[rows], direction[rows] = (a[deep.found] for a in (deep.length, deep.mover, deep.direction))
     direction -= np.einsum("ij,ij->i", direction, few.normals)[:, None] * few.normals
     return StandingStock(np.where(np.isfinite(height), height, MAX_WAY), mover, direction), left, why
-
-
-def _left_below(measured: Measured, few: SurfaceSamples, along: F64, mover: I32, axes: F64, limits: _Limits,
-                cutting: Cutting) -> BOOL:
-    """Samples below an overhang that a tool of the program touches, moved on from where it cut, (n,) bool.
-
-    along : (n,) float64, mm of stock on their normals; mover : (n,) int32, index, the move that left it
-
-    Each is tried along its normal, along its shortest way out, and from places of its face that are finished. Of more
-    than ``MAX_BELOW`` on a face an even share is tried; each other one shares the answer of the nearest, unless more
-    stands on it.
-    """
-    out, s = np.zeros(len(few), np.bool_), measured.samples
-    sides = np.concatenate([cutting.tree.mesh.triangles, fixture_sides(cutting.setup)])
-    finished = proved_samples(measured.residual, cutting.setup) & (measured.mover >= 0)
-    for face in np.unique(few.face):
-        rows = np.flatnonzero(few.face == face)
-        tried = thinned(rows, MAX_BELOW)
-        near, answer = few.subset(tried), np.zeros(len(tried), np.bool_)
-
-        def ask(poses: Poses, answer: BOOL = answer) -> None:
-            for k in np.unique(poses.tool):
-                mine = poses.only((poses.tool == k) & ~answer[poses.row])
-                answer[mine.row[stands_free(sides, cutting.tools[k], cutting.setup, mine.tips, mine.axes, mine.shift,
-                                            limits.near)]] = True
-
-        ways = ways_out(near.points, near.normals, axes, limits.lift, MAX_WAY, cutting)
-        for way, left, by in ((near.normals, along[tried], mover[tried]), (ways.direction, ways.length, ways.mover)):
-            ask(poses_at(near.points, way, left, by, cutting.moves, cutting.tools, cutting.setup.stock_allowance))
-        good = thinned(np.flatnonzero(finished & (s.face == face)), MAX_BELOW)
-        for poses in _slid(measured, good, near, cutting):
-            ask(poses)
-        of = cKDTree(near.points).query(few.points[rows])[1]
-        out[rows] = answer[of] & (along[rows] <= along[tried[of]] + limits.h)
-    return out
-
-
-def _slid(measured: Measured, good: INT, near: SurfaceSamples, cutting: Cutting) -> list[Poses]:
-    """Poses at samples, slid there from the nearest finished ones of the face, (g,) index, that a tool touched."""
-    s = measured.samples.subset(good)
-    left, by = np.maximum(measured.residual[good], 0.0), measured.mover[good]
-    touched = poses_at(s.points, s.normals, left, by, cutting.moves, cutting.tools, cutting.setup.stock_allowance)
-    touched = touched.only(np.unique(touched.row, return_index=True)[1])
-    if not len(touched):
-        return []
-    of = cKDTree(s.points[touched.row]).query(near.points, k=min(SLID_FROM, len(touched)))[1].reshape(len(near), -1)
-    return [slid_poses(near.points, near.normals, touched.only(column), s.points, s.normals, cutting.tools)
-            for column in of.T]
 
 
 def _shared(few: SurfaceSamples, cutting: Cutting, error: float) -> BOOL:
@@ -403,14 +365,16 @@ def _sides(measured: Measured, few: SurfaceSamples, tried: INT, height: F64, row
     return rows[wanted], np.where(blocked, 0.0, aside)[wanted]
 
 
-def _ways(few: SurfaceSamples, rows: INT, axes: F64, lift: float, cutting: Cutting) -> WaysOut:
+def _ways(few: SurfaceSamples, rows: INT, below: BOOL, axes: F64, lift: float, cutting: Cutting) -> WaysOut:
     """Shortest ways out of the stock on some samples, (r,) index; axes : (k, 3) float64, unit; lift : mm.
+
+    below : (r,) bool, samples to which a tool comes below an overhang
 
     Of more than ``MAX_WAYS`` samples an even share is followed; each other one gets the way of the nearest of its face,
     to the same top: the plane square to that way at its end.
     """
     chosen = thinned(rows, MAX_WAYS)
-    ways = ways_out(few.points[chosen], few.normals[chosen], axes, lift, MAX_WAY, cutting)
+    ways = ways_out(few.points[chosen], few.normals[chosen], axes, lift, MAX_WAY, cutting, below[np.isin(rows, chosen)])
     if len(chosen) == len(rows):
         return ways
     near = KeyedPoints(few.face[chosen].astype(np.int64), few.points[chosen])

@@ -1,14 +1,12 @@
 """What mills touch on the ways of their own program: slots as wide as the mill."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from geometry.mesh_queries.bvh import TriangleTree
-from geometry.tool_body import ToolBody
-from service.verification.own_ways import MillWays, ceilings_worked, touched_on_ways
+from service.verification.own_ways import MillWays, touched_on_ways
 from tests.hand_parts import prism, terraces, tool
 from zones.reach.assembly import Clearances
 
@@ -56,19 +54,3 @@ def test_a_ball_comes_down_a_groove_of_its_own_radius_and_an_allowance_stays():
     assert touched_on_ways(groove, low, tool(4.0, 2.0), upper, UP, CLEAR, 0.02, 0.0).all()
     assert touched_on_ways(groove, low, tool(4.0, 2.0), upper, UP, CLEAR, 0.02, 0.1).all()
     assert not touched_on_ways(groove, low, tool(4.6, 2.3), upper, UP, CLEAR, 0.02, 0.0).any()
-
-
-# a groove 2 deep, 3 <= z <= 4, in the side x = 10 of a block; prism along Y, -6 to 6
-GROOVE = prism([(0, 0), (10, 0), (10, 3), (8, 3), (8, 4), (10, 4), (10, 6), (0, 6)],
-               [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 7), (4, 5, 6), (4, 6, 7)], 6.0).mesh
-CUTTER = ToolBody("T1", 1, 8.0, 0.0, 1.0, 3.0, 20.0, 8.0, 30.0)
-ROOF = 5
-
-
-@pytest.mark.parametrize(("x", "z", "cutter", "found"), [
-    (12.0, 3.0, CUTTER, True), (13.0, 3.0, CUTTER, True), (12.0, 2.8, CUTTER, True), (16.0, 3.0, CUTTER, False),
-    (12.0, 6.0, CUTTER, False), (12.0, -9.0, CUTTER, False), (12.0, 3.0, replace(CUTTER, neck_diameter=7.9), False)])
-def test_a_ceiling_is_asked_where_the_flutes_of_a_thin_neck_end_below_it(x, z, cutter, found):
-    own = {1: ways((x, -9.0, z), (x, 9.0, z))}
-    assert ceilings_worked(GROOVE, [cutter], own) == ((ROOF,) if found else ())
-    assert ceilings_worked(GROOVE, [replace(cutter, number=2)], own) == ()

@@ -11,6 +11,7 @@ from verify.moves import Moves
 from verify.tool_axes import ToolAxes
 from verify.work.own_poses import poses_at, slid_poses
 
+SIDEWAYS = np.array([[0.0, -1.0, 0.0]])
 SLOT = ToolBody("T1", 1, 8.0, 0.0, 1.0, 3.0, 20.0, 8.0, 30.0)
 
 
@@ -29,8 +30,9 @@ def turned(angle):
 
 def at(points, ways, left, way_of, tools, allowance=0.0):
     n = len(points)
-    return poses_at(np.array(points, float), np.array(ways, float), np.array(left, float), np.zeros(n, np.int32),
-                    way_of, tools, allowance)
+    ways = np.array(ways, float)
+    return poses_at(np.array(points, float), ways, ways, np.array(left, float), np.zeros(n, np.int32), way_of, tools,
+                    allowance)
 
 
 @pytest.mark.parametrize("allowance", [0.0, 0.3])
@@ -61,7 +63,7 @@ def test_what_no_pose_is_made_of():
     assert not len(at([[5.0, 8.0, 3.4]], [[0.0, -1.0, 0.0]], [9.0], way, [SLOT])), "wider than the tool"
     assert not len(at([[5.0, 0.0, 3.4]], [[0.0, -1.0, 0.0]], [0.5], way, [SLOT])), "another move left it"
     nobody = np.array([-1], np.int32)
-    assert not len(poses_at(np.zeros((1, 3)), np.array([[0.0, -1.0, 0.0]]), np.ones(1), nobody, way, [SLOT], 0.0))
+    assert not len(poses_at(np.zeros((1, 3)), SIDEWAYS, SIDEWAYS, np.ones(1), nobody, way, [SLOT], 0.0))
 
 
 def test_a_side_that_leans_too_little_turns_about_what_it_touches():
