@@ -41,6 +41,7 @@ class Poses:
     tips  : (k, 3) float64, mm; axes : (k, 3) float64, unit, tip to spindle
     shift : (k, 3) float64, mm, from where the program had the tool
     edge  : (k,) bool, whether it touches a slope with an edge, which finishes slopes in steps alone
+    turned : (k,) bool, whether it has another axis than the program gave the tool
     """
 
     row: INT
@@ -49,14 +50,15 @@ class Poses:
     axes: F64
     shift: F64
     edge: NDArray[np.bool_]
+    turned: NDArray[np.bool_]
 
     def __len__(self) -> int:
         return len(self.row)
 
     def only(self, chosen: NDArray[np.bool_] | INT) -> Poses:
-        """The poses of a mask or of rows."""
+        """The poses that are chosen: (k,) bool, or their rows, (r,) int64, index."""
         return Poses(self.row[chosen], self.tool[chosen], self.tips[chosen], self.axes[chosen], self.shift[chosen],
-                     self.edge[chosen])
+                     self.edge[chosen], self.turned[chosen])
 
 
 def poses_at(points: F64, normals: F64, ways: F64, left: F64, mover: I32, moves: Moves, tools: Sequence[ToolBody],
@@ -84,22 +86,23 @@ def poses_at(points: F64, normals: F64, ways: F64, left: F64, mover: I32, moves:
             continue
         up = abs(float(normals[row] @ axis))
         edge = UPRIGHT < up < LEVEL and float(side @ -normals[row]) < EDGE
-        out.append((row, tip - on * way, axis, -on * way, edge))
+        out.append((row, tip - on * way, axis, -on * way, edge, False))
         if moves.axes is not None and (turn := _turn(side, -way)) is not None:
             touch, leaning = points[row] + left[row] * way, turn @ axis
             turned = touch + turn @ (tip - touch) - on * way
             edge = float((turn @ side) @ -normals[row]) < EDGE
-            out.append((row, turned, leaning, -on * way, edge))
+            out.append((row, turned, leaning, -on * way, edge, True))
             # the end has swung towards a floor below: a side touches as well farther up
             lift = 2.0 * tool.widest_radius * float(np.linalg.norm(leaning - axis))
             if abs(side @ axis) < SIDE and (touch - tip) @ axis > tool.end_height + lift:
-                out.append((row, turned + lift * leaning, leaning, -on * way, edge))
+                out.append((row, turned + lift * leaning, leaning, -on * way, edge, True))
     if not out:
         none, nowhere = np.zeros(0, np.int64), np.zeros((0, 3))
-        return Poses(none, none, nowhere, nowhere, nowhere, np.zeros(0, np.bool_))
+        return Poses(none, none, nowhere, nowhere, nowhere, none > 0, none > 0)
     rows = np.array([p[0] for p in out], np.int64)
     tips, axes, shift = (np.array([p[k] for p in out], np.float64) for k in (1, 2, 3))
-    return Poses(rows, moves.tool[mover[rows]].astype(np.int64), tips, axes, shift, np.array([p[4] for p in out]))
+    on_edge, turns = (np.array([p[k] for p in out], np.bool_) for k in (4, 5))
+    return Poses(rows, moves.tool[mover[rows]].astype(np.int64), tips, axes, shift, on_edge, turns)
 
 
 def slid_poses(points: F64, normals: F64, touched: Poses, places: F64, place_normals: F64,
@@ -132,7 +135,7 @@ def slid_poses(points: F64, normals: F64, touched: Poses, places: F64, place_nor
     at = rise - np.einsum("ij,ij->i", arm, axes)  # height of the touch over the tip, once that does not rise
     level = (np.abs(np.einsum("ij,ij->i", normals, axes)) < SIDE) & (at >= lowest) & (at <= highest)
     tips = tips - np.where(level, rise, 0.0)[:, None] * axes
-    return Poses(np.arange(len(points)), touched.tool, tips, axes, tips - touched.tips, touched.edge)
+    return Poses(np.arange(len(points)), touched.tool, tips, axes, tips - touched.tips, touched.edge, touched.turned)
 
 
 def _at(point: F64, move: int, moves: Moves, tool: ToolBody) -> tuple[F64, F64, F64 | None]:

@@ -40,13 +40,18 @@ def free_poses(poses: Poses, cutting: Cutting, slack: float) -> BOOL:
     slack : mm by which the cutting part may enter the surface
 
     Returns (n,) bool.
+
+    A tool that nowhere gets thinner upwards stands in what hangs over the place that it touches, so it is not asked
+    with the axes of the program.
     """
     out = np.zeros(len(poses), np.bool_)
-    if not len(poses):
+    thinner = np.array([_gets_thinner(t, cutting.setup, slack) for t in cutting.tools], np.bool_)
+    asked = poses.turned | thinner[poses.tool]
+    if not asked.any():
         return out
     sides = np.concatenate([cutting.tree.mesh.triangles, fixture_sides(cutting.setup)])
-    for k in np.unique(poses.tool):
-        rows = np.flatnonzero(poses.tool == k)
+    for k in np.unique(poses.tool[asked]):
+        rows = np.flatnonzero(asked & (poses.tool == k))
         out[rows] = stands_free(sides, cutting.tools[k], cutting.setup, poses.tips[rows], poses.axes[rows],
                                 poses.shift[rows], slack)
     return out
@@ -78,6 +83,11 @@ def stands_free(triangles: F64, tool: ToolBody, setup: ProofSetup, tips: F64, ax
                 out[k], hint = False, met
                 break
     return out
+
+
+def _gets_thinner(tool: ToolBody, setup: ProofSetup, slack: float) -> bool:
+    """Whether a body over the flutes, its clearance included, is thinner than these by more than ``slack``, mm."""
+    return bool(Bodies.of([tool], setup).rows[:, 2:4].min(initial=np.inf) < tool.widest_radius - slack)
 
 
 def fixture_sides(setup: ProofSetup) -> F64:
