@@ -18,7 +18,7 @@ from verify.work.own_poses import Poses, poses_at, slid_poses
 from verify.work.standing_room import free_poses
 from verify.work.ways_out import ways_out
 
-MAX_TRIED = 60  # samples of a face that poses are tried on, and finished ones that tools are slid from
+MAX_TRIED = 120  # samples of a face that poses are tried on, and finished ones that tools are slid from
 SLID_FROM = 4  # finished samples, the nearest ones, that a tool is slid from to each
 MAX_WAY = 12.0  # mm, longest way out that is looked for
 BOOL = NDArray[np.bool_]

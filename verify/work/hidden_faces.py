@@ -14,11 +14,12 @@ import numpy as np
 
 from geometry.sampling import sample_surface
 from verify.surface.removal import residual_on_normals
-from verify.work.asked_faces import OFF_FACETS, WORKED_SHARE, Cutting
+from verify.work.asked_faces import OFF_FACETS, WORKED_SHARE, Cutting, thinned
 from verify.work.own_poses import poses_at
 from verify.work.standing_room import free_poses
 
 PLACES = 100  # of each face
+POSED = 25  # of them, evenly chosen, to which tools are moved on
 
 
 def hidden_work(hidden: Collection[int], cutting: Cutting, slack: float) -> tuple[int, ...]:
@@ -36,28 +37,28 @@ def hidden_work(hidden: Collection[int], cutting: Cutting, slack: float) -> tupl
     """
     mesh, moves = cutting.tree.mesh, cutting.moves
     feeds = np.flatnonzero(moves.feed)
-    faces = [n for n in sorted(hidden) if (mesh.face_ids == n).any()]
-    if not faces or not len(feeds):
+    chosen = np.flatnonzero(np.isin(mesh.face_ids, list(hidden)))
+    if not len(chosen) or not len(feeds):
         return ()
-    one = [sample_surface(mesh, PLACES / float(mesh.areas[mesh.face_ids == n].sum()),
-                          triangles=np.flatnonzero(mesh.face_ids == n)) for n in faces]
+    chosen = chosen[np.argsort(mesh.face_ids[chosen], kind="stable")]
+    each = np.split(chosen, np.flatnonzero(np.diff(mesh.face_ids[chosen])) + 1)
+    one = [sample_surface(mesh, PLACES / float(mesh.areas[t].sum()), triangles=t) for t in each]
     points, normals = (np.concatenate([getattr(s, name) for s in one]) for name in ("points", "normals"))
     face = np.concatenate([s.face for s in one])
     most = 2.0 * max(cutting.tools[k].widest_radius for k in np.unique(moves.tool[feeds]))
     initial = np.minimum(*cutting.blank_on_rays(points, normals, most, OFF_FACETS))
     left, by = residual_on_normals(points, normals, initial, moves.only(feeds), cutting.tools, threads=cutting.threads)
     total, cut = np.bincount(face), np.bincount(face[by >= 0], minlength=int(face.max()) + 1)
-    rows = np.flatnonzero((by >= 0) & (cut >= WORKED_SHARE * total)[face])
-    if not len(rows):
-        return ()
-    poses = poses_at(points[rows], normals[rows], normals[rows], np.maximum(left[rows], 0.0),
-                     feeds[by[rows]].astype(np.int32), moves, cutting.tools, cutting.setup.stock_allowance)
-    held = np.zeros(len(rows), np.bool_)
-    for n in np.unique(face[rows]):
-        mine = poses.only(face[rows[poses.row]] == n)
-        held[mine.row[free_poses(mine, cutting, slack)]] = True
-    touched = np.bincount(face[rows[held]], minlength=len(total))
-    return tuple(n for n in faces if touched[n] >= WORKED_SHARE * total[n])
+    worked = np.flatnonzero(cut >= np.maximum(WORKED_SHARE * total, 1))
+    rows = [thinned(np.flatnonzero((by >= 0) & (face == n)), POSED) for n in worked]
+    out = list[int]()
+    for n, mine in zip(worked.tolist(), rows, strict=True):
+        poses = poses_at(points[mine], normals[mine], normals[mine], np.maximum(left[mine], 0.0),
+                         feeds[by[mine]].astype(np.int32), moves, cutting.tools, cutting.setup.stock_allowance)
+        held = np.unique(poses.row[free_poses(poses, cutting, slack)])
+        if len(held) / len(mine) * cut[n] >= WORKED_SHARE * total[n]:
+            out.append(n)
+    return tuple(out)
 
 
 __all__ = ["hidden_work"]

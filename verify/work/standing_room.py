@@ -4,8 +4,9 @@ Kernels of reach take every body as going on upwards without end, since tools co
 overhang does not: its neck is free where its flutes would not be. Here the tool stands as it is, up to the top of its
 holder or of the spindle.
 
-Points of the surface decide, ``APART`` from each other at most. A body of radius r that enters a flat wall by t leaves
-a mark as wide as 2 sqrt(2 r t): 0.2 mm for 5 um and 1 mm. Coordinates are float64, mm, in the frame of the proof.
+Points of the surface decide, ``APART`` from each other at most round the cutting part and the neck, and ``FAR_APART``
+round shank and holder. A body of radius r that enters a flat wall by t leaves a mark as wide as 2 sqrt(2 r t): 0.2 mm
+for 5 um and 1 mm. Coordinates are float64, mm, in the frame of the proof.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from verify.work.asked_faces import Cutting
 from verify.work.own_poses import Poses
 
 CHORDS = 32  # of a round corner
-APART = 0.1  # mm between points of the surface
+APART, FAR_APART = 0.1, 0.5  # mm between points of the surface
 MAX_POINTS = 300_000  # where more are near, they are farther apart
 WAY_STEP = 0.1  # mm between places on the way
 MAX_STEPS = 10
@@ -71,9 +72,9 @@ def stands_free(triangles: F64, tool: ToolBody, setup: ProofSetup, tips: F64, ax
     if not len(tips):
         return np.zeros(0, np.bool_)
     frusta = _frusta(tool, setup, setup.stock_allowance - slack)
-    low, high, wide = float(frusta[:, 0].min()), float(frusta[:, 1].max()), float(frusta[:, 2:].max())
-    ends = np.stack([tips + z * axes - s * shift for z in (low, high) for s in (0.0, 1.0)])
-    points = _points_in(triangles, ends.min(axis=(0, 1)) - wide, ends.max(axis=(0, 1)) + wide)
+    head = frusta[frusta[:, 0] < max(tool.flute_length, tool.neck_length)]
+    points = np.concatenate([_points_round(triangles, head, tips, axes, shift, APART),
+                             _points_round(triangles, frusta, tips, axes, shift, FAR_APART)])
     out, hint = np.ones(len(tips), np.bool_), -1
     for k, (tip, axis, way) in enumerate(zip(tips, axes, shift, strict=True)):
         steps = min(max(round(float(np.linalg.norm(way)) / WAY_STEP), 1), MAX_STEPS)
@@ -107,12 +108,16 @@ def _frusta(tool: ToolBody, setup: ProofSetup, grow: float) -> F64:
     return np.array([*cutter, *Bodies.of([tool], setup).rows[:, :4].tolist()])
 
 
-def _points_in(triangles: F64, low: F64, high: F64) -> F64:
-    """Points of triangles (t, 3, 3) within a box, (n, 3), ``APART`` from each other or as near as ``MAX_POINTS`` lets.
+def _points_round(triangles: F64, frusta: F64, tips: F64, axes: F64, shift: F64, apart: float) -> F64:
+    """Points of triangles in the box round frusta at all poses and ways, (n, 3), at most ``apart`` mm from each other.
 
     The longest side of each triangle is halved until it is as short as that; what lies outside of the box goes first.
+    Of more than ``MAX_POINTS`` the distance is doubled.
     """
-    found, rest, apart = list[F64](), triangles, APART
+    wide = float(frusta[:, 2:].max())
+    ends = np.stack([tips + z * axes - s * shift for z in (frusta[:, 0].min(), frusta[:, 1].max()) for s in (0.0, 1.0)])
+    low, high = ends.min(axis=(0, 1)) - wide, ends.max(axis=(0, 1)) + wide
+    found, rest = [np.zeros((0, 3))], triangles
     while len(rest):
         rest = rest[((rest.max(axis=1) >= low) & (rest.min(axis=1) <= high)).all(axis=1)]
         if len(rest) + sum(map(len, found)) > MAX_POINTS:
@@ -125,7 +130,7 @@ def _points_in(triangles: F64, low: F64, high: F64) -> F64:
         a, b, c = (rest[row, (first + k) % 3] for k in range(3))
         middle = 0.5 * (a + b)
         rest = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
-    return np.concatenate([np.zeros((0, 3)), *found])
+    return np.concatenate(found)
 
 
 __all__ = ["fixture_sides", "free_poses", "stands_free"]

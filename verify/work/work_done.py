@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from geometry.mesh import F64, I32
 from geometry.mesh_queries.keyed_nearest import KeyedPoints
@@ -37,6 +36,7 @@ from verify.work.asked_faces import (
     worked_faces,
 )
 from verify.work.below_overhangs import MAX_WAY, left_below
+from verify.work.fine_steps import in_fine_steps
 from verify.work.hidden_faces import hidden_work
 from verify.work.stock_places import StandingStock, stock_findings
 from verify.work.unread_work import UnreadWork
@@ -49,8 +49,6 @@ LIFT_SHARE = 0.1  # of h: distance at which a tool on an open face touches a sam
 CORNER_SHARE = 0.5  # of h: the same in a corner
 UPRIGHT = float(np.sin(np.radians(3.0)))  # share of the axis in the normal up to which a face counts as a wall
 SHARED = 0.02  # of the allowance: where its end is nearer to another face by more, that face has it too
-STEPS_WITHIN = 0.5  # mm: stock is even to the scallop height within this where steps are fine
-LEAST_NEAR = 4  # samples that must lie there
 MAX_AXES = 24
 SAME_AXIS = float(np.radians(0.01))
 NOT_IN_PROGRAM, LEFT, UNDERCUT = "not_in_program", "pass", "undercut"  # words of the remainder
@@ -225,14 +223,15 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     tight = high[~left[high]]
     touched = tight[reached(tight, limits.near, 0.0)]
     beyond = np.setdiff1d(tight, touched)
-    fine = (mover[beyond] >= 0) & _in_fine_steps(few, height, beyond, limits)
+    uneven = limits.h + 2.0 * limits.error
+    fine = in_fine_steps(few, height, mover, beyond, uneven, measured, cutting)
     touched = np.union1d(touched, beyond[asked.touch.on_ways(few.subset(beyond), tools, axes, limits.near, fine)])
     stepped = np.setdiff1d(beyond[fine], touched)
     touched = np.union1d(touched, stepped[asked.touch.edges(few.subset(stepped), tools, axes, limits.near)])
     beyond = np.setdiff1d(beyond, touched)
     why[beyond] = asked.touch.reasons(few.subset(beyond), tools, axes)
     below = beyond[(why[beyond] == UNDERCUT) & (height[beyond] > limits.corner)]
-    fine = (mover[below] >= 0) & _in_fine_steps(few, height, below, limits)
+    fine = in_fine_steps(few, height, mover, below, uneven, measured, cutting)
     below = below[left_below(measured, few.subset(below), along[below], mover[below], fine, axes, limits.h, limits.lift,
                              limits.near, cutting)]
     touched = np.union1d(touched, below)
@@ -266,23 +265,6 @@ def _shared(few: SurfaceSamples, cutting: Cutting, error: float) -> BOOL:
         return np.zeros(len(few), np.bool_)
     ends = few.points + allowance * few.normals
     return np.asarray(nearest(cutting.tree, ends)[0] < allowance - max(SHARED * allowance, 2.0 * error))
-
-
-def _in_fine_steps(few: SurfaceSamples, height: F64, rows: INT, limits: _Limits) -> BOOL:
-    """Whether the stock round some samples, (r,) index, is even to the scallop height, as fine steps leave it.
-
-    height : (n,) float64, mm over the allowance, at all samples
-    """
-    out = np.zeros(len(rows), np.bool_)
-    for face in np.unique(few.face[rows]).tolist():
-        known = np.flatnonzero((few.face == face) & np.isfinite(height))
-        mine = np.flatnonzero(few.face[rows] == face)
-        if not len(known):
-            continue
-        around = cKDTree(few.points[known]).query_ball_point(few.points[rows[mine]], STEPS_WITHIN)
-        out[mine] = [len(near) >= LEAST_NEAR and bool(np.ptp(height[known[near]]) <= limits.h + 2.0 * limits.error)
-                     for near in around]
-    return out
 
 
 @dataclass(frozen=True, eq=False)
