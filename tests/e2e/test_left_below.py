@@ -1,4 +1,4 @@
-"""Stock that programs leave below overhangs where their own tools could have cut it; depths in closed form."""
+"""Stock that programs leave where their own tools could have cut it, but no tool has room; depths in closed form."""
 
 import json
 import math
@@ -93,3 +93,25 @@ def test_a_flank_that_leans_too_little_leaves_a_wedge(tmp_path, lean, state, sto
     if state == "clean":
         lowest = 4.0 * math.tan(LEAN - a) / math.cos(LEAN)  # at the foot; the end of the tool stays a little above
         assert all(0.5 * lowest < depth < lowest + 0.003 for depth in heights(report).values()) and heights(report)
+
+
+KEYWAY = {"tools": [{"id": "T1", "number": 1, "kind": "flat", "diameter_mm": 4, "flute_length_mm": 8,
+                     "stickout_mm": 25}],
+          "stock": {"kind": "box", "box_mm": [[0, 0, 0], [16, 12, 6]], "uncertainty_mm": 0.0}}
+
+
+@pytest.mark.parametrize(("to", "state"), [(13.0, "proved"), (8.0, "clean")])
+def test_a_keyway_as_wide_as_its_mill_is_asked_to_its_end(tmp_path, to, state):
+    """14 x 4, 3 deep, from X3 to X13; a mill of 4 mm ramps down to Z3 between X3 and X ``to``."""
+    cq = pytest.importorskip("cadquery")
+    shape = cq.Workplane().box(16, 12, 6, centered=False)
+    shape = shape.cut(cq.Workplane().center(8, 6).slot2D(14, 4).extrude(6).translate((0, 0, 3)))
+    lines = ["G21 G17 G90 G94 G40 G49 G80 G64 P0.001", "G54", "T1 M6", "S6000 M3", "G0 X3 Y6", "G43 H1 Z30", "G0 Z6.5",
+             "G1 Z6 F200"]
+    for k in range(1, 21):
+        lines += [f"G1 X{to if k % 2 else 3.0} Z{6.0 - 0.15 * k:.4f} F200"]
+    lines += [f"G1 X{to}", "G1 X3", "G0 Z30", "M5", "G53 G0 Z0", "M2"]
+    report = proof(tmp_path, shape, KEYWAY, lines)
+    assert report["state"] == state, report["findings"][:2]
+    if state == "clean":
+        assert max(heights(report).values()) == pytest.approx(3.0, abs=0.02)

@@ -55,7 +55,7 @@ def hidden_work(hidden: Collection[int], cutting: Cutting, slack: float) -> tupl
     for n, mine in zip(worked.tolist(), rows, strict=True):
         poses = poses_at(points[mine], normals[mine], normals[mine], np.maximum(left[mine], 0.0),
                          feeds[by[mine]].astype(np.int32), moves, cutting.tools, cutting.setup.stock_allowance)
-        held = np.unique(poses.row[free_poses(poses, cutting, slack)])
+        held = np.unique(poses.row[free_poses(poses, np.ones(len(poses), np.bool_), cutting, slack)])
         if len(held) / len(mine) * cut[n] >= WORKED_SHARE * total[n]:
             out.append(n)
     return tuple(out)

@@ -35,19 +35,20 @@ SIDES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 
 BOOL = NDArray[np.bool_]
 
 
-def free_poses(poses: Poses, cutting: Cutting, slack: float) -> BOOL:
+def free_poses(poses: Poses, hidden: BOOL, cutting: Cutting, slack: float) -> BOOL:
     """Poses of tools of a proof at which the whole tool stands free of part and fixtures, and on its way there.
 
+    hidden : (n,) bool, whether something hangs over the place that is touched
     slack : mm by which the cutting part may enter the surface
 
     Returns (n,) bool.
 
     A tool that nowhere gets thinner upwards stands in what hangs over the place that it touches, so it is not asked
-    with the axes of the program.
+    there with the axes of the program.
     """
     out = np.zeros(len(poses), np.bool_)
     thinner = np.array([_gets_thinner(t, cutting.setup, slack) for t in cutting.tools], np.bool_)
-    asked = poses.turned | thinner[poses.tool]
+    asked = ~hidden | poses.turned | thinner[poses.tool]
     if not asked.any():
         return out
     sides = np.concatenate([cutting.tree.mesh.triangles, fixture_sides(cutting.setup)])

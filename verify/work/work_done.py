@@ -35,9 +35,9 @@ from verify.work.asked_faces import (
     thinned,
     worked_faces,
 )
-from verify.work.below_overhangs import MAX_WAY, left_below
 from verify.work.fine_steps import in_fine_steps
 from verify.work.hidden_faces import hidden_work
+from verify.work.moved_tools import MAX_WAY, touched_on_from
 from verify.work.stock_places import StandingStock, stock_findings
 from verify.work.unread_work import UnreadWork
 from verify.work.ways_out import ROUNDING, WaysOut, ways_out
@@ -51,7 +51,7 @@ UPRIGHT = float(np.sin(np.radians(3.0)))  # share of the axis in the normal up t
 SHARED = 0.02  # of the allowance: where its end is nearer to another face by more, that face has it too
 MAX_AXES = 24
 SAME_AXIS = float(np.radians(0.01))
-NOT_IN_PROGRAM, LEFT, UNDERCUT = "not_in_program", "pass", "undercut"  # words of the remainder
+NOT_IN_PROGRAM, LEFT, UNDERCUT, CORNER = "not_in_program", "pass", "undercut", "corner"  # words of the remainder
 BOOL = NDArray[np.bool_]
 INT = NDArray[np.int64]
 
@@ -230,10 +230,10 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     touched = np.union1d(touched, stepped[asked.touch.edges(few.subset(stepped), tools, axes, limits.near)])
     beyond = np.setdiff1d(beyond, touched)
     why[beyond] = asked.touch.reasons(few.subset(beyond), tools, axes)
-    below = beyond[(why[beyond] == UNDERCUT) & (height[beyond] > limits.corner)]
+    below = beyond[np.isin(why[beyond], (UNDERCUT, CORNER)) & (height[beyond] > limits.corner)]
     fine = in_fine_steps(few, height, mover, below, uneven, measured, cutting)
-    below = below[left_below(measured, few.subset(below), along[below], mover[below], fine, axes, limits.h, limits.lift,
-                             limits.near, cutting)]
+    below = below[touched_on_from(measured, few.subset(below), why[below] == UNDERCUT, along[below], mover[below], fine,
+                                  axes, limits.h, limits.lift, limits.near, cutting)]
     touched = np.union1d(touched, below)
     deep = _missing_depths(few, touched, mover, axes, limits.lift, cutting)
     corner = np.zeros(len(tried), np.bool_)

@@ -1,6 +1,7 @@
-"""Stock below overhangs, which no axis looks at: whether the tools of a program could have cut it.
+"""Stock below overhangs and in slots as wide as a mill: whether the tools of a program could have cut it.
 
-They are moved on from where the program had them (``verify.work.own_poses``). Theory: docs/theory/work-done.md.
+No tool has room beside such places, so they are not known from the part alone. Tools are moved on from where the
+program had them (``verify.work.own_poses``). Theory: docs/theory/work-done.md.
 Coordinates are float64, mm, in the frame of the proof.
 """
 
@@ -25,11 +26,12 @@ BOOL = NDArray[np.bool_]
 INT = NDArray[np.int64]
 
 
-def left_below(measured: Measured, few: SurfaceSamples, along: F64, mover: I32, fine: BOOL, axes: F64, scallop: float,
-               lift: float, slack: float, cutting: Cutting) -> BOOL:
+def touched_on_from(measured: Measured, few: SurfaceSamples, hidden: BOOL, along: F64, mover: I32, fine: BOOL,
+                    axes: F64, scallop: float, lift: float, slack: float, cutting: Cutting) -> BOOL:
     """Samples that a tool of the program touches, moved on from where it cut.
 
     few   : SurfaceSamples, n of them, setup frame
+    hidden : (n,) bool, whether something hangs over them
     along : (n,) float64, mm of stock on their normals; mover : (n,) int32, index, the move that left it
     fine  : (n,) bool, whether fine steps left it, as edges finish slopes
     axes  : (k, 3) float64, unit, setup frame, tip to spindle, axes that the program cuts with
@@ -55,7 +57,7 @@ def left_below(measured: Measured, few: SurfaceSamples, along: F64, mover: I32, 
                       _moved_on(near, ways.direction, ways.length, ways.mover, cutting),
                       *_slid(measured, good, near, cutting)):
             asked = poses.only(~answer[poses.row] & (~poses.edge | fine[tried[poses.row]]))
-            answer[asked.row[free_poses(asked, cutting, slack)]] = True
+            answer[asked.row[free_poses(asked, hidden[tried[asked.row]], cutting, slack)]] = True
         of = cKDTree(near.points).query(few.points[rows])[1]
         out[rows] = answer[of] & (along[rows] <= along[tried[of]] + scallop)
     return out
@@ -79,4 +81,4 @@ def _slid(measured: Measured, good: INT, near: SurfaceSamples, cutting: Cutting)
             for column in of.T]
 
 
-__all__ = ["MAX_WAY", "left_below"]
+__all__ = ["MAX_WAY", "touched_on_from"]
