@@ -275,8 +275,10 @@ def stands_behind_taps(rng: Rng) -> Case:
     cycle = f"{choice(rng, 'G98', 'G99')} {choice(rng, 'G84', 'G74')} R{SAFE - 1.0:g}. Z{SAFE - 3.0:g}. F500."
     lines = [*(["M29 S500"] * rigid), cycle, "G80", f"G0 Z{SAFE:g}."]
     if dialect == "heidenhain":
-        lines = [f"L Z+{SAFE:g} R0 FMAX", f"CYCL DEF {choice(rng, '207', '209')} TAPPING Q200=1 Q201=-2 Q239=+1 "
-                 f"Q203=+{SAFE - 3:g} Q204=2 Q257=1 Q256=0", "CYCL CALL", f"L Z+{SAFE:g} R0 FMAX"]
+        number = choice(rng, "207", "209")
+        breaks = " Q257=1 Q256=0" if number == "209" else ""
+        lines = [f"L Z+{SAFE:g} R0 FMAX", f"CYCL DEF {number} TAPPING Q200=1 Q201=-2 Q239=+1 "
+                 f"Q203=+{SAFE - 3:g} Q204=2{breaks}", "CYCL CALL", f"L Z+{SAFE:g} R0 FMAX"]
     s.ops[2:2] = [Op("raw", text=line) for line in lines]
     return made("stands behind taps", part, s, ("program",), None, None, {"machine": {"dialects": [dialect]}}, dialect,
                 word="spindle")

@@ -95,6 +95,31 @@ def test_a_flank_that_leans_too_little_leaves_a_wedge(tmp_path, lean, state, sto
         assert all(0.5 * lowest < depth < lowest + 0.003 for depth in heights(report).values()) and heights(report)
 
 
+@pytest.mark.parametrize(("lean", "state"), [(20.0, "proved"), (17.0, "clean")])
+def test_a_flank_on_a_drafted_wall_leaves_a_wedge_too(tmp_path, lean, state):
+    """The wall leans back by 20 degrees with 0.3 mm of stock on it; the flank touches its foot."""
+    cq = pytest.importorskip("cadquery")
+
+    def wall(more):
+        more = more / math.cos(LEAN)
+        outline = [(0, 0), (12, 0), (12, 6), (6.0 + 4.0 * math.tan(LEAN) - more, 6), (6.0 - more, 2), (0, 2)]
+        return cq.Workplane("YZ").polyline(outline).close().extrude(8)
+
+    blank, a = write_step(wall(0.3), tmp_path / "blank.step"), math.radians(lean)
+    z = 2.0 + 2.0 * math.sin(a) + 0.005
+    y = 6.0 - (2.0 + (2.0 - z) * math.sin(a)) / math.cos(a)
+    setup = {"tools": [dict(MILL, flute_length_mm=10)],
+             "stock": {"kind": "step", "step_file": str(blank), "uncertainty_mm": 0.0},
+             "machine": {"kind": "5-axis", "kinematics": "table-table-AC", "dialects": ["linuxcnc"], "iso_axes": []}}
+    lines = ["G21 G90 G17 G94 G40 G49 G54 G61", "G53 G0 Z0", "G0 A0 C0", "T1 M6", "S8000 M3", "G0 X-6 Y-6",
+             "G43 H1 Z60", "M428", f"G0 A{lean} C0", f"G0 X-6 Y-8 Z{z:.4f}", f"G0 Y{y:.5f}", "G1 X14 F150",
+             "G0 Y-8", "G0 Z60", "G0 A0 C0", "M429", "G53 G0 Z0", "M5", "M30"]
+    report = proof(tmp_path, wall(0.0), setup, lines, blank)
+    assert report["state"] == state, report["findings"][:2]
+    if state == "clean":
+        assert max(heights(report).values()) == pytest.approx(4.0 / math.cos(LEAN) * math.sin(LEAN - a), rel=0.1)
+
+
 KEYWAY = {"tools": [{"id": "T1", "number": 1, "kind": "flat", "diameter_mm": 4, "flute_length_mm": 8,
                      "stickout_mm": 25}],
           "stock": {"kind": "box", "box_mm": [[0, 0, 0], [16, 12, 6]], "uncertainty_mm": 0.0}}

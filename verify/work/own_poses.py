@@ -26,6 +26,7 @@ CHORDS = 32  # of a round corner
 PLACES = 64  # parts of a move in which the place of the tool is looked for, and again of two of them
 ON_TOOL = 0.02  # mm: a point farther from the cutting part was left by another move
 UPRIGHT, LEVEL = math.sin(math.radians(3.0)), math.cos(math.radians(3.0))  # between them a face is a slope
+UPRIGHT_TOOL = math.cos(math.radians(0.5))  # part of Z in an axis that leans for no wall
 SIDE = 0.1  # share of the axis in the normal of a side
 EDGE = math.cos(math.radians(6.0))  # between a face and the tool where it touches: chords of a corner turn by 3
 MAX_LEAN = math.radians(20.0)  # by which the axis may turn towards the face
@@ -71,9 +72,9 @@ def poses_at(points: F64, normals: F64, ways: F64, left: F64, mover: I32, moves:
     mover  : (n,) int32, index, the move; -1 for none
     allowance : mm that may stay
 
-    Returns Poses. Where axes turn in the program, a place has a second one, with the tool turned about the point that
-    touches until its side lies against the way, by 20 degrees at most: a side that leans too little has left a wedge.
-    It has a third one a little farther up, since the end swings.
+    Returns Poses. Where the tool leans in the program, a place has a second one, with the tool turned about the point
+    that touches until its side lies against the way, by 20 degrees at most: a side that leans too little has left a
+    wedge. It has a third one a little farther up, since the end swings.
     """
     out = []
     for row in np.flatnonzero((mover >= 0) & np.isfinite(left)).tolist():
@@ -87,7 +88,7 @@ def poses_at(points: F64, normals: F64, ways: F64, left: F64, mover: I32, moves:
         up = abs(float(normals[row] @ axis))
         edge = UPRIGHT < up < LEVEL and float(side @ -normals[row]) < EDGE
         out.append((row, tip - on * way, axis, -on * way, edge, False))
-        if moves.axes is not None and (turn := _turn(side, -way)) is not None:
+        if axis[2] < UPRIGHT_TOOL and (turn := _turn(side, -way)) is not None:
             touch, leaning = points[row] + left[row] * way, turn @ axis
             turned = touch + turn @ (tip - touch) - on * way
             edge = float((turn @ side) @ -normals[row]) < EDGE

@@ -51,7 +51,8 @@ UPRIGHT = float(np.sin(np.radians(3.0)))  # share of the axis in the normal up t
 SHARED = 0.02  # of the allowance: where its end is nearer to another face by more, that face has it too
 MAX_AXES = 24
 SAME_AXIS = float(np.radians(0.01))
-NOT_IN_PROGRAM, LEFT, UNDERCUT, CORNER = "not_in_program", "pass", "undercut", "corner"  # words of the remainder
+NOT_IN_PROGRAM, LEFT = "not_in_program", "pass"  # words of the remainder
+UNDERCUT, CORNER, SHARP_CORNER = "undercut", "corner", "sharp corner"
 BOOL = NDArray[np.bool_]
 INT = NDArray[np.int64]
 
@@ -230,7 +231,7 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     touched = np.union1d(touched, stepped[asked.touch.edges(few.subset(stepped), tools, axes, limits.near)])
     beyond = np.setdiff1d(beyond, touched)
     why[beyond] = asked.touch.reasons(few.subset(beyond), tools, axes)
-    below = beyond[np.isin(why[beyond], (UNDERCUT, CORNER)) & (height[beyond] > limits.corner)]
+    below = beyond[np.isin(why[beyond], (UNDERCUT, CORNER, SHARP_CORNER)) & (height[beyond] > limits.corner)]
     fine = in_fine_steps(few, height, mover, below, uneven, measured, cutting)
     below = below[touched_on_from(measured, few.subset(below), why[below] == UNDERCUT, along[below], mover[below], fine,
                                   axes, limits.h, limits.lift, limits.near, cutting)]
