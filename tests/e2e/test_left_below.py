@@ -40,7 +40,9 @@ def side_groove(folder, high, deep, levels, to=24.0):
 
 
 def heights(report):
-    return {f["face"]: f["depth"] for f in report["findings"] if f["kind"] == "stock_left"}
+    """The largest height of stock that is left on each face, mm."""
+    found = [f for f in report["findings"] if f["kind"] == "stock_left"]
+    return {face: max(f["depth"] for f in found if f["face"] == face) for face in {f["face"] for f in found}}
 
 
 @pytest.mark.parametrize(("high", "levels"), [(1.0, (3.0,)), (1.4, (3.0, 3.4))])
@@ -140,3 +142,27 @@ def test_a_keyway_as_wide_as_its_mill_is_asked_to_its_end(tmp_path, to, state):
     assert report["state"] == state, report["findings"][:2]
     if state == "clean":
         assert max(heights(report).values()) == pytest.approx(3.0, abs=0.02)
+
+
+@pytest.mark.parametrize(("share", "state"), [(1.0, "proved"), (0.5, "clean")])
+def test_a_half_round_ring_as_wide_as_its_ball_is_asked_all_round(tmp_path, share, state):
+    """A ring groove of 4 mm with a half round of 1 mm, by a ball of 2 mm that sinks 1 mm on its way."""
+    cq = pytest.importorskip("cadquery")
+    ring = cq.Workplane("XZ").center(4, 6).circle(1.0).revolve(360, (-4, 0), (-4, 1))
+    shape = cq.Workplane().box(12, 12, 6, centered=(True, True, False)).cut(ring)
+    mill = {"id": "T1", "number": 1, "kind": "ball", "diameter_mm": 2, "flute_length_mm": 6, "stickout_mm": 20}
+    setup = {"tools": [mill],
+             "stock": {"kind": "box", "box_mm": [[-6, -6, 0], [6, 6, 6]], "uncertainty_mm": 0.0}}
+    lines = ["G21 G17 G90 G94 G40 G49 G80 G64 P0.001", "G54", "T1 M6", "S8000 M3", "G0 X4 Y0", "G43 H1 Z30", "G0 Z6.5",
+             "G1 Z6 F80"]
+    turn = 2.0 * math.pi * share
+    x, y = 4.0 * math.cos(turn), 4.0 * math.sin(turn)
+    for k in range(1, 11):
+        there = (x, y, "G3") if k % 2 or share == 1.0 else (4.0, 0.0, "G2")
+        i, j = (-4.0, 0.0) if k % 2 or share == 1.0 else (-x, -y)
+        lines += [f"{there[2]} X{there[0]:.5f} Y{there[1]:.5f} Z{6.0 - 0.1 * k:.4f} I{i:.5f} J{j:.5f} F80"]
+    lines += [f"G3 X{x:.5f} Y{y:.5f} I-4 J0", "G0 Z30", "M5", "G53 G0 Z0", "M2"]
+    report = proof(tmp_path, shape, setup, lines)
+    assert report["state"] == state, report["findings"][:2]
+    if state == "clean":
+        assert max(heights(report).values()) == pytest.approx(1.0, abs=0.02)

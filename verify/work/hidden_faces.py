@@ -16,7 +16,7 @@ from geometry.sampling import sample_surface
 from verify.surface.removal import residual_on_normals
 from verify.work.asked_faces import OFF_FACETS, WORKED_SHARE, Cutting, thinned
 from verify.work.own_poses import poses_at
-from verify.work.standing_room import free_poses
+from verify.work.standing_room import Surroundings, free_poses
 
 PLACES = 100  # of each face
 POSED = 25  # of them, evenly chosen, to which tools are moved on
@@ -51,11 +51,11 @@ def hidden_work(hidden: Collection[int], cutting: Cutting, slack: float) -> tupl
     total, cut = np.bincount(face), np.bincount(face[by >= 0], minlength=int(face.max()) + 1)
     worked = np.flatnonzero(cut >= np.maximum(WORKED_SHARE * total, 1))
     rows = [thinned(np.flatnonzero((by >= 0) & (face == n)), POSED) for n in worked]
-    out = list[int]()
+    out, around = list[int](), Surroundings.of(cutting)
     for n, mine in zip(worked.tolist(), rows, strict=True):
         poses = poses_at(points[mine], normals[mine], normals[mine], np.maximum(left[mine], 0.0),
                          feeds[by[mine]].astype(np.int32), moves, cutting.tools, cutting.setup.stock_allowance)
-        held = np.unique(poses.row[free_poses(poses, np.ones(len(poses), np.bool_), cutting, slack)])
+        held = np.unique(poses.row[free_poses(poses, np.ones(len(poses), np.bool_), around, cutting, slack)])
         if len(held) / len(mine) * cut[n] >= WORKED_SHARE * total[n]:
             out.append(n)
     return tuple(out)

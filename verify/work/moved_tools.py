@@ -15,12 +15,13 @@ from geometry.mesh import F64, I32
 from geometry.sampling import SurfaceSamples
 from verify.surface.sample_scores import proved_samples
 from verify.work.asked_faces import Cutting, Measured, thinned
-from verify.work.own_poses import Poses, poses_at, slid_poses
-from verify.work.standing_room import free_poses
+from verify.work.own_poses import Poses, joined, poses_at, slid_poses
+from verify.work.standing_room import Surroundings, free_poses
 from verify.work.ways_out import ways_out
 
-MAX_TRIED = 120  # samples of a face that poses are tried on, and finished ones that tools are slid from
-SLID_FROM = 4  # finished samples, the nearest ones, that a tool is slid from to each
+MAX_TRIED, LEAST_TRIED, MAX_ALL = 120, 20, 1500  # samples that are tried: of a face, of each of many faces, and of all
+SLID_FROM = 2  # finished samples that a tool is slid from to each: the nearest ones, and those of the nearest normal
+ALIKE = 20.0  # mm: the distance that counts as much as a normal square to the other
 MAX_WAY = 12.0  # mm, longest way out that is looked for
 BOOL = NDArray[np.bool_]
 INT = NDArray[np.int64]
@@ -42,22 +43,24 @@ def touched_on_from(measured: Measured, few: SurfaceSamples, hidden: BOOL, along
     Returns (n,) bool.
 
     Each sample is tried along its normal, along its shortest way out, and from places of its face that are finished. Of
-    more than ``MAX_TRIED`` on a face an even share is tried; each other one shares the answer of the nearest, unless
-    more stands on it.
+    more than ``MAX_TRIED`` on a face, or fewer of many faces, an even share is tried; each other one shares the answer
+    of the nearest, unless more stands on it.
     """
     out = np.zeros(len(few), np.bool_)
     finished = proved_samples(measured.residual, cutting.setup) & (measured.mover >= 0)
-    for face in np.unique(few.face):
+    faces, around = np.unique(few.face), Surroundings.of(cutting)
+    most = max(LEAST_TRIED, min(MAX_TRIED, MAX_ALL // max(len(faces), 1)))
+    for face in faces:
         rows = np.flatnonzero(few.face == face)
-        tried = thinned(rows, MAX_TRIED)
+        tried = thinned(rows, most)
         near, answer = few.subset(tried), np.zeros(len(tried), np.bool_)
-        good = thinned(np.flatnonzero(finished & (measured.samples.face == face)), MAX_TRIED)
+        good = thinned(np.flatnonzero(finished & (measured.samples.face == face)), most)
         ways = ways_out(near.points, near.normals, axes, lift, MAX_WAY, cutting, np.ones(len(tried), np.bool_))
-        for poses in (_moved_on(near, near.normals, along[tried], mover[tried], cutting),
-                      _moved_on(near, ways.direction, ways.length, ways.mover, cutting),
-                      *_slid(measured, good, near, cutting)):
-            asked = poses.only(~answer[poses.row] & (~poses.edge | fine[tried[poses.row]]))
-            answer[asked.row[free_poses(asked, hidden[tried[asked.row]], cutting, slack)]] = True
+        poses = joined([_moved_on(near, near.normals, along[tried], mover[tried], cutting),
+                        _moved_on(near, ways.direction, ways.length, ways.mover, cutting),
+                        *_slid(measured, good, near, cutting)])
+        asked = poses.only(~poses.edge | fine[tried[poses.row]])
+        answer[asked.row[free_poses(asked, hidden[tried[asked.row]], around, cutting, slack)]] = True
         of = cKDTree(near.points).query(few.points[rows])[1]
         out[rows] = answer[of] & (along[rows] <= along[tried[of]] + scallop)
     return out
@@ -76,9 +79,12 @@ def _slid(measured: Measured, good: INT, near: SurfaceSamples, cutting: Cutting)
     touched = touched.only(np.unique(touched.row, return_index=True)[1])
     if not len(touched):
         return []
-    of = cKDTree(s.points[touched.row]).query(near.points, k=min(SLID_FROM, len(touched)))[1].reshape(len(near), -1)
+    from_, n = s.subset(touched.row), min(SLID_FROM, len(touched))
+    near_by = cKDTree(from_.points).query(near.points, k=n)[1].reshape(len(near), -1)
+    alike = cKDTree(np.hstack([from_.points, ALIKE * from_.normals])).query(
+        np.hstack([near.points, ALIKE * near.normals]), k=n)[1].reshape(len(near), -1)
     return [slid_poses(near.points, near.normals, touched.only(column), s.points, s.normals, cutting.tools)
-            for column in of.T]
+            for column in np.hstack([near_by, alike]).T]
 
 
 __all__ = ["MAX_WAY", "touched_on_from"]

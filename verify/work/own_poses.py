@@ -23,7 +23,7 @@ from geometry.tool_body import ToolBody
 from verify.moves import Moves
 
 CHORDS = 32  # of a round corner
-PLACES = 64  # parts of a move in which the place of the tool is looked for, and again of two of them
+PLACES = 24  # parts of a move in which the place of the tool is looked for, and again of two of them
 ON_TOOL = 0.02  # mm: a point farther from the cutting part was left by another move
 UPRIGHT, LEVEL = math.sin(math.radians(3.0)), math.cos(math.radians(3.0))  # between them a face is a slope
 UPRIGHT_TOOL = math.cos(math.radians(0.5))  # part of Z in an axis that leans for no wall
@@ -60,6 +60,12 @@ class Poses:
         """The poses that are chosen: (k,) bool, or their rows, (r,) int64, index."""
         return Poses(self.row[chosen], self.tool[chosen], self.tips[chosen], self.axes[chosen], self.shift[chosen],
                      self.edge[chosen], self.turned[chosen])
+
+
+def joined(parts: Sequence[Poses]) -> Poses:
+    """Poses of several parts, in order."""
+    names = ("row", "tool", "tips", "axes", "shift", "edge", "turned")
+    return Poses(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
 
 
 def poses_at(points: F64, normals: F64, ways: F64, left: F64, mover: I32, moves: Moves, tools: Sequence[ToolBody],
@@ -175,21 +181,15 @@ def _axes(moves: Moves, move: int, share: F64) -> F64:
 
 def _off_outline(outline: F64, rho: F64, height: F64) -> tuple[F64, F64]:
     """Distance of places from an outline, (n,) mm, and the outward normal of its nearest line, (n, 2): aside and up."""
-    best, normal = np.full(len(rho), np.inf), np.zeros((len(rho), 2))
-    place = np.column_stack([rho, height])
-    for a, b in zip(outline[:-1], outline[1:], strict=True):
-        d, long = b - a, float(np.linalg.norm(b - a))
-        if long < 1e-12:
-            continue
-        along = np.clip((place - a) @ d / long**2, 0.0, 1.0)
-        away = np.linalg.norm(place - a - along[:, None] * d, axis=1)
-        nearer = away < best
-        best[nearer], normal[nearer] = away[nearer], (d[1] / long, -d[0] / long)
-    top = outline[-1]
-    away = np.hypot(np.clip(rho - top[0], 0.0, None), height - top[1])
-    nearer = away < best  # the upper end of the flutes
-    best[nearer], normal[nearer] = away[nearer], (0.0, 1.0)
-    return best, normal
+    lines = np.concatenate([outline, [[0.0, outline[-1, 1]]]])  # closed by the upper end of the flutes
+    d = np.diff(lines, axis=0)
+    long = np.hypot(d[:, 0], d[:, 1])
+    a, d, long = lines[:-1][long > 1e-12], d[long > 1e-12], long[long > 1e-12]
+    x, y = rho[:, None] - a[:, 0], height[:, None] - a[:, 1]
+    along = np.clip((x * d[:, 0] + y * d[:, 1]) / long**2, 0.0, 1.0)
+    away = np.hypot(x - along * d[:, 0], y - along * d[:, 1])
+    best = away.argmin(axis=1)
+    return away[np.arange(len(rho)), best], np.column_stack([d[best, 1], -d[best, 0]]) / long[best, None]
 
 
 def _turn(side: F64, wanted: F64) -> F64 | None:
@@ -203,4 +203,4 @@ def _turn(side: F64, wanted: F64) -> F64 | None:
     return np.asarray(np.eye(3) + sine * k + (1.0 - cosine) * (k @ k))
 
 
-__all__ = ["Poses", "poses_at", "slid_poses"]
+__all__ = ["Poses", "joined", "poses_at", "slid_poses"]

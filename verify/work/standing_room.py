@@ -11,12 +11,18 @@ for 5 um and 1 mm. Coordinates are float64, mm, in the frame of the proof.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
+from geometry.mesh_queries.bvh import TriangleTree
+from geometry.mesh_queries.outline_drop import drop_turned
+from geometry.mesh_queries.revolved_outline import Outline, OutlineLine
+from geometry.mesh_queries.tilted_collision import axis_frames
 from geometry.tool_body import ToolBody
 from verify.kernels.surface.standing import first_inside
 from verify.model import ProofSetup
@@ -29,62 +35,127 @@ APART, FAR_APART = 0.1, 0.5  # mm between points of the surface
 MAX_POINTS = 300_000  # where more are near, they are farther apart
 WAY_STEP = 0.1  # mm between places on the way
 MAX_STEPS = 10
+MAX_AXES = 8  # of the poses of a tool; those along others are not free
 # the corners of a box by bits, and its sides as triangles
 SIDES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6],
                   [0, 6, 4], [1, 5, 7], [1, 7, 3]])
 BOOL = NDArray[np.bool_]
 
 
-def free_poses(poses: Poses, hidden: BOOL, cutting: Cutting, slack: float) -> BOOL:
-    """Poses of tools of a proof at which the whole tool stands free of part and fixtures, and on its way there.
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """Part and fixtures of a proof, as triangles (t, 3, 3) float64, mm."""
+
+    triangles: F64
+
+    @classmethod
+    def of(cls, cutting: Cutting) -> Surroundings:
+        """Those of a proof."""
+        return cls(np.concatenate([cutting.tree.mesh.triangles, fixture_sides(cutting.setup)]))
+
+    @cached_property
+    def far(self) -> F64:
+        """Points of all of them, (n, 3) float64, mm, setup frame, ``FAR_APART`` from each other at most."""
+        return _points_in(self.triangles, np.full(3, -np.inf), np.full(3, np.inf), FAR_APART)
+
+    def near(self, frusta: F64, tips: F64, axes: F64, shift: F64) -> F64:
+        """Points in the box round a tool at all poses and ways, ``APART`` from each other at most.
+
+        frusta : (k, 4) float64, mm, tool frame: lower and upper end over the tip, and the radii there
+        tips, axes, shift : (n, 3) float64, mm and unit, setup frame, as in ``stands_free``
+
+        Returns (p, 3) float64, mm, setup frame.
+        """
+        wide = float(frusta[:, 2:].max())
+        heights = frusta[:, 0].min(), frusta[:, 1].max()
+        ends = np.stack([tips + z * axes - s * shift for z in heights for s in (0.0, 1.0)])
+        return _points_in(self.triangles, ends.min(axis=(0, 1)) - wide, ends.max(axis=(0, 1)) + wide, APART)
+
+
+def free_poses(poses: Poses, hidden: BOOL, around: Surroundings, cutting: Cutting, slack: float) -> BOOL:
+    """Poses of tools of a proof to which the whole tool comes free of part and fixtures.
 
     hidden : (n,) bool, whether something hangs over the place that is touched
     slack : mm by which the cutting part may enter the surface
 
     Returns (n,) bool.
 
-    A tool that nowhere gets thinner upwards stands in what hangs over the place that it touches, so it is not asked
-    there with the axes of the program.
+    Where nothing hangs over the place, the tool comes down its axis. Else it comes the straight way; a tool that
+    nowhere gets thinner upwards stands in what hangs there, so it is not asked with the axes of the program.
     """
-    out = np.zeros(len(poses), np.bool_)
+    out, above = np.zeros(len(poses), np.bool_), ~hidden & ~poses.turned
     thinner = np.array([_gets_thinner(t, cutting.setup, slack) for t in cutting.tools], np.bool_)
-    asked = ~hidden | poses.turned | thinner[poses.tool]
-    if not asked.any():
-        return out
-    sides = np.concatenate([cutting.tree.mesh.triangles, fixture_sides(cutting.setup)])
-    for k in np.unique(poses.tool[asked]):
-        rows = np.flatnonzero(asked & (poses.tool == k))
-        out[rows] = stands_free(sides, cutting.tools[k], cutting.setup, poses.tips[rows], poses.axes[rows],
+    below = ~above & (poses.turned | thinner[poses.tool])
+    for k in np.unique(poses.tool[above]):
+        rows = np.flatnonzero(above & (poses.tool == k))
+        axes, which = np.unique(np.round(poses.axes[rows], 6), axis=0, return_inverse=True)
+        for n, axis in enumerate(axes[:MAX_AXES]):
+            mine = rows[which.reshape(-1) == n]
+            out[mine] = _comes_from_above(cutting, k, axis, poses.tips[mine], slack)
+    if cutting.setup.fixtures:  # they are not in the tree
+        for k in np.unique(poses.tool[out]):
+            rows = np.flatnonzero(out & (poses.tool == k))
+            out[rows] = stands_free(around, cutting.tools[k], cutting.setup, poses.tips[rows], poses.axes[rows],
+                                    np.zeros((len(rows), 3)), slack)
+    for k in np.unique(poses.tool[below]):
+        rows = np.flatnonzero(below & (poses.tool == k))
+        out[rows] = stands_free(around, cutting.tools[k], cutting.setup, poses.tips[rows], poses.axes[rows],
                                 poses.shift[rows], slack)
     return out
 
 
-def stands_free(triangles: F64, tool: ToolBody, setup: ProofSetup, tips: F64, axes: F64, shift: F64,
+def _comes_from_above(cutting: Cutting, k: int, axis: F64, tips: F64, slack: float) -> BOOL:
+    """Whether tool ``k`` comes down its axis to tips, (n, 3), free of the part all the way, (n,) bool."""
+    frame, tool = axis_frames(axis[None])[0], cutting.tools[k]
+    turn = np.eye(4)
+    turn[:3, :3] = frame
+    upright = np.array_equal(frame, np.eye(3))
+    tree = cutting.tree if upright else TriangleTree(cutting.tree.mesh.transformed(turn))
+    allowance, at = cutting.setup.stock_allowance, (0.0, 0.0)
+    pieces = list[OutlineLine]()
+    ends = [(max(rho - slack + allowance, 0.0), z) for rho, z in tool.cutting_profile(CHORDS)[1:]]
+    for z0, z1, r0, r1 in Bodies.of([tool], cutting.setup).rows[:, :4].tolist():
+        ends += [(r0, z0), (r1, z1)]
+    for rho, z in ends:
+        place = max(rho, at[0]), max(z, at[1])
+        if place != at:
+            pieces.append(OutlineLine(*place))
+            at = place
+    places = tips @ frame.T
+    lowest = drop_turned(tree, places[:, :2], Outline(tuple(pieces)))
+    return np.asarray(lowest + allowance <= places[:, 2] + slack)
+
+
+def stands_free(around: Surroundings, tool: ToolBody, setup: ProofSetup, tips: F64, axes: F64, shift: F64,
                 slack: float) -> BOOL:
     """Whether a tool stands free at poses and on the straight ways there.
 
-    triangles : (t, 3, 3) float64, mm, setup frame, of the part and of ``fixture_sides``
     tips  : (n, 3) float64, mm, setup frame; axes : (n, 3) float64, unit, setup frame, tip to spindle
     shift : (n, 3) float64, mm, setup frame, the ways: they begin at tips - shift
     slack : mm by which the cutting part may enter the surface, for facets and rounding; the stock allowance is kept
 
     Returns (n,) bool.
     """
-    if not len(tips):
-        return np.zeros(0, np.bool_)
     frusta = _frusta(tool, setup, setup.stock_allowance - slack)
-    head = frusta[frusta[:, 0] < max(tool.flute_length, tool.neck_length)]
-    points = np.concatenate([_points_round(triangles, head, tips, axes, shift, APART),
-                             _points_round(triangles, frusta, tips, axes, shift, FAR_APART)])
-    out, hint = np.ones(len(tips), np.bool_), -1
-    for k, (tip, axis, way) in enumerate(zip(tips, axes, shift, strict=True)):
-        steps = min(max(round(float(np.linalg.norm(way)) / WAY_STEP), 1), MAX_STEPS)
+    out = np.ones(len(tips), np.bool_)
+    _drop_blocked(out, around.far, frusta, tips, axes, shift)
+    rows = np.flatnonzero(out)
+    if len(rows):
+        head = frusta[frusta[:, 0] < max(tool.flute_length, tool.neck_length)]
+        _drop_blocked(out, around.near(head, tips[rows], axes[rows], shift[rows]), frusta, tips, axes, shift)
+    return out
+
+
+def _drop_blocked(out: BOOL, points: F64, frusta: F64, tips: F64, axes: F64, shift: F64) -> None:
+    """Set ``out``, (n,), to False where a tool of frusta takes in one of the points at its pose or on its way there."""
+    hint = -1
+    for k in np.flatnonzero(out):
+        steps = min(max(round(float(np.linalg.norm(shift[k])) / WAY_STEP), 1), MAX_STEPS)
         for share in np.arange(steps) / steps:
-            met = first_inside(points, frusta, tip - share * way, axis, hint)
+            met = first_inside(points, frusta, tips[k] - share * shift[k], axes[k], hint)
             if met >= 0:
                 out[k], hint = False, met
                 break
-    return out
 
 
 def _gets_thinner(tool: ToolBody, setup: ProofSetup, slack: float) -> bool:
@@ -109,22 +180,19 @@ def _frusta(tool: ToolBody, setup: ProofSetup, grow: float) -> F64:
     return np.array([*cutter, *Bodies.of([tool], setup).rows[:, :4].tolist()])
 
 
-def _points_round(triangles: F64, frusta: F64, tips: F64, axes: F64, shift: F64, apart: float) -> F64:
-    """Points of triangles in the box round frusta at all poses and ways, (n, 3), at most ``apart`` mm from each other.
+def _points_in(triangles: F64, low: F64, high: F64, apart: float) -> F64:
+    """Points of triangles in a box, (n, 3), at most ``apart`` mm from each other.
 
     The longest side of each triangle is halved until it is as short as that; what lies outside of the box goes first.
     Of more than ``MAX_POINTS`` the distance is doubled.
     """
-    wide = float(frusta[:, 2:].max())
-    ends = np.stack([tips + z * axes - s * shift for z in (frusta[:, 0].min(), frusta[:, 1].max()) for s in (0.0, 1.0)])
-    low, high = ends.min(axis=(0, 1)) - wide, ends.max(axis=(0, 1)) + wide
     found, rest = [np.zeros((0, 3))], triangles
     while len(rest):
         rest = rest[((rest.max(axis=1) >= low) & (rest.min(axis=1) <= high)).all(axis=1)]
         if len(rest) + sum(map(len, found)) > MAX_POINTS:
             apart *= 2.0
         sides = np.linalg.norm(rest - np.roll(rest, -1, axis=1), axis=2)
-        done = sides.max(axis=1) <= apart
+        done = sides.max(axis=1, initial=0.0) <= apart
         found.append(rest[done].reshape(-1, 3))
         rest, first = rest[~done], sides[~done].argmax(axis=1)
         row = np.arange(len(rest))
@@ -134,4 +202,4 @@ def _points_round(triangles: F64, frusta: F64, tips: F64, axes: F64, shift: F64,
     return np.concatenate(found)
 
 
-__all__ = ["fixture_sides", "free_poses", "stands_free"]
+__all__ = ["Surroundings", "fixture_sides", "free_poses", "stands_free"]

@@ -231,7 +231,8 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     touched = np.union1d(touched, stepped[asked.touch.edges(few.subset(stepped), tools, axes, limits.near)])
     beyond = np.setdiff1d(beyond, touched)
     why[beyond] = asked.touch.reasons(few.subset(beyond), tools, axes)
-    below = beyond[np.isin(why[beyond], (UNDERCUT, CORNER, SHARP_CORNER)) & (height[beyond] > limits.corner)]
+    tight_for = (UNDERCUT, CORNER, SHARP_CORNER) if cutting.moves.axes is not None else (UNDERCUT, CORNER)
+    below = beyond[np.isin(why[beyond], tight_for) & (height[beyond] > limits.corner)]
     fine = in_fine_steps(few, height, mover, below, uneven, measured, cutting)
     below = below[touched_on_from(measured, few.subset(below), why[below] == UNDERCUT, along[below], mover[below], fine,
                                   axes, limits.h, limits.lift, limits.near, cutting)]

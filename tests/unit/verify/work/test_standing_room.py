@@ -8,7 +8,7 @@ import pytest
 from geometry.tool_body import HolderFrustum, ToolBody
 from tests.hand_parts import prism
 from verify.model import ProofSetup
-from verify.work.standing_room import fixture_sides, stands_free
+from verify.work.standing_room import Surroundings, fixture_sides, stands_free
 
 # a block 0 <= x <= 10 with a groove 2 deep and 3 <= z <= 4 high in its side x = 10; 12 long in Y
 GROOVE = [(0, 0), (10, 0), (10, 3), (8, 3), (8, 4), (10, 4), (10, 6), (0, 6)]
@@ -21,7 +21,7 @@ UP = np.array([[0.0, 0.0, 1.0]])
 
 
 def free(x, z=3.0, tool=SLOT, shift=(0.0, 0.0, 0.0), setup=SETUP, sides=SIDES, slack=0.005):
-    return bool(stands_free(sides, tool, setup, np.array([[x, 0.0, z]]), UP, np.array([shift]), slack)[0])
+    return bool(stands_free(Surroundings(sides), tool, setup, np.array([[x, 0.0, z]]), UP, np.array([shift]), slack)[0])
 
 
 def test_the_groove_is_closed():
@@ -59,4 +59,5 @@ def test_fixtures_and_the_allowance_count():
 
 
 def test_no_pose_is_free_of_nothing():
-    assert stands_free(SIDES, SLOT, SETUP, np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), 0.005).shape == (0,)
+    none = np.zeros((0, 3))
+    assert stands_free(Surroundings(SIDES), SLOT, SETUP, none, none, none, 0.005).shape == (0,)
