@@ -13,6 +13,9 @@ from verify.kernels.tables import AxisArrays
 
 STILL = 1e-9  # rad: an axis that turns by less stands still; that is 1e-7 mm at 100 mm
 
+UPRIGHT = float(np.sin(np.radians(3.0)))  # share of the axis in a normal up to which a face is a wall
+LEVEL = float(np.cos(np.radians(3.0)))  # share from which it is a floor or a ceiling; slopes lie between
+
 
 @dataclass(frozen=True, eq=False)
 class ToolAxes:

@@ -23,14 +23,13 @@ from service.stages.job_inputs import JobInputs
 from service.stages.preparation import obstacle_mesh
 from service.verification.named_touch import AxisLines, NamedTouch
 from service.verification.own_ways import MillWays, touched_on_ways
+from verify.tool_axes import LEVEL, UPRIGHT
 from zones.machinable_area import SEEN
 from zones.reach.approach_cones import approach
 from zones.reach.index_orientations import AxisCoverage
 from zones.remainder.obstructions import SKIN
 from zones.remainder.reasons import Reason
 
-UPRIGHT = float(np.sin(np.radians(3.0)))  # share of the axis in the normal up to which a face is a wall
-LEVEL = float(np.cos(np.radians(3.0)))  # share from which it is a floor; slopes lie between
 MAX_REASONED = 3000  # samples whose reason is looked for one by one; the others share that of the nearest in order
 BOOL = NDArray[np.bool_]
 

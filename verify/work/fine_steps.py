@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from geometry.mesh import F64, I32
 from geometry.sampling import SurfaceSamples
 from verify.surface.sample_scores import proved_samples
+from verify.tool_axes import LEVEL, UPRIGHT
 from verify.work.asked_faces import Cutting, Measured, thinned
 
 WITHIN = 0.5  # mm: stock is even to the scallop height within this where steps are fine
@@ -20,7 +21,6 @@ LEAST_NEAR, LEAST_FITTED = 4, 8  # samples that must lie there
 FOLLOWED = 0.5  # of the height of a place along the axis, over which the moves that left the stock are spread
 SOLID_SHARE = 0.01  # of a face: finished all round within ``FIT_WITHIN``
 MAX_SOLID = 10_000  # samples of a face that are looked at for that
-SLOPE = float(np.sin(np.radians(3.0))), float(np.cos(np.radians(3.0)))  # share of the axis in the normal
 BOOL = NDArray[np.bool_]
 INT = NDArray[np.int64]
 
@@ -88,7 +88,7 @@ def _finished_by_edges(face: int, measured: Measured, cutting: Cutting) -> bool:
     if good.sum() < SOLID_SHARE * len(rows):
         return False
     up = np.abs(np.einsum("ij,ij->i", s.normals[rows[good]], _axes(cutting, by[good])))
-    good[good] = (up > SLOPE[0]) & (up < SLOPE[1])
+    good[good] = (up > UPRIGHT) & (up < LEVEL)
     around = cKDTree(s.points[rows]).query_ball_point(s.points[rows[good]], FIT_WITHIN)
     solid = sum(len(near) >= LEAST_NEAR and bool(good[near].all()) for near in around)
     return solid >= max(SOLID_SHARE * len(rows), 1.0)

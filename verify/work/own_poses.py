@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from geometry.mesh import F64, I32
 from geometry.tool_body import ToolBody
 from verify.moves import Moves
+from verify.tool_axes import LEVEL, UPRIGHT
 
 CHORDS = 32  # of a round corner
 PLACES = 24  # parts of a move in which the place of the tool is looked for, and again of two of them
 ON_TOOL = 0.02  # mm: a point farther from the cutting part was left by another move
-UPRIGHT, LEVEL = math.sin(math.radians(3.0)), math.cos(math.radians(3.0))  # between them a face is a slope
 UPRIGHT_TOOL = math.cos(math.radians(0.5))  # part of Z in an axis that leans for no wall
 SIDE = 0.1  # share of the axis in the normal of a side
 EDGE = math.cos(math.radians(6.0))  # between a face and the tool where it touches: chords of a corner turn by 3

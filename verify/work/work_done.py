@@ -24,6 +24,7 @@ from verify.findings import Source
 from verify.model import Asked, Finding, FindingKind, ProofSetup, ScoredSamples, WorkDone
 from verify.moves import Moves
 from verify.surface.sample_scores import proved_samples
+from verify.tool_axes import UPRIGHT
 from verify.work.asked_faces import (
     ASIDE,
     ASIDE_ROOM,
@@ -47,7 +48,6 @@ LEAST_TRIED = 50  # of them on each face
 MAX_WAYS = 1500  # samples whose shortest way out is looked for; the same for the others
 LIFT_SHARE = 0.1  # of h: distance at which a tool on an open face touches a sample
 CORNER_SHARE = 0.5  # of h: the same in a corner
-UPRIGHT = float(np.sin(np.radians(3.0)))  # share of the axis in the normal up to which a face counts as a wall
 SHARED = 0.02  # of the allowance: where its end is nearer to another face by more, that face has it too
 MAX_AXES = 24
 SAME_AXIS = float(np.radians(0.01))
