@@ -19,10 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh import F64
-from geometry.mesh_queries.bvh import TriangleTree
-from geometry.mesh_queries.outline_drop import drop_turned
-from geometry.mesh_queries.revolved_outline import Outline, OutlineLine
-from geometry.mesh_queries.tilted_collision import axis_frames
 from geometry.tool_body import ToolBody
 from verify.kernels.surface.standing import first_inside
 from verify.model import ProofSetup
@@ -35,7 +31,6 @@ APART, FAR_APART = 0.1, 0.5  # mm between points of the surface
 MAX_POINTS = 300_000  # where more are near, they are farther apart
 WAY_STEP = 0.1  # mm between places on the way
 MAX_STEPS = 10
-MAX_AXES = 8  # of the poses of a tool; those along others are not free
 # the corners of a box by bits, and its sides as triangles
 SIDES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6],
                   [0, 6, 4], [1, 5, 7], [1, 7, 3]])
@@ -88,15 +83,8 @@ def free_poses(poses: Poses, hidden: BOOL, around: Surroundings, cutting: Cuttin
     below = ~above & (poses.turned | thinner[poses.tool])
     for k in np.unique(poses.tool[above]):
         rows = np.flatnonzero(above & (poses.tool == k))
-        axes, which = np.unique(np.round(poses.axes[rows], 6), axis=0, return_inverse=True)
-        for n, axis in enumerate(axes[:MAX_AXES]):
-            mine = rows[which.reshape(-1) == n]
-            out[mine] = _comes_from_above(cutting, k, axis, poses.tips[mine], slack)
-    if cutting.setup.fixtures:  # they are not in the tree
-        for k in np.unique(poses.tool[out]):
-            rows = np.flatnonzero(out & (poses.tool == k))
-            out[rows] = stands_free(around, cutting.tools[k], cutting.setup, poses.tips[rows], poses.axes[rows],
-                                    np.zeros((len(rows), 3)), slack)
+        out[rows] = stands_free(around, cutting.tools[k], cutting.setup, poses.tips[rows], poses.axes[rows],
+                                np.zeros((len(rows), 3)), slack, column=True)
     for k in np.unique(poses.tool[below]):
         rows = np.flatnonzero(below & (poses.tool == k))
         out[rows] = stands_free(around, cutting.tools[k], cutting.setup, poses.tips[rows], poses.axes[rows],
@@ -104,39 +92,21 @@ def free_poses(poses: Poses, hidden: BOOL, around: Surroundings, cutting: Cuttin
     return out
 
 
-def _comes_from_above(cutting: Cutting, k: int, axis: F64, tips: F64, slack: float) -> BOOL:
-    """Whether tool ``k`` comes down its axis to tips, (n, 3), free of the part all the way, (n,) bool."""
-    frame, tool = axis_frames(axis[None])[0], cutting.tools[k]
-    turn = np.eye(4)
-    turn[:3, :3] = frame
-    upright = np.array_equal(frame, np.eye(3))
-    tree = cutting.tree if upright else TriangleTree(cutting.tree.mesh.transformed(turn))
-    allowance, at = cutting.setup.stock_allowance, (0.0, 0.0)
-    pieces = list[OutlineLine]()
-    ends = [(max(rho - slack + allowance, 0.0), z) for rho, z in tool.cutting_profile(CHORDS)[1:]]
-    for z0, z1, r0, r1 in Bodies.of([tool], cutting.setup).rows[:, :4].tolist():
-        ends += [(r0, z0), (r1, z1)]
-    for rho, z in ends:
-        place = max(rho, at[0]), max(z, at[1])
-        if place != at:
-            pieces.append(OutlineLine(*place))
-            at = place
-    places = tips @ frame.T
-    lowest = drop_turned(tree, places[:, :2], Outline(tuple(pieces)))
-    return np.asarray(lowest + allowance <= places[:, 2] + slack)
-
-
 def stands_free(around: Surroundings, tool: ToolBody, setup: ProofSetup, tips: F64, axes: F64, shift: F64,
-                slack: float) -> BOOL:
+                slack: float, column: bool = False) -> BOOL:
     """Whether a tool stands free at poses and on the straight ways there.
 
     tips  : (n, 3) float64, mm, setup frame; axes : (n, 3) float64, unit, setup frame, tip to spindle
     shift : (n, 3) float64, mm, setup frame, the ways: they begin at tips - shift
     slack : mm by which the cutting part may enter the surface, for facets and rounding; the stock allowance is kept
+    column : whether all over the tool must be free as well, so that it comes down its axis
 
     Returns (n,) bool.
     """
     frusta = _frusta(tool, setup, setup.stock_allowance - slack)
+    if column:  # a part of the tool is no thinner than what is below it
+        widest = np.maximum.accumulate(frusta[:, 2:].reshape(-1)).reshape(-1, 2)
+        frusta = np.column_stack([frusta[:, :2], widest])
     out = np.ones(len(tips), np.bool_)
     _drop_blocked(out, around.far, frusta, tips, axes, shift)
     rows = np.flatnonzero(out)
