@@ -19,6 +19,7 @@ WITHIN = 0.5  # mm: stock is even to the scallop height within this where steps 
 FIT_WITHIN = 0.3  # mm: the same, but for a slope of the stock, which an offset has on a round face
 LEAST_NEAR, LEAST_FITTED = 4, 8  # samples that must lie there
 FOLLOWED = 0.5  # of the height of a place along the axis, over which the moves that left the stock are spread
+FLAT = 1e-6  # mm: places that are spread no more in a direction have no slope along it
 SOLID_SHARE = 0.01  # of a face: finished all round within ``FIT_WITHIN``
 MAX_SOLID = 10_000  # samples of a face that are looked at for that
 BOOL = NDArray[np.bool_]
@@ -54,28 +55,72 @@ def in_fine_steps(few: SurfaceSamples, height: F64, mover: I32, rows: INT, uneve
             continue
         if not len(known):
             continue
-        tree, left = cKDTree(few.points[known]), mover[rows[mine]] >= 0
-        for k, near in zip(mine[left], tree.query_ball_point(few.points[rows[mine[left]]], WITHIN), strict=True):
-            beside = known[near]
-            out[k] = len(beside) >= LEAST_NEAR and bool(np.ptp(height[beside]) <= uneven)
-        for k in mine[left & ~out[mine]]:
-            beside = known[tree.query_ball_point(few.points[rows[k]], FIT_WITHIN)]
-            beside = beside[tool[mover[beside]] == tool[mover[rows[k]]]]
-            out[k] = len(beside) >= LEAST_FITTED and _even_on_a_slope(few.points[beside], height[beside],
-                                                                     mover[beside], uneven, cutting)
+        tree, left = cKDTree(few.points[known]), mine[mover[rows[mine]] >= 0]
+        beside, of = _near(tree, few.points[rows[left]], WITHIN)
+        beside = known[beside]
+        ask, first, count = _starts(of)
+        out[left[ask]] = (count >= LEAST_NEAR) & (_spread(height[beside], first) <= uneven)
+        left = left[~out[left]]
+        beside, of = _near(tree, few.points[rows[left]], FIT_WITHIN)
+        beside = known[beside]
+        same = tool[mover[beside]] == tool[mover[rows[left]]][of]
+        beside, of = beside[same], of[same]
+        ask, _, count = _starts(of)
+        enough = np.isin(of, ask[count >= LEAST_FITTED])
+        beside, of = beside[enough], of[enough]
+        even = _even_on_slopes(few.points[beside], height[beside], mover[beside], of, uneven, cutting)
+        out[left[np.unique(of)[even]]] = True
     return out
 
 
-def _even_on_a_slope(points: F64, height: F64, mover: I32, uneven: float, cutting: Cutting) -> bool:
-    """Whether stock at places is even but for a slope, and moves at as many heights left it as the places have."""
-    if (mover < 0).any():
-        return False
-    at = np.column_stack([np.ones(len(points)), points - points.mean(axis=0)])
-    off = height - at @ np.linalg.lstsq(at, height, rcond=1e-6)[0]
-    if np.ptp(off) > uneven:
-        return False
-    axis = _axis(cutting, int(mover[0]))
-    return bool(np.ptp(cutting.moves.end[mover] @ axis) >= FOLLOWED * np.ptp(points @ axis))
+def _near(tree: cKDTree, points: F64, within: float) -> tuple[INT, INT]:
+    """Places of a tree that are near to points: index of the place and of the point, (c,) each, point by point."""
+    found = tree.query_ball_point(points, within)
+    if not len(points):
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    of = np.repeat(np.arange(len(points)), [len(f) for f in found])
+    return np.concatenate([np.array(f, np.int64) for f in found]), of
+
+
+def _starts(of: INT) -> tuple[INT, INT, INT]:
+    """Numbers in an ascending array, where the run of each begins, and how long it is."""
+    return np.unique(of, return_index=True, return_counts=True)
+
+
+def _spread(values: F64, first: INT) -> F64:
+    """Largest less smallest value of each run, (g,) float64."""
+    if not len(first):
+        return np.zeros(0)
+    return np.asarray(np.maximum.reduceat(values, first) - np.minimum.reduceat(values, first))
+
+
+def _even_on_slopes(points: F64, height: F64, mover: I32, of: INT, uneven: float, cutting: Cutting) -> BOOL:
+    """Whether stock at places is even but for a slope, and moves at as many heights left it as the places have.
+
+    points : (n, 3) float64, mm; height : (n,) float64, mm; mover : (n,) int32, index, the move that left it, -1 for none
+    of     : (n,) int64, ascending, the group of each; a group has a slope of its own, by least squares
+
+    Returns (g,) bool.
+    """
+    _, first, count = _starts(of)
+    if not len(first):
+        return np.zeros(0, np.bool_)
+    group = np.repeat(np.arange(len(first)), count)
+    at, over = points - _mean(points, first, count)[group], height - _mean(height, first, count)[group]
+    squares, vectors = np.linalg.eigh(_mean(at[:, :, None] * at[:, None], first, count))
+    inverse = np.where(squares > FLAT**2, 1.0 / np.maximum(squares, FLAT**2), 0.0)
+    along = np.einsum("gji,gj->gi", vectors, _mean(at * over[:, None], first, count))
+    slope = np.einsum("gij,gj->gi", vectors, inverse * along)
+    even = _spread(over - np.einsum("ni,ni->n", at, slope[group]), first) <= uneven
+    axis = _axes(cutting, np.maximum(mover[first], 0))[group]
+    ways = _spread(np.einsum("ni,ni->n", cutting.moves.end[mover], axis), first)
+    followed = ways >= FOLLOWED * _spread(np.einsum("ni,ni->n", points, axis), first)
+    return np.asarray(even & followed & (np.minimum.reduceat(mover, first) >= 0))
+
+
+def _mean(values: F64, first: INT, count: INT) -> F64:
+    """Mean of each run of values, (n, ...), over the first axis."""
+    return np.asarray(np.add.reduceat(values, first) / count.reshape(-1, *[1] * (values.ndim - 1)))
 
 
 def _finished_by_edges(face: int, measured: Measured, cutting: Cutting) -> bool:
@@ -92,10 +137,6 @@ def _finished_by_edges(face: int, measured: Measured, cutting: Cutting) -> bool:
     around = cKDTree(s.points[rows]).query_ball_point(s.points[rows[good]], FIT_WITHIN)
     solid = sum(len(near) >= LEAST_NEAR and bool(good[near].all()) for near in around)
     return solid >= max(SOLID_SHARE * len(rows), 1.0)
-
-
-def _axis(cutting: Cutting, move: int) -> F64:
-    return np.asarray(_axes(cutting, np.array([move]))[0])
 
 
 def _axes(cutting: Cutting, moves: INT | I32) -> F64:

@@ -82,34 +82,36 @@ def poses_at(points: F64, normals: F64, ways: F64, left: F64, mover: I32, moves:
     that touches until its side lies against the way, by 20 degrees at most: a side that leans too little has left a
     wedge. It has a third one a little farther up, since the end swings.
     """
-    out = []
-    for row in np.flatnonzero((mover >= 0) & np.isfinite(left)).tolist():
-        tool = tools[int(moves.tool[mover[row]])]
-        if tool.named or left[row] > 2.0 * tool.widest_radius:
+    widest = np.array([t.widest_radius for t in tools])
+    named = np.array([t.named for t in tools], np.bool_)
+    tool = np.where(mover >= 0, moves.tool[mover], 0).astype(np.int64)
+    rows = np.flatnonzero((mover >= 0) & np.isfinite(left) & ~named[tool])
+    rows = rows[left[rows] <= 2.0 * widest[tool[rows]]]
+    touch = points[rows] + left[rows, None] * ways[rows]
+    tips, axes, side = (np.zeros((len(rows), 3)) for _ in range(3))
+    for k in np.unique(tool[rows]):
+        mine = np.flatnonzero(tool[rows] == k)
+        tips[mine], axes[mine], side[mine] = _at(touch[mine], mover[rows[mine]], moves, tools[k])
+    met = np.isfinite(side[:, 0])
+    rows, touch, tips, axes, side = rows[met], touch[met], tips[met], axes[met], side[met]
+    on = -np.maximum(left[rows] - allowance, 0.0)[:, None] * ways[rows]
+    up = np.abs(np.einsum("ij,ij->i", normals[rows], axes))
+    edge = (up > UPRIGHT) & (up < LEVEL) & (-np.einsum("ij,ij->i", side, normals[rows]) < EDGE)
+    parts = [Poses(rows, tool[rows], tips + on, axes, on, edge, np.zeros(len(rows), np.bool_))]
+    for n in np.flatnonzero(axes[:, 2] < UPRIGHT_TOOL).tolist():
+        turn = _turn(side[n], -ways[rows[n]])
+        if turn is None:
             continue
-        way, on = ways[row], max(float(left[row]) - allowance, 0.0)
-        tip, axis, side = _at(points[row] + left[row] * way, int(mover[row]), moves, tool)
-        if side is None:
-            continue
-        up = abs(float(normals[row] @ axis))
-        edge = UPRIGHT < up < LEVEL and float(side @ -normals[row]) < EDGE
-        out.append((row, tip - on * way, axis, -on * way, edge, False))
-        if axis[2] < UPRIGHT_TOOL and (turn := _turn(side, -way)) is not None:
-            touch, leaning = points[row] + left[row] * way, turn @ axis
-            turned = touch + turn @ (tip - touch) - on * way
-            edge = float((turn @ side) @ -normals[row]) < EDGE
-            out.append((row, turned, leaning, -on * way, edge, True))
-            # the end has swung towards a floor below: a side touches as well farther up
-            lift = 2.0 * tool.widest_radius * float(np.linalg.norm(leaning - axis))
-            if abs(side @ axis) < SIDE and (touch - tip) @ axis > tool.end_height + lift:
-                out.append((row, turned + lift * leaning, leaning, -on * way, edge, True))
-    if not out:
-        none, nowhere = np.zeros(0, np.int64), np.zeros((0, 3))
-        return Poses(none, none, nowhere, nowhere, nowhere, none > 0, none > 0)
-    rows = np.array([p[0] for p in out], np.int64)
-    tips, axes, shift = (np.array([p[k] for p in out], np.float64) for k in (1, 2, 3))
-    on_edge, turns = (np.array([p[k] for p in out], np.bool_) for k in (4, 5))
-    return Poses(rows, moves.tool[mover[rows]].astype(np.int64), tips, axes, shift, on_edge, turns)
+        leaning, body = turn @ axes[n], tools[tool[rows[n]]]
+        turned = [touch[n] + turn @ (tips[n] - touch[n]) + on[n]]
+        # the end has swung towards a floor below: a side touches as well farther up
+        lift = 2.0 * body.widest_radius * float(np.linalg.norm(leaning - axes[n]))
+        if abs(side[n] @ axes[n]) < SIDE and (touch[n] - tips[n]) @ axes[n] > body.end_height + lift:
+            turned.append(turned[0] + lift * leaning)
+        same, on_edge = np.full(len(turned), n), float((turn @ side[n]) @ -normals[rows[n]]) < EDGE
+        parts.append(Poses(rows[same], tool[rows[same]], np.array(turned), np.tile(leaning, (len(turned), 1)), on[same],
+                           np.full(len(turned), on_edge), np.ones(len(turned), np.bool_)))
+    return joined(parts)
 
 
 def slid_poses(points: F64, normals: F64, touched: Poses, places: F64, place_normals: F64,
@@ -145,51 +147,56 @@ def slid_poses(points: F64, normals: F64, touched: Poses, places: F64, place_nor
     return Poses(np.arange(len(points)), touched.tool, tips, axes, tips - touched.tips, touched.edge, touched.turned)
 
 
-def _at(point: F64, move: int, moves: Moves, tool: ToolBody) -> tuple[F64, F64, F64 | None]:
-    """Tip, axis and outward normal of a tool where its move brought its cutting part nearest to a point.
+def _at(points: F64, mover: I32, moves: Moves, tool: ToolBody) -> tuple[F64, F64, F64]:
+    """Tips, axes and outward normals of a tool where its moves brought its cutting part nearest to points.
 
-    The normal is None where that is farther than ``ON_TOOL``.
+    points : (n, 3) float64, mm; mover : (n,) int32, index, the move of each
+
+    Returns three (n, 3) float64; a normal is NaN where that is farther than ``ON_TOOL``.
     """
-    low, high = 0.0, 1.0
-    outline = np.array(tool.cutting_profile(CHORDS))
+    row, outline = np.arange(len(points)), np.array(tool.cutting_profile(CHORDS))
+    low, high = np.zeros(len(points)), np.ones(len(points))
     for _ in range(2):
-        share = np.linspace(low, high, PLACES + 1)
-        tips = moves.start[move] + share[:, None] * (moves.end[move] - moves.start[move])
-        axes = _axes(moves, move, share)
-        d = point - tips
-        height = np.einsum("ij,ij->i", d, axes)
-        aside = d - height[:, None] * axes
-        rho = np.linalg.norm(aside, axis=1)
-        away, slope = _off_outline(outline, rho, height)
-        best = int(np.argmin(away))
         step = (high - low) / PLACES
-        low, high = max(share[best] - step, 0.0), min(share[best] + step, 1.0)
-    if away[best] > ON_TOOL:
-        return tips[best], axes[best], None
-    out = aside[best] / max(rho[best], 1e-12)
-    return tips[best], axes[best], slope[best, 0] * out + slope[best, 1] * axes[best]
+        share = low[:, None] + step[:, None] * np.arange(PLACES + 1)
+        tips = moves.start[mover][:, None] + share[:, :, None] * (moves.end[mover] - moves.start[mover])[:, None]
+        axes = _axes(moves, mover, share)
+        d = points[:, None] - tips
+        height = np.einsum("nij,nij->ni", d, axes)
+        aside = d - height[:, :, None] * axes
+        rho = np.linalg.norm(aside, axis=2)
+        away, slope = (a.reshape(*rho.shape, -1) for a in _off_outline(outline, rho.ravel(), height.ravel()))
+        best = away[:, :, 0].argmin(axis=1)
+        low, high = np.maximum(share[row, best] - step, 0.0), np.minimum(share[row, best] + step, 1.0)
+    away, slope, aside, axes, rho = (a[row, best] for a in (away, slope, aside, axes, rho))
+    side = slope[:, :1] * aside / np.maximum(rho, 1e-12)[:, None] + slope[:, 1:] * axes
+    return tips[row, best], axes, np.where(away <= ON_TOOL, side, np.nan)
 
 
-def _axes(moves: Moves, move: int, share: F64) -> F64:
-    """Unit axes (k, 3) at shares (k,) of a move."""
+def _axes(moves: Moves, mover: I32, share: F64) -> F64:
+    """Unit axes (n, k, 3) at shares (n, k) of moves (n,)."""
     if moves.axes is None:
-        return np.tile([0.0, 0.0, 1.0], (len(share), 1))
-    own = moves.axes.only(np.array([move]))
-    angle = (share * own.angle[0])[:, None]
-    return np.asarray(np.cos(angle) * own.axis[0] + np.sin(angle) * np.cross(own.about[0], own.axis[0]))
+        return np.broadcast_to(np.array([0.0, 0.0, 1.0]), (*share.shape, 3))
+    own = moves.axes.only(mover.astype(np.int64))
+    angle, about = (share * own.angle[:, None])[:, :, None], np.cross(own.about, own.axis)
+    return np.asarray(np.cos(angle) * own.axis[:, None] + np.sin(angle) * about[:, None])
 
 
 def _off_outline(outline: F64, rho: F64, height: F64) -> tuple[F64, F64]:
     """Distance of places from an outline, (n,) mm, and the outward normal of its nearest line, (n, 2): aside and up."""
     lines = np.concatenate([outline, [[0.0, outline[-1, 1]]]])  # closed by the upper end of the flutes
-    d = np.diff(lines, axis=0)
-    long = np.hypot(d[:, 0], d[:, 1])
-    a, d, long = lines[:-1][long > 1e-12], d[long > 1e-12], long[long > 1e-12]
-    x, y = rho[:, None] - a[:, 0], height[:, None] - a[:, 1]
-    along = np.clip((x * d[:, 0] + y * d[:, 1]) / long**2, 0.0, 1.0)
-    away = np.hypot(x - along * d[:, 0], y - along * d[:, 1])
-    best = away.argmin(axis=1)
-    return away[np.arange(len(rho)), best], np.column_stack([d[best, 1], -d[best, 0]]) / long[best, None]
+    ends = np.diff(lines, axis=0)
+    long = np.hypot(ends[:, 0], ends[:, 1])
+    kept = long > 1e-12
+    starts, ends, long = lines[:-1][kept], ends[kept], long[kept]
+    best, away = np.zeros(len(rho), np.int64), np.full(len(rho), np.inf)
+    for k, (a, d, size) in enumerate(zip(starts, ends / long[:, None], long, strict=True)):
+        x, y = rho - a[0], height - a[1]
+        along = np.clip(x * d[0] + y * d[1], 0.0, size)
+        off = np.square(x - along * d[0]) + np.square(y - along * d[1])
+        nearer = off < away
+        best[nearer], away[nearer] = k, off[nearer]
+    return np.sqrt(away), np.column_stack([ends[best, 1], -ends[best, 0]]) / long[best, None]
 
 
 def _turn(side: F64, wanted: F64) -> F64 | None:

@@ -31,10 +31,40 @@ APART, FAR_APART = 0.1, 0.5  # mm between points of the surface
 MAX_POINTS = 300_000  # where more are near, they are farther apart
 WAY_STEP = 0.1  # mm between places on the way
 MAX_STEPS = 10
+CELL, GUARD = 1.5, 1e-9  # mm: points of one cell are looked at together, in a ball that is larger by rounding
 # the corners of a box by bits, and its sides as triangles
 SIDES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6],
                   [0, 6, 4], [1, 5, 7], [1, 7, 3]])
 BOOL = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """Points in groups, so that most of them need no look.
+
+    points : (n, 3) float64, mm, setup frame
+    first  : (g + 1,) int64, index of the first point of each group, and n
+    balls  : (g, 4) float64, mm: a ball round the points of each group, centre and radius
+    """
+
+    points: F64
+    first: NDArray[np.int64]
+    balls: F64
+
+    @classmethod
+    def of(cls, points: F64) -> Cloud:
+        """Points (n, 3), mm, grouped by cells of ``CELL``."""
+        cells = np.floor(points / CELL).astype(np.int64)
+        order = np.lexsort(cells.T)
+        points, cells = points[order], cells[order]
+        new = np.ones(len(points), np.bool_)
+        new[1:] = (cells[1:] != cells[:-1]).any(axis=1)
+        start = np.flatnonzero(new)
+        if not len(start):
+            return cls(points, np.zeros(1, np.int64), np.zeros((0, 4)))
+        low, high = np.minimum.reduceat(points, start), np.maximum.reduceat(points, start)
+        balls = np.column_stack([0.5 * (low + high), 0.5 * np.linalg.norm(high - low, axis=1) + GUARD])
+        return cls(points, np.append(start, len(points)), balls)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,22 +79,20 @@ class Surroundings:
         return cls(np.concatenate([cutting.tree.mesh.triangles, fixture_sides(cutting.setup)]))
 
     @cached_property
-    def far(self) -> F64:
-        """Points of all of them, (n, 3) float64, mm, setup frame, ``FAR_APART`` from each other at most."""
-        return _points_in(self.triangles, np.full(3, -np.inf), np.full(3, np.inf), FAR_APART)
+    def far(self) -> Cloud:
+        """Points of all of them, ``FAR_APART`` from each other at most."""
+        return Cloud.of(_points_in(self.triangles, np.full(3, -np.inf), np.full(3, np.inf), FAR_APART))
 
-    def near(self, frusta: F64, tips: F64, axes: F64, shift: F64) -> F64:
+    def near(self, frusta: F64, tips: F64, axes: F64, shift: F64) -> Cloud:
         """Points in the box round a tool at all poses and ways, ``APART`` from each other at most.
 
         frusta : (k, 4) float64, mm, tool frame: lower and upper end over the tip, and the radii there
         tips, axes, shift : (n, 3) float64, mm and unit, setup frame, as in ``stands_free``
-
-        Returns (p, 3) float64, mm, setup frame.
         """
         wide = float(frusta[:, 2:].max())
         heights = frusta[:, 0].min(), frusta[:, 1].max()
         ends = np.stack([tips + z * axes - s * shift for z in heights for s in (0.0, 1.0)])
-        return _points_in(self.triangles, ends.min(axis=(0, 1)) - wide, ends.max(axis=(0, 1)) + wide, APART)
+        return Cloud.of(_points_in(self.triangles, ends.min(axis=(0, 1)) - wide, ends.max(axis=(0, 1)) + wide, APART))
 
 
 def free_poses(poses: Poses, hidden: BOOL, around: Surroundings, cutting: Cutting, slack: float) -> BOOL:
@@ -116,13 +144,13 @@ def stands_free(around: Surroundings, tool: ToolBody, setup: ProofSetup, tips: F
     return out
 
 
-def _drop_blocked(out: BOOL, points: F64, frusta: F64, tips: F64, axes: F64, shift: F64) -> None:
-    """Set ``out``, (n,), to False where a tool of frusta takes in one of the points at its pose or on its way there."""
+def _drop_blocked(out: BOOL, cloud: Cloud, frusta: F64, tips: F64, axes: F64, shift: F64) -> None:
+    """Set ``out``, (n,), to False where a tool of frusta takes in a point of a cloud at its pose or on its way there."""
     hint = -1
     for k in np.flatnonzero(out):
         steps = min(max(round(float(np.linalg.norm(shift[k])) / WAY_STEP), 1), MAX_STEPS)
         for share in np.arange(steps) / steps:
-            met = first_inside(points, frusta, tips[k] - share * shift[k], axes[k], hint)
+            met = first_inside(cloud.points, cloud.first, cloud.balls, frusta, tips[k] - share * shift[k], axes[k], hint)
             if met >= 0:
                 out[k], hint = False, met
                 break
@@ -172,4 +200,4 @@ def _points_in(triangles: F64, low: F64, high: F64, apart: float) -> F64:
     return np.concatenate(found)
 
 
-__all__ = ["Surroundings", "fixture_sides", "free_poses", "stands_free"]
+__all__ = ["Cloud", "Surroundings", "fixture_sides", "free_poses", "stands_free"]
