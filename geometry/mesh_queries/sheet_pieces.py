@@ -66,6 +66,14 @@ def sheets_of(middle: F64, normals: F64, reach: F64, thickness: F64, lean: float
 
 
 @dataclass(frozen=True, eq=False)
+class _Others:
+    """Places without one sheet, and whether each stands, (n,) bool, or is of a node with too few places to tell."""
+
+    places: cKDTree
+    stands: BOOL
+
+
+@dataclass(frozen=True, eq=False)
 class SheetPieces:
     """Sheets and pieces of a solid as places of its surface, and which of them are joined.
 
@@ -85,6 +93,10 @@ class SheetPieces:
     joints: INT
     low: BOOL
     spacing: float
+
+    @cached_property
+    def _known(self) -> dict[int, _Others | None]:
+        return {}
 
     @cached_property
     def _thin(self) -> INT:
@@ -117,15 +129,22 @@ class SheetPieces:
         """
         out = np.ones(len(places), np.bool_)
         for number in np.unique(sheet[sheet >= 0]).tolist():
-            standing, size = self._standing(number)
-            if standing[np.arange(len(standing)) != number].all():
-                continue
-            others = np.flatnonzero(self.node != number)
-            rows = np.flatnonzero(sheet == number)
-            off, near = cKDTree(self.points[others]).query(places[rows])
-            node = self.node[others[near]]
-            out[rows] = standing[node] | (off > REACH * self.spacing) | (size[node] < NEIGHBOURS)
+            if number not in self._known:
+                self._known[number] = self._without(number)
+            others = self._known[number]
+            if others is not None:
+                rows = np.flatnonzero(sheet == number)
+                off, near = others.places.query(places[rows])
+                out[rows] = others.stands[near] | (off > REACH * self.spacing)
         return out
+
+    def _without(self, sheet: int) -> _Others | None:
+        """The places of other nodes than a sheet; None where all of these stand without it."""
+        standing, size = self._standing(sheet)
+        if standing[np.arange(len(standing)) != sheet].all():
+            return None
+        others = np.flatnonzero(self.node != sheet)
+        return _Others(cKDTree(self.points[others]), (standing | (size < NEIGHBOURS))[self.node[others]])
 
     def _standing(self, sheet: int) -> tuple[BOOL, INT]:
         """Of the m nodes, which are joined with a lowest place without one sheet, and how many places are joined."""

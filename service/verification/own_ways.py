@@ -80,10 +80,14 @@ def touched_on_ways(tree: TriangleTree, points: F64, tool: ToolBody, ways: MillW
     there = tree if np.array_equal(frame, np.eye(3)) else TriangleTree(tree.mesh.transformed(turn))
     at, a, b = points @ frame.T, (ways.start[mine] @ frame.T)[:, :2], (ways.end[mine] @ frame.T)[:, :2]
     xy, row = _near_places(at[:, :2], a, b, tool.radius)
+    aside = np.linalg.norm(at[row, :2] - xy, axis=1)
+    beside = aside <= tool.widest_radius + lift + grow
+    xy, row, aside = xy[beside], row[beside], aside[beside]
     narrow = _narrower(tool, clear, min(lift, 0.25 * tool.radius))
     tips = drop_turned(there, xy, narrow) + grow
-    near = _distance(tool, np.linalg.norm(at[row, :2] - xy, axis=1), at[row, 2] - tips) <= lift + grow
-    out[row[near & np.isfinite(tips)]] = True
+    on = np.flatnonzero(np.isfinite(tips))
+    near = _distance(tool, aside[on], at[row[on], 2] - tips[on]) <= lift + grow
+    out[row[on[near]]] = True
     return out
 
 

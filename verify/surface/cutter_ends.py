@@ -43,6 +43,7 @@ TOLD = 0.5  # mm: a wider step along the ways is a note
 THIN = 0.05  # mm
 BATCH = 4096  # poses
 SPARE = 1e-6  # mm
+CLOSE = 0.5  # mm: places of a rim that are farther from the surface are told apart by whether they are in the part
 INT = NDArray[np.int64]
 
 
@@ -295,11 +296,18 @@ def _deepest(tree: TriangleTree, tip: F64, axis: F64, on: _Ring, least: float) -
     y = np.cross(axis, x)
     ring, ball = on.radius, on.grown
     middle = tip + on.high * axis
+    around = 1 if ring <= 0.0 else AROUND
+    rough = ring * (1.0 - math.cos(math.pi / around))  # by which the rim may be deeper between two places
+    close = max(rough - least, CLOSE)
 
     def depth(rows: INT, angle: F64) -> tuple[F64, F64, F64, INT]:
         """How deep the end presses in at angles (k,) rad of poses; feet, ways out, triangles."""
         at = middle[rows] + ring * (np.cos(angle)[:, None] * x[rows] + np.sin(angle)[:, None] * y[rows])
-        far, triangle, foot = nearest(tree, at, ball if ball > 0.0 else np.inf)
+        far, triangle, foot = nearest(tree, at, ball if ball > 0.0 else close)
+        if ball <= 0.0:  # of places that are farther, those in the air do not count
+            alone = np.flatnonzero(triangle < 0)
+            alone = alone[_inside_alone(tree, at[alone], close)]
+            far[alone], triangle[alone], foot[alone] = nearest(tree, at[alone])
         met = triangle >= 0
         inside = met & (np.einsum("ij,ij->i", at - foot, tree.mesh.normals[triangle]) < 0.0)
         doubtful = np.flatnonzero(inside & (far > least))
@@ -310,12 +318,11 @@ def _deepest(tree: TriangleTree, tip: F64, axis: F64, on: _Ring, least: float) -
         way[flat] = tree.mesh.normals[triangle[flat]]
         return deep, foot, way, triangle
 
-    n, around = len(tip), 1 if ring <= 0.0 else AROUND
+    n = len(tip)
     every = np.repeat(np.arange(n), around)
     angle = np.tile(2.0 * math.pi * np.arange(around) / around, n)
     deep, foot, way, triangle = depth(every, angle)
     best = np.arange(n) * around + deep.reshape(n, around).argmax(axis=1)
-    rough = ring * (1.0 - math.cos(math.pi / around))  # by which the rim may be deeper between two places
     rows = np.flatnonzero(deep[best] > least - rough)
     deep, foot, way, triangle, angle = deep[best], foot[best], way[best], triangle[best], angle[best]
     span = math.pi / around

@@ -5,6 +5,7 @@ Coordinates are float64, mm, in the frame of the proof.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -151,14 +152,28 @@ class FinishedPlanes:
         if not len(rows):
             return out
         ends = points[rows] + height[rows, None] * normals[rows]
-        keys, of = np.unique(_plane_keys(self.run[mover[rows]], ends, normals[rows], self.width), axis=0,
-                             return_inverse=True)
+        keys, of = _distinct(_plane_keys(self.run[mover[rows]], ends, normals[rows], self.width))
         mine = np.isin(self.own, keys[:, 0])  # of few runs anything is asked
-        planes = _plane_keys(self.own[mine], self.points[mine], self.normals[mine], self.width)
-        finished = frozenset(map(tuple, np.unique(planes, axis=0).tolist()))
+        planes, _ = _distinct(_plane_keys(self.own[mine], self.points[mine], self.normals[mine], self.width))
+        finished = frozenset(map(tuple, planes.tolist()))
         known = np.array([any((*k[:4], k[4] + d) in finished for d in (-1, 0, 1)) for k in map(tuple, keys.tolist())])
-        out[rows] = known[of.reshape(-1)]
+        out[rows] = known[of]
         return out
+
+
+def _distinct(rows: INT) -> tuple[INT, INT]:
+    """The distinct rows of whole numbers (n, k), and which of them each is, (n,); by one number each, where that is
+    exact."""
+    low = rows.min(axis=0, initial=0)
+    span = (rows.max(axis=0, initial=0) - low + 1).tolist()
+    if math.prod(span) >= 2**62:
+        distinct, of = np.unique(rows, axis=0, return_inverse=True)
+        return distinct, of.reshape(-1)
+    number = np.zeros(len(rows), np.int64)
+    for column, size in zip((rows - low).T, span, strict=True):
+        number = number * size + column
+    _, first, of = np.unique(number, return_index=True, return_inverse=True)
+    return rows[first], of.reshape(-1)
 
 
 def _plane_keys(run: INT, points: F64, normals: F64, width: float) -> INT:

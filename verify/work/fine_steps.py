@@ -97,7 +97,8 @@ def _spread(values: F64, first: INT) -> F64:
 def _even_on_slopes(points: F64, height: F64, mover: I32, of: INT, uneven: float, cutting: Cutting) -> BOOL:
     """Whether stock at places is even but for a slope, and moves at as many heights left it as the places have.
 
-    points : (n, 3) float64, mm; height : (n,) float64, mm; mover : (n,) int32, index, the move that left it, -1 for none
+    points : (n, 3) float64, mm; height : (n,) float64, mm
+    mover  : (n,) int32, index, the move that left it, -1 for none
     of     : (n,) int64, ascending, the group of each; a group has a slope of its own, by least squares
 
     Returns (g,) bool.

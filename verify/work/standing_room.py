@@ -145,12 +145,12 @@ def stands_free(around: Surroundings, tool: ToolBody, setup: ProofSetup, tips: F
 
 
 def _drop_blocked(out: BOOL, cloud: Cloud, frusta: F64, tips: F64, axes: F64, shift: F64) -> None:
-    """Set ``out``, (n,), to False where a tool of frusta takes in a point of a cloud at its pose or on its way there."""
-    hint = -1
+    """Set ``out``, (n,), to False where a tool of frusta takes in a point at its pose or on its way there."""
+    hint, groups = -1, (cloud.points, cloud.first, cloud.balls)
     for k in np.flatnonzero(out):
         steps = min(max(round(float(np.linalg.norm(shift[k])) / WAY_STEP), 1), MAX_STEPS)
         for share in np.arange(steps) / steps:
-            met = first_inside(cloud.points, cloud.first, cloud.balls, frusta, tips[k] - share * shift[k], axes[k], hint)
+            met = first_inside(*groups, frusta, tips[k] - share * shift[k], axes[k], hint)
             if met >= 0:
                 out[k], hint = False, met
                 break

@@ -224,18 +224,18 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     tight = high[~left[high]]
     touched = tight[reached(tight, limits.near, 0.0)]
     beyond = np.setdiff1d(tight, touched)
-    uneven = limits.h + 2.0 * limits.error
-    fine = in_fine_steps(few, height, mover, beyond, uneven, measured, cutting)
-    touched = np.union1d(touched, beyond[asked.touch.on_ways(few.subset(beyond), tools, axes, limits.near, fine)])
-    stepped = np.setdiff1d(beyond[fine], touched)
+    fine = np.zeros(len(tried), np.bool_)
+    fine[beyond] = in_fine_steps(few, height, mover, beyond, limits.h + 2.0 * limits.error, measured, cutting)
+    by_ways = asked.touch.on_ways(few.subset(beyond), tools, axes, limits.near, fine[beyond])
+    touched = np.union1d(touched, beyond[by_ways])
+    stepped = np.setdiff1d(beyond[fine[beyond]], touched)
     touched = np.union1d(touched, stepped[asked.touch.edges(few.subset(stepped), tools, axes, limits.near)])
     beyond = np.setdiff1d(beyond, touched)
     why[beyond] = asked.touch.reasons(few.subset(beyond), tools, axes)
     tight_for = (UNDERCUT, CORNER, SHARP_CORNER) if cutting.moves.axes is not None else (UNDERCUT, CORNER)
     below = beyond[np.isin(why[beyond], tight_for) & (height[beyond] > limits.corner)]
-    fine = in_fine_steps(few, height, mover, below, uneven, measured, cutting)
-    below = below[touched_on_from(measured, few.subset(below), why[below] == UNDERCUT, along[below], mover[below], fine,
-                                  axes, limits.h, limits.lift, limits.near, cutting)]
+    below = below[touched_on_from(measured, few.subset(below), why[below] == UNDERCUT, along[below], mover[below],
+                                  fine[below], axes, limits.h, limits.lift, limits.near, cutting)]
     touched = np.union1d(touched, below)
     deep = _missing_depths(few, touched, mover, axes, limits.lift, cutting)
     corner = np.zeros(len(tried), np.bool_)
