@@ -31,6 +31,7 @@ APART, FAR_APART = 0.1, 0.5  # mm between points of the surface
 MAX_POINTS = 300_000  # where more are near, they are farther apart
 WAY_STEP = 0.1  # mm between places on the way
 MAX_STEPS = 10
+SAME_PLACE = 1e-3  # mm
 CELL, GUARD = 1.5, 1e-9  # mm: points of one cell are looked at together, in a ball that is larger by rounding
 # the corners of a box by bits, and its sides as triangles
 SIDES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6],
@@ -53,15 +54,14 @@ class Cloud:
 
     @classmethod
     def of(cls, points: F64) -> Cloud:
-        """Points (n, 3), mm, grouped by cells of ``CELL``."""
-        cells = np.floor(points / CELL).astype(np.int64)
-        order = np.lexsort(cells.T)
-        points, cells = points[order], cells[order]
-        new = np.ones(len(points), np.bool_)
-        new[1:] = (cells[1:] != cells[:-1]).any(axis=1)
-        start = np.flatnonzero(new)
-        if not len(start):
+        """Points (n, 3), mm, grouped by cells of ``CELL``; of points that are one but for ``SAME_PLACE``, the first."""
+        points = points[np.unique(_cells(points, SAME_PLACE), return_index=True)[1]]
+        if not len(points):
             return cls(points, np.zeros(1, np.int64), np.zeros((0, 4)))
+        cells = _cells(points, CELL)
+        order = np.argsort(cells, kind="stable")
+        points, cells = points[order], cells[order]
+        start = np.flatnonzero(np.diff(cells, prepend=-1))
         low, high = np.minimum.reduceat(points, start), np.maximum.reduceat(points, start)
         balls = np.column_stack([0.5 * (low + high), 0.5 * np.linalg.norm(high - low, axis=1) + GUARD])
         return cls(points, np.append(start, len(points)), balls)
@@ -176,6 +176,15 @@ def _frusta(tool: ToolBody, setup: ProofSetup, grow: float) -> F64:
     outline = [(max(rho, 0.0), z - grow if z < tool.flute_length else z + grow) for rho, z in outline]
     cutter = [(a[1], b[1], a[0], b[0]) for a, b in pairwise(outline) if b[1] > a[1]]
     return np.array([*cutter, *Bodies.of([tool], setup).rows[:, :4].tolist()])
+
+
+def _cells(points: F64, size: float) -> NDArray[np.int64]:
+    """Number of the cell of each point (n, 3), mm, from 0; cells are larger than ``size`` where 2^20 on a side do not
+    hold the points."""
+    low = points.min(axis=0, initial=np.inf)
+    size = max(size, float((points - low).max(initial=0.0)) / (2**20 - 1))
+    x, y, z = np.floor((points - low) / size).astype(np.int64).T
+    return np.asarray((x << 40) + (y << 20) + z)
 
 
 def _points_in(triangles: F64, low: F64, high: F64, apart: float) -> F64:
