@@ -91,7 +91,7 @@ def test_a_flank_that_leans_too_little_leaves_a_wedge(tmp_path, lean, state, sto
              "G43 H1 Z60", "M428", f"G0 A-{lean} C0", f"G0 X-6 Y-8 Z{z:.4f}", f"G0 Y{y:.5f}", "G1 X14 F150",
              "G1 Y-8 F400", "G0 Z60", "G0 A0 C0", "M429", "G53 G0 Z0", "M5", "M30"]
     report = proof(tmp_path, wall(0.0), setup, lines, blank)
-    assert report["state"] == state
+    assert report["state"] == state, report["findings"][:3]
     if state == "clean":
         lowest = 4.0 * math.tan(LEAN - a) / math.cos(LEAN)  # at the foot; the end of the tool stays a little above
         assert all(0.5 * lowest < depth < lowest + 0.003 for depth in heights(report).values()) and heights(report)
@@ -166,3 +166,30 @@ def test_a_half_round_ring_as_wide_as_its_ball_is_asked_all_round(tmp_path, shar
     assert report["state"] == state, report["findings"][:2]
     if state == "clean":
         assert max(heights(report).values()) == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(("short", "state"), [(0.0, "proved"), (0.2, "clean"), (0.4, "clean")])
+def test_a_mill_that_stops_before_it_touches_both_walls_of_a_notch(tmp_path, short, state):
+    """Two upright walls meet at 60 degrees: a crescent of that thickness stays on the floor at the end of the way."""
+    cq = pytest.importorskip("cadquery")
+    tangent, sine = math.tan(math.radians(30.0)), math.sin(math.radians(30.0))
+    notch = cq.Workplane("XY", origin=(0, 0, 3)).polyline([(-1, 8 - 17 * tangent), (16, 8), (-1, 8 + 17 * tangent)])
+    shape = cq.Workplane().box(20, 16, 6, centered=False).cut(notch.close().extrude(4))
+    setup = {"tools": [MILL], "stock": {"kind": "box", "box_mm": [[0, 0, 0], [20, 16, 6]], "uncertainty_mm": 0.0}}
+    end = 16.0 - 2.0 / sine - short
+
+    def aside(x, more):
+        return max((16.0 - x) * tangent - 2.0 / math.cos(math.radians(30.0)) - more, 0.0)
+    lines = ["G21 G17 G90 G94 G40 G49 G80 G64 P0.001", "G54", "T1 M6", "S3000 M3", "G0 X-8 Y8", "G43 H1 Z30", "G0 Z9"]
+    for z in (5.2, 4.4, 3.6, 3.0):
+        for more in (9.0, 7.5, 6.0, 4.5, 3.0, 1.5, 0.0):
+            last = min(end, 16.0 - (2.0 / math.cos(math.radians(30.0)) + more) / tangent)
+            way = aside(last, more)
+            lines += ["G0 Z9", f"G0 X-5 Y{8.0 - aside(-5.0, more):.4f}", f"G0 Z{z}",
+                      f"G1 X{last:.4f} Y{8.0 - way:.4f} F300", f"G1 Y{8.0 + way:.4f}",
+                      f"G1 X-5 Y{8.0 + aside(-5.0, more):.4f}"]
+    report = proof(tmp_path, shape, setup, [*lines, "G0 Z30", "M5", "G53 G0 Z0", "M2"])
+    assert report["state"] == state, report["findings"][:3]
+    if short:
+        floor = max(f["depth"] for f in report["findings"] if f["kind"] == "stock_left" and f["point"][2] < 3.01)
+        assert 0.6 * short < floor < 1.15 * short

@@ -25,13 +25,18 @@ def job(tmp_path_factory):
                          parse_setup(json.dumps(SETUP)), lambda _stage, _share: None)
 
 
-def rounds(step, out=0.0, up=0.0, lowest=-0.5):
-    """Rounds about the frustum down to ``lowest``, ``step`` mm apart, ``out`` mm too far away, ``up`` mm too high."""
+def rounds(step, out=0.0, up=0.0, lowest=-0.5, left_out=(9.0, 9.0)):
+    """Rounds about the frustum down to ``lowest``, ``step`` mm apart, ``out`` mm too far away, ``up`` mm too high.
+
+    Those between the two heights ``left_out`` are missing.
+    """
     lines = ["G21 G17 G90 G94 G40 G49 G80 G64 P0.001 Q0", "G54", "T1 M6", "G43 H1", "S6000 M3", "G0 X-20 Y-20", "Z20"]
     for k in range(1, round(3.5 / step) + 1):
         z = 3.0 - k * step
         if z < lowest - 1e-9:
             break
+        if left_out[0] < z < left_out[1]:
+            continue
         x, y = 5.0 - z * LEAN + 3.0 + out, 4.0 - z * LEAN + 3.0 + out
         lines += [f"G1 X{-x:.5f} Y-20 F600", f"Z{z + up:.4f}", f"Y{y:.5f}", f"X{x:.5f}", f"Y{-y:.5f}", f"X{-x:.5f}"]
     return "\n".join([*lines, "G1 Y-20", "G0 Z40", "G53 G0 Z0", "M2", ""])
@@ -70,6 +75,19 @@ def test_slopes_that_fine_steps_finish_in_part_are_asked_to_their_foot(job):
     assert report["state"] == "clean"
     low = [f for f in report["findings"] if f["kind"] == "stock_left" and f["point"][2] < 1.5]
     assert low and {f["face"] for f in low} <= {"F2", "F3", "F4", "F5"}
+
+
+@pytest.mark.parametrize(("left_out", "lowest", "high"), [((9.0, 9.0), -0.5, None), ((1.0, 2.2), -0.5, 1.2),
+                                                         ((9.0, 9.0), 1.5, 1.5)])
+def test_steps_left_out_are_told_though_the_steps_are_not_fine(job, left_out, lowest, high):
+    """Steps of 0.15 leave stairs of 0.026, more than the scallop height, which are remainder where all are there."""
+    report = proof_of(job, rounds(0.15, lowest=lowest, left_out=left_out))
+    assert report["state"] == ("proved" if high is None else "clean")
+    if high is not None:
+        deepest = high * math.sin(math.radians(10.0))
+        found = [f for f in report["findings"] if f["kind"] == "stock_left"]
+        assert {f["face"] for f in found} >= {"F2", "F3", "F4", "F5"}
+        assert 0.6 * deepest < max(f["depth"] for f in found) < deepest + 0.01
 
 
 ROUND = {"tools": [dict(FLAT, diameter_mm=4)], "quality": {"scallop_height_mm": 0.01},

@@ -22,6 +22,8 @@ FOLLOWED = 0.5  # of the height of a place along the axis, over which the moves 
 FLAT = 1e-6  # mm: places that are spread no more in a direction have no slope along it
 SOLID_SHARE = 0.01  # of a face: finished all round within ``FIT_WITHIN``
 MAX_SOLID = 10_000  # samples of a face that are looked at for that
+LEAST_STAIRS = 20  # samples of a face that edges left stock on
+USUAL, HIGHER = 0.5, 4.0  # share of them that is no higher than stairs usually are; times as high are no stairs
 BOOL = NDArray[np.bool_]
 INT = NDArray[np.int64]
 
@@ -39,12 +41,14 @@ def in_fine_steps(few: SurfaceSamples, height: F64, mover: I32, rows: INT, uneve
 
     Notes
     -----
-    One of three things makes steps fine.
+    One of four things makes steps fine.
 
     - The stock is even round the sample.
     - What the same tool left is even but for a slope, as an offset is on a round face, and moves at many heights left
       it. A single stair of roughing is a slope, too, but one move leaves it.
     - Patches of the face are finished by edges all round, on a hundredth of it. Stairs of roughing finish lines alone.
+    - The stock is much higher than the stairs that edges leave on the face, on the normal and along the axis: a part of
+      the steps is left out, however coarse they are.
     """
     out, tool = np.zeros(len(rows), np.bool_), cutting.moves.tool
     for face in np.unique(few.face[rows]).tolist():
@@ -53,6 +57,8 @@ def in_fine_steps(few: SurfaceSamples, height: F64, mover: I32, rows: INT, uneve
         if _finished_by_edges(face, measured, cutting):
             out[mine] = True
             continue
+        out[mine] = _over_stairs(few.normals[rows[mine]], height[rows[mine]], face, measured, uneven, cutting)
+        mine = mine[~out[mine]]
         if not len(known):
             continue
         tree, left = cKDTree(few.points[known]), mine[mover[rows[mine]] >= 0]
@@ -71,6 +77,29 @@ def in_fine_steps(few: SurfaceSamples, height: F64, mover: I32, rows: INT, uneve
         even = _even_on_slopes(few.points[beside], height[beside], mover[beside], of, uneven, cutting)
         out[left[np.unique(of)[even]]] = True
     return out
+
+
+def _over_stairs(normals: F64, height: F64, face: int, measured: Measured, uneven: float, cutting: Cutting) -> BOOL:
+    """Whether stock is much higher than the stairs that edges of flat ends leave on the same face.
+
+    normals : (r, 3) float64, unit, setup frame; height : (r,) float64, mm over the allowance
+    uneven  : mm by which stock may differ where it is even
+
+    Returns (r,) bool. A stair of height s leaves up to s cos of the slope on the normal, so both are compared.
+    """
+    s = measured.samples
+    stairs = thinned(np.flatnonzero((s.face == face) & (measured.mover >= 0)), MAX_SOLID)
+    stairs = stairs[_sharp(cutting)[cutting.moves.tool[measured.mover[stairs]]]]
+    axes = _axes(cutting, measured.mover[stairs])
+    up = np.abs(np.einsum("ij,ij->i", s.normals[stairs], axes))
+    sloping = (up > UPRIGHT) & (up < LEVEL)
+    stairs, up, axes = stairs[sloping], up[sloping], axes[sloping]
+    if len(stairs) < LEAST_STAIRS:
+        return np.zeros(len(normals), np.bool_)
+    stock = np.maximum(measured.residual[stairs] - cutting.setup.stock_allowance, 0.0)
+    usual, step = (float(np.quantile(v, USUAL)) for v in (stock, stock / up))
+    lean = np.maximum(np.abs(normals @ axes[len(axes) // 2]), UPRIGHT)
+    return np.asarray((height > max(HIGHER * usual, uneven)) & (height / lean > HIGHER * step))
 
 
 def _near(tree: cKDTree, points: F64, within: float) -> tuple[INT, INT]:
@@ -126,7 +155,7 @@ def _mean(values: F64, first: INT, count: INT) -> F64:
 
 def _finished_by_edges(face: int, measured: Measured, cutting: Cutting) -> bool:
     """Whether edges of flat ends have finished patches of a sloping face."""
-    s, sharp = measured.samples, np.array([t.tip_curvature <= 0.0 and not t.named for t in cutting.tools], np.bool_)
+    s, sharp = measured.samples, _sharp(cutting)
     rows = thinned(np.flatnonzero(s.face == face), MAX_SOLID)
     by = measured.mover[rows]
     good = proved_samples(measured.residual[rows], cutting.setup) & (by >= 0)
@@ -138,6 +167,11 @@ def _finished_by_edges(face: int, measured: Measured, cutting: Cutting) -> bool:
     around = cKDTree(s.points[rows]).query_ball_point(s.points[rows[good]], FIT_WITHIN)
     solid = sum(len(near) >= LEAST_NEAR and bool(good[near].all()) for near in around)
     return solid >= max(SOLID_SHARE * len(rows), 1.0)
+
+
+def _sharp(cutting: Cutting) -> BOOL:
+    """(k,) bool, which tools are mills with a sharp edge at the end."""
+    return np.array([t.tip_curvature <= 0.0 and not t.named for t in cutting.tools], np.bool_)
 
 
 def _axes(cutting: Cutting, moves: INT | I32) -> F64:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh import F64
 from geometry.tool_body import ToolBody
-from verify.kernels.surface.standing import first_inside
+from verify.kernels.surface.standing import first_inside, settle
 from verify.model import ProofSetup
 from verify.tool_bodies import Bodies
 from verify.work.asked_faces import Cutting
@@ -31,6 +31,9 @@ APART, FAR_APART = 0.1, 0.5  # mm between points of the surface
 MAX_POINTS = 300_000  # where more are near, they are farther apart
 WAY_STEP = 0.1  # mm between places on the way
 MAX_STEPS = 10
+MAX_DEPTH = 0.3  # mm: a tool that enters by more is not moved aside
+ROUNDS = 12  # of moving aside
+TOUCHES = 1e-3  # mm
 SAME_PLACE = 1e-3  # mm
 CELL, GUARD = 1.5, 1e-9  # mm: points of one cell are looked at together, in a ball that is larger by rounding
 # the corners of a box by bits, and its sides as triangles
@@ -51,6 +54,14 @@ class Cloud:
     points: F64
     first: NDArray[np.int64]
     balls: F64
+
+    @property
+    def groups(self) -> tuple[F64, NDArray[np.int64], F64]:
+        """All of it, as kernels take it.
+
+        Returns points (n, 3) float64, mm, setup frame, first (g + 1,) int64, index, and balls (g, 4) float64, mm.
+        """
+        return self.points, self.first, self.balls
 
     @classmethod
     def of(cls, points: F64) -> Cloud:
@@ -83,8 +94,8 @@ class Surroundings:
         """Points of all of them, ``FAR_APART`` from each other at most."""
         return Cloud.of(_points_in(self.triangles, np.full(3, -np.inf), np.full(3, np.inf), FAR_APART))
 
-    def near(self, frusta: F64, tips: F64, axes: F64, shift: F64) -> Cloud:
-        """Points in the box round a tool at all poses and ways, ``APART`` from each other at most.
+    def near(self, frusta: F64, tips: F64, axes: F64, shift: F64, apart: float) -> Cloud:
+        """Points in the box round a tool at all poses and ways, ``apart`` mm from each other at most.
 
         frusta : (k, 4) float64, mm, tool frame: lower and upper end over the tip, and the radii there
         tips, axes, shift : (n, 3) float64, mm and unit, setup frame, as in ``stands_free``
@@ -92,7 +103,7 @@ class Surroundings:
         wide = float(frusta[:, 2:].max())
         heights = frusta[:, 0].min(), frusta[:, 1].max()
         ends = np.stack([tips + z * axes - s * shift for z in heights for s in (0.0, 1.0)])
-        return Cloud.of(_points_in(self.triangles, ends.min(axis=(0, 1)) - wide, ends.max(axis=(0, 1)) + wide, APART))
+        return Cloud.of(_points_in(self.triangles, ends.min(axis=(0, 1)) - wide, ends.max(axis=(0, 1)) + wide, apart))
 
 
 def free_poses(poses: Poses, hidden: BOOL, around: Surroundings, cutting: Cutting, slack: float) -> BOOL:
@@ -132,21 +143,62 @@ def stands_free(around: Surroundings, tool: ToolBody, setup: ProofSetup, tips: F
     Returns (n,) bool.
     """
     frusta = _frusta(tool, setup, setup.stock_allowance - slack)
-    if column:  # a part of the tool is no thinner than what is below it
-        widest = np.maximum.accumulate(frusta[:, 2:].reshape(-1)).reshape(-1, 2)
-        frusta = np.column_stack([frusta[:, :2], widest])
+    if column:
+        frusta = _column(frusta)
     out = np.ones(len(tips), np.bool_)
     _drop_blocked(out, around.far, frusta, tips, axes, shift)
     rows = np.flatnonzero(out)
     if len(rows):
         head = frusta[frusta[:, 0] < max(tool.flute_length, tool.neck_length)]
-        _drop_blocked(out, around.near(head, tips[rows], axes[rows], shift[rows]), frusta, tips, axes, shift)
+        _drop_blocked(out, around.near(head, tips[rows], axes[rows], shift[rows], APART), frusta, tips, axes, shift)
     return out
+
+
+def moved_aside(poses: Poses, places: F64, normals: F64, around: Surroundings, cutting: Cutting, room: float) -> BOOL:
+    """Poses of tools that still touch their places when they are moved aside until part and fixtures are ``room`` away.
+
+    places, normals : (n, 3) float64, mm and unit, setup frame, what the poses touch; of walls, with the room between
+    room   : mm
+
+    Returns (n,) bool.
+
+    Notes
+    -----
+    Where a mill meets walls on two sides, few of its places touch what lies between them. A pose is pushed square to
+    its axis away from the deepest point inside it, and back to its place, in turn; the tool comes down its axis there.
+    """
+    out, grow = np.zeros(len(poses), np.bool_), cutting.setup.stock_allowance + room
+    for k in np.unique(poses.tool):
+        rows, tool = np.flatnonzero(poses.tool == k), cutting.tools[k]
+        frusta = _column(_frusta(tool, cutting.setup, grow))
+        frusta[:, :2] += grow + TOUCHES  # it may stand on what lies below its end
+        height, up = (np.einsum("ij,ij->i", v, poses.axes[rows]) for v in (places[rows] - poses.tips[rows],
+                                                                           normals[rows]))
+        outline = np.array(tool.cutting_profile(CHORDS))
+        wide = np.interp(height + TOUCHES, outline[:, 1], outline[:, 0]) + TOUCHES
+        wide += grow * np.sqrt(np.maximum(1.0 - up**2, 0.0))
+        head = frusta[frusta[:, 0] < max(tool.flute_length, tool.neck_length)]
+        for fine in (False, True):  # the points far apart rule most of them out
+            tips, axes, none = poses.tips[rows].copy(), poses.axes[rows], np.zeros((len(rows), 3))
+            groups = (around.near(head, tips, axes, none, APART) if fine else around.far).groups
+            kept = np.array([settle(*groups, frusta, tips[n], axes[n], places[row], wide[n], MAX_DEPTH, ROUNDS)
+                             for n, row in enumerate(rows.tolist())], np.bool_)
+            rows, wide = rows[kept], wide[kept]
+            if not len(rows):
+                break
+        out[rows] = True
+    return out
+
+
+def _column(frusta: F64) -> F64:
+    """Frusta of a tool that comes down its axis: no part is thinner than what is below it."""
+    widest = np.maximum.accumulate(frusta[:, 2:].reshape(-1)).reshape(-1, 2)
+    return np.column_stack([frusta[:, :2], widest])
 
 
 def _drop_blocked(out: BOOL, cloud: Cloud, frusta: F64, tips: F64, axes: F64, shift: F64) -> None:
     """Set ``out``, (n,), to False where a tool of frusta takes in a point at its pose or on its way there."""
-    hint, groups = -1, (cloud.points, cloud.first, cloud.balls)
+    hint, groups = -1, cloud.groups
     for k in np.flatnonzero(out):
         steps = min(max(round(float(np.linalg.norm(shift[k])) / WAY_STEP), 1), MAX_STEPS)
         for share in np.arange(steps) / steps:
@@ -209,4 +261,4 @@ def _points_in(triangles: F64, low: F64, high: F64, apart: float) -> F64:
     return np.concatenate(found)
 
 
-__all__ = ["Cloud", "Surroundings", "fixture_sides", "free_poses", "stands_free"]
+__all__ = ["Cloud", "Surroundings", "fixture_sides", "free_poses", "moved_aside", "stands_free"]

@@ -38,7 +38,7 @@ from verify.work.asked_faces import (
 )
 from verify.work.fine_steps import in_fine_steps
 from verify.work.hidden_faces import hidden_work
-from verify.work.moved_tools import MAX_WAY, touched_on_from
+from verify.work.moved_tools import MAX_WAY, Left, touched_on_from
 from verify.work.stock_places import StandingStock, stock_findings
 from verify.work.unread_work import UnreadWork
 from verify.work.ways_out import ROUNDING, WaysOut, ways_out
@@ -234,8 +234,8 @@ def _standing(asked: Asked, measured: Measured, cutting: Cutting, few: SurfaceSa
     why[beyond] = asked.touch.reasons(few.subset(beyond), tools, axes)
     tight_for = (UNDERCUT, CORNER, SHARP_CORNER) if cutting.moves.axes is not None else (UNDERCUT, CORNER)
     below = beyond[np.isin(why[beyond], tight_for) & (height[beyond] > limits.corner)]
-    below = below[touched_on_from(measured, few.subset(below), why[below] == UNDERCUT, along[below], mover[below],
-                                  fine[below], axes, limits.h, limits.lift, limits.near, cutting)]
+    stood = Left(few.subset(below), why[below] == UNDERCUT, along[below], mover[below], fine[below])
+    below = below[touched_on_from(measured, stood, axes, limits.h, limits.lift, limits.near, limits.face, cutting)]
     touched = np.union1d(touched, below)
     deep = _missing_depths(few, touched, mover, axes, limits.lift, cutting)
     corner = np.zeros(len(tried), np.bool_)
